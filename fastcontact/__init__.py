@@ -32,13 +32,16 @@ _MODULES = {
 _NAMES = {
     "analysis.contact_answers": ("ContactAnswers", "contact_answers", "contact_history", "contact_moment", "wear"),
     "analysis.criteria": ("Criteria",),
+    "analysis.modes": ("Modes", "modes"),
     "analysis.run": ("solve", "solve_steps"),
     "analysis.sensitivities": ("Sensitivities", "sensitivities"),
     "analysis.support_forces": ("pretension_history", "spring_forces", "support_forces"),
     "cases.decks.deck": ("Deck", "read_deck"),
+    "contact.found_contacts": ("FoundContacts", "find_contacts"),
     "elasticity.anisotropic_materials": ("Anisotropic", "Orthotropic"),
     "elasticity.material_axes": ("CylindricalAxes",),
     "elasticity.materials": ("LinearElastic",),
+    "elasticity.nonlinear_materials": ("ElasticPlastic", "MooneyRivlin", "NeoHookean", "Ogden", "Yeoh"),
     "elasticity.varying_constants": ("Tabulated",),
     "errors": (
         "CaseError",

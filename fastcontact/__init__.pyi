@@ -8,6 +8,8 @@ from fastcontact.analysis.contact_answers import contact_history as contact_hist
 from fastcontact.analysis.contact_answers import contact_moment as contact_moment
 from fastcontact.analysis.contact_answers import wear as wear
 from fastcontact.analysis.criteria import Criteria as Criteria
+from fastcontact.analysis.modes import Modes as Modes
+from fastcontact.analysis.modes import modes as modes
 from fastcontact.analysis.run import solve as solve
 from fastcontact.analysis.run import solve_steps as solve_steps
 from fastcontact.analysis.sensitivities import Sensitivities as Sensitivities
@@ -18,11 +20,28 @@ from fastcontact.analysis.support_forces import support_forces as support_forces
 from fastcontact.cases.decks.deck import Deck as Deck
 from fastcontact.cases.decks.deck import read_deck as read_deck
 from fastcontact.contact import obstacles as obstacles
+from fastcontact.contact.found_contacts import FoundContacts as FoundContacts
+from fastcontact.contact.found_contacts import find_contacts as find_contacts
 from fastcontact.elasticity import recovery as recovery
 from fastcontact.elasticity.anisotropic_materials import Anisotropic as Anisotropic
 from fastcontact.elasticity.anisotropic_materials import Orthotropic as Orthotropic
 from fastcontact.elasticity.material_axes import CylindricalAxes as CylindricalAxes
 from fastcontact.elasticity.materials import LinearElastic as LinearElastic
+from fastcontact.elasticity.nonlinear_materials import (
+    ElasticPlastic as ElasticPlastic,
+)
+from fastcontact.elasticity.nonlinear_materials import (
+    MooneyRivlin as MooneyRivlin,
+)
+from fastcontact.elasticity.nonlinear_materials import (
+    NeoHookean as NeoHookean,
+)
+from fastcontact.elasticity.nonlinear_materials import (
+    Ogden as Ogden,
+)
+from fastcontact.elasticity.nonlinear_materials import (
+    Yeoh as Yeoh,
+)
 from fastcontact.elasticity.varying_constants import Tabulated as Tabulated
 from fastcontact.errors import CaseError as CaseError
 from fastcontact.errors import ContactError as ContactError

@@ -43,8 +43,8 @@ class Balance:
         The largest force that nothing balances over the largest one of this step, zero where that is round-off.
     noise : float
         Forces up to this are round-off [force].
-    energy : float
-        Of deformation, springs included [energy].
+    energy : (float, float)
+        Of deformation, springs included, and plastic work since the beginning [energy].
     """
 
     reaction: Array
@@ -53,7 +53,7 @@ class Balance:
     bound: float
     relative: float
     noise: float = 0.0
-    energy: float = 0.0
+    energy: tuple[float, float] = (0.0, 0.0)
 
     @property
     def excess(self) -> float:
@@ -90,7 +90,10 @@ class Balance:
         )
 
 
-def balance(problem: Problem, u: Array, contact_force: Array, external: Array, largest_so_far: float) -> Balance:
+def balance(
+    problem: Problem, u: Array, contact_force: Array, external: Array, largest_so_far: float,
+    internal: tuple[Array, tuple[float, float]] | None = None,
+) -> Balance:  # fmt: skip
     """Return the reactions, and by how much all other degrees of freedom are out of balance.
 
     Parameters
@@ -102,10 +105,15 @@ def balance(problem: Problem, u: Array, contact_force: Array, external: Array, l
         Nodal forces of contact and of loads [force].
     largest_so_far : float
         The largest force of the steps so far [force].
+    internal : (ndarray (n_dofs,), (float, float)), optional
+        Forces [force] and energies [energy] of nonlinear bodies and of springs.
     """
     criteria = problem.criteria
-    out = problem.system.K @ u
-    energy = 0.5 * float(u @ out)
+    if internal is None:
+        out = problem.system.K @ u
+        energy = 0.5 * float(u @ out), 0.0
+    else:
+        out, energy = internal[0].copy(), internal[1]
     out -= contact_force
     out -= external
     reaction, residual = problem.system.balance(out)

@@ -43,11 +43,11 @@ def keep_contact(problem: Problem, start: State, load: StepLoad, settled: Settle
 
 def keep_path(
     problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State, results: dict[str, ContactResult],
-    energy: float,
+    energy: tuple[float, float],
 ) -> tuple[State, dict[str, ContactResult]]:  # fmt: skip
     """Return the state at the end of a step with slip, wear and work so far, and the results of contact pairs with them.
 
-    `energy` is that of deformation [energy].
+    `energy` is that of deformation, elastic and plastic [energy].
     """
     displacement, told, works = problem.displacement(end.u), dict(results), np.zeros(3)
     worn, slipped, forces = dict(start.worn), dict(start.slipped), dict(start.forces)

@@ -9,20 +9,23 @@ stresses follow from them.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 
 from fastcontact._jit import parallel
 from fastcontact._jit.norms_kernels import largest
 from fastcontact.analysis.balance import Balance, balance
+from fastcontact.analysis.displacements import solve_displacements, with_loads
 from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
 from fastcontact.analysis.inequalities import StepContext
 from fastcontact.analysis.keep_contact import keep_contact, keep_path
+from fastcontact.analysis.newton import newton
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
 from fastcontact.analysis.step_result import contact_results, counted, recover
+from fastcontact.elasticity.nonlinear_bodies import DeformedBodies
 from fastcontact.linear.protocol import Loaded
 from fastcontact.model.rigid_motions import generalised
 from fastcontact.results.step import ContactResult, StepResult
@@ -54,31 +57,45 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     problem.solver.put_back(state.solver)
     loaded = with_loads(problem, load)
     start, expected = prepare_start(problem, state, load, loaded)
+    if problem.bodies is not None:
+        found = newton(problem, start, load, expected)
+        done = problem.solver.counters.iterations - solved_before
+        iterations = {**counted(found.settled, done), **found.counts, "history": found.history}
+        return _ended(
+            problem, start, load, found.settled, (found.u, found.balance, iterations), (index, instant), found.bodies
+        )
     settled, u, balanced = equilibrium(problem, start, load, loaded, expected)
     # An iterative solver was too inaccurate: it is asked for more, and goes on from the same contact.
     while balanced.excess > 1.0 and problem.solver.improve(balanced.wanting):
         settled, u, balanced = equilibrium(problem, start, load, with_loads(problem, load), expected, settled)
     balanced.check(index, problem, settled.iterate.history if settled is not None else ())
     iterations = counted(settled, problem.solver.counters.iterations - solved_before)
+    return _ended(problem, start, load, settled, (u, balanced, iterations), (index, instant), None)
+
+
+def _ended(
+    problem: Problem, start: State, load: StepLoad, settled: SettledContact | None,
+    solution: tuple[Array, Balance, dict[str, Any]], place: tuple[int, float], bodies: DeformedBodies | None,
+) -> tuple[State, StepResult]:  # fmt: skip
+    """Return state and result of a load step, from its displacements, the balance of forces and the iterations."""
+    u, balanced, iterations = solution
     end = replace(
-        start, u=u, largest_force=balanced.largest, obstacles=problem.obstacles_at(load, u), angles=load.angles
-    )
+        start, u=u, largest_force=balanced.largest, obstacles=problem.obstacles_at(load, u), angles=load.angles,
+        history=start.history if bodies is None else bodies.history,
+    )  # fmt: skip
     contact: dict[str, ContactResult] = {}
     if settled is not None:
         end, contact = after_contact(problem, start, load, settled, end, balanced.energy)
-    elif start.work is not None:
+    else:
+        end = replace(end, extrapolation=start.extrapolation.converged(u, {}))
+    if settled is None and start.work is not None:
         end = replace(end, work=start.work.after(balanced.energy, 0.0, (0.0, 0.0, 0.0)))
     if end.work is not None:
         iterations["work"] = end.work.told()
     if problem.unsupported_bodies is not None and end.rigid is not None:
         iterations["regularised"] = problem.unsupported_bodies.report(end.rigid, end.largest_rigid_force)
     end = replace(end, solver=problem.solver.snapshot())
-    return end, recover(problem, end, contact, balanced.reaction, iterations, (index, instant))
-
-
-def with_loads(problem: Problem, load: StepLoad) -> Loaded:
-    """Return the equations of the step: the prepared matrix with the right-hand side of its loads."""
-    return problem.solver.load(problem.system.right(load.force, load.lift))
+    return end, recover(problem, end, contact, balanced.reaction, iterations, place, bodies)
 
 
 def prepare_start(problem: Problem, state: State, load: StepLoad, loaded: Loaded) -> tuple[State, float]:
@@ -101,9 +118,14 @@ def prepare_start(problem: Problem, state: State, load: StepLoad, loaded: Loaded
     start = replace(
         state, gap_round_off=round_off, largest_rigid_force=rigid_force, rigid=None, last_change=None,
         largest_force=max(state.largest_force, largest(load.force)),
-        extrapolation=state.extrapolation.to(load.lift, load.force),
+        extrapolation=state.extrapolation.to(load.lift, load.force, *_motions(problem, load)),
     )  # fmt: skip
     return start, expected
+
+
+def _motions(problem: Problem, load: StepLoad) -> list[Array]:
+    """Return motions of obstacles that nonlinear bodies are extrapolated along."""
+    return [] if problem.bodies is None else [*load.obstacles.values()]
 
 
 def equilibrium(
@@ -126,24 +148,8 @@ def equilibrium(
     return settled, u, balanced
 
 
-def solve_displacements(
-    problem: Problem, start: State, load: StepLoad, loaded: Loaded, settled: SettledContact | None
-) -> tuple[Array, Array]:
-    """Return all displacements [length] and the contact forces [force], both (n_dofs,)."""
-    system, lift = problem.system, load.lift
-    if settled is None:
-        none = csr_array((0, len(lift))), np.empty(0)
-        v = loaded.solve(*none, guess=system.unknowns(start.u, lift))[0]
-        return system.displacement(v, lift), np.zeros(len(lift))
-    contact_force, rigid = settled.force, settled.iterate.rigid
-    if problem.unsupported_bodies is not None and rigid is not None:
-        lift = lift + problem.unsupported_bodies.rigid(rigid.position)
-    v = loaded.full_solution(system.reduced(contact_force), settled.solution.u)
-    return system.displacement(v, lift), contact_force
-
-
 def after_contact(
-    problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State, energy: float
+    problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State, energy: tuple[float, float]
 ) -> tuple[State, dict[str, ContactResult]]:
     """Return the end of the step with what later steps start from, and the results of all contact pairs."""
     end = keep_contact(problem, start, load, settled, end)

@@ -11,6 +11,7 @@ import numpy as np
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
+from fastcontact.elasticity.relations import Relation
 from fastcontact.model.model import Model
 from fastcontact.model.pretension import locked_lengths
 from fastcontact.results.step import StepResult
@@ -49,6 +50,11 @@ def go_on(
     return problem, replace(
         state, solver=problem.solver.snapshot(), extrapolation=Extrapolation(), rigid=None, locked=lengths
     )
+
+
+def at_present_length(model: Model) -> list[Relation]:
+    """Return the relations that keep all pretension sections as they are in small motions."""
+    return [own.locked(model.mesh.points.size, 0.0) for own in model.pretensions]
 
 
 def _with_locks(model: Model, lengths: Mapping[str, float]) -> Model:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -15,7 +16,7 @@ from fastcontact._jit import parallel
 from fastcontact.analysis.active_dofs import ActiveDofs, SurfaceDofs
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.state import State
-from fastcontact.analysis.unsupported_bodies import UnsupportedBodies
+from fastcontact.analysis.unsupported_bodies import RigidPosition, UnsupportedBodies
 from fastcontact.analysis.work import Work
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
@@ -25,8 +26,9 @@ from fastcontact.elasticity.constrained_system import System
 from fastcontact.elasticity.initial_states import InitialState
 from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.elasticity.material_sides import MaterialSides, material_sides
+from fastcontact.elasticity.nonlinear_bodies import DeformedBodies, NonlinearBodies
 from fastcontact.elasticity.relations import stacked_rows
-from fastcontact.elasticity.springs import stiffened, too_stiff
+from fastcontact.elasticity.springs import spring_force, stiffened, too_stiff
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 from fastcontact.elasticity.temperature import Temperature
 from fastcontact.linear import choice
@@ -97,6 +99,8 @@ class Problem:
         By history, displacements [length] and nodal forces [force] at multiplier 1.
     doubtful : tuple of str
         Warnings about the stiffness.
+    bodies : NonlinearBodies, optional
+        The solid cells, where they are nonlinear; `system` and `solver` then hold their stiffness before any load.
     """
 
     model: Model
@@ -114,6 +118,7 @@ class Problem:
     prescribed: ByRamp
     forces: ByRamp
     doubtful: tuple[str, ...] = ()
+    bodies: NonlinearBodies | None = None
 
     @cached_property
     def material_of_cells(self) -> NDArray[np.int32]:
@@ -191,6 +196,36 @@ class Problem:
         depth[self.pairs[name].secondary.points] = state.worn[name].depth
         return depth
 
+    def deformed(self, u: Array, start: State, *, geometric: bool = True) -> DeformedBodies:
+        """Return `NonlinearBodies.at` displacements u (n_dofs,) [length], in a load step that begins at `start`."""
+        assert self.bodies is not None
+        return self.bodies.at(self.displacement(u), start.history or self.bodies.beginning, geometric=geometric)
+
+    def internal(self, bodies: DeformedBodies, u: Array) -> tuple[Array, tuple[float, float]]:
+        """Return forces (n_dofs,) [force] of nonlinear bodies and springs, their elastic energy and plastic work [energy]."""
+        force, springs = np.zeros_like(u), self.model.springs
+        n = self.model.n_dofs
+        force[:n] = bodies.force.ravel()
+        pull = spring_force(springs, u[:n])
+        force[:n] += pull
+        return force, (bodies.energy + 0.5 * float(pull @ u[:n]), bodies.plastic_work)
+
+    def linearised(
+        self, bodies: DeformedBodies, u: Array, load: StepLoad, rigid: RigidPosition | None
+    ) -> tuple[Problem, StepLoad]:
+        """Return the problem with the tangent of nonlinear bodies, at displacements u (n_dofs,) [length], and its loads."""
+        force = -self.internal(bodies, u)[0]
+        system = self.system.renewed(self.force_driven.stiffness(stiffened(bodies.K, self.model.springs)))
+        force += load.force + system.K @ u
+        if self.unsupported_bodies is not None and rigid is not None:  # turned bodies under load are not free to turn
+            force -= system.K @ self.unsupported_bodies.rigid(rigid.position)
+        solver = copy.copy(self.solver)
+        involved = system.involved(self.contact_dofs)
+        modes = self.force_driven.near_nullspace(near_nullspace(self.model))
+        involved = _prepare_solver(solver, system, self.unsupported_bodies, modes, involved)
+        dofs = active_dofs(system, self.contact_dofs, involved, self.pairs, self.unsupported_bodies, solver)
+        return replace(self, system=system, solver=solver, dofs=dofs), replace(load, force=force)
+
     def initial_state(self) -> State:
         """Return the state before the first load step."""
         # Gaps are differences of coordinates and no more accurate than those.
@@ -238,11 +273,20 @@ def prepare(
     involved = _prepare_solver(solver, system, bodies, driven.near_nullspace(near_nullspace(model)), involved)
     return Problem(
         model, ramp, criteria, solver, pairs, field, sides, system, bodies,
-        SurfaceDofs(system, contact_dofs, involved) if pairs and bodies is None and solver.condenses
-        else ActiveDofs(system, contact_dofs),
+        active_dofs(system, contact_dofs, involved, pairs, bodies, solver),
         contact_dofs, driven, driven.prescribed(prescribed), driven.forces(_forces(model)),
-        tuple(doubtful),
+        tuple(doubtful), model.nonlinear_bodies(field),
     )  # fmt: skip
+
+
+def active_dofs(
+    system: System, contact_dofs: NDArray[np.intp], involved: NDArray[np.intp], pairs: Mapping[str, Formulation],
+    bodies: UnsupportedBodies | None, solver: LinearSolver,
+) -> ActiveDofs:  # fmt: skip
+    """Return the displacement components that a pairing solves for."""
+    if pairs and bodies is None and solver.condenses:
+        return SurfaceDofs(system, contact_dofs, involved)
+    return ActiveDofs(system, contact_dofs)
 
 
 def _forces(model: Model) -> dict[Table | None, Array]:

@@ -67,7 +67,7 @@ def taken(problem: Problem, state: State, case: dict[str, Any]) -> dict[str, Any
     solver, kept = problem.solver, state.to_dict(problem.model.n_dofs)
     extrapolation = kept.pop("extrapolation")
     kept = {"format": FORMAT, "case": case, **kept, "solver": {"kind": _kind(solver), "memory": solver.memory()}}
-    if solver.iterative:  # only then do steps start from extrapolated ones
+    if _extrapolates(problem):
         kept["extrapolation"] = extrapolation
     return kept
 
@@ -83,9 +83,14 @@ def put_back(problem: Problem, step: StepResult, touched: frozenset[str]) -> Sta
     if kept["solver"]["kind"] == _kind(problem.solver):
         problem.solver.remember(kept["solver"]["memory"])
     state = State.from_dict(kept, step.displacement, touched)
-    if not problem.solver.iterative:
+    if not _extrapolates(problem):
         state = replace(state, extrapolation=Extrapolation())
     return replace(state, solver=problem.solver.snapshot())
+
+
+def _extrapolates(problem: Problem) -> bool:
+    """Return whether load steps start from extrapolated ones."""
+    return problem.solver.iterative or problem.bodies is not None
 
 
 def remaining(ramp: Ramp, last: StepResult | None) -> list[float]:

@@ -48,8 +48,11 @@ IMBALANCE = 0.02
 
 def result_warnings(problem: Problem, state: State, last: StepResult) -> list[str]:
     """Return the warnings about an analysis whose `last` step ended in a state."""
-    found = interpenetration(problem, state, last) + _large_strain(problem, last) + _large_rotation(problem, state)
-    found += _carrying_springs(problem, state) + (locking_warning(problem, state.u) or scatter_warnings(problem, last))
+    found = interpenetration(problem, state, last) + _carrying_springs(problem, state)
+    if problem.model.strain == "small":
+        found += _large_strain(problem, last) + _large_rotation(problem, state)
+    if problem.bodies is None:
+        found += locking_warning(problem, state.u) or scatter_warnings(problem, last)
     found += [problem.solver.gave_up] if problem.solver.gave_up else []
     load = problem.load_at(last.load_factor)
     loaded, sagging = bool(load.force.any() or load.lift.any()), sag_warnings(problem, state, last)

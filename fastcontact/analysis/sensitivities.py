@@ -122,6 +122,7 @@ def sensitivities(
 
 def check_asked(model: Model, quantity: Sequence[str | int], parameters: Sequence[Sequence[str | int]]) -> None:
     """Raise ModelError or MeshError if a model has no such quantity or parameter, see `sensitivities`."""
+    model.refuse_nonlinear("sensitivities are")
     check_quantity(model, tuple(quantity))
     for parameter in parameters:
         check_parameter(model, tuple(parameter))

@@ -67,6 +67,8 @@ class State:
         The fixed number of geometry updates of the last step, and the relative change by the last one.
     rigid : RigidPosition, optional
         Rigid position of unsupported bodies in the last step.
+    history : dict of str to ndarray (n_cells, n_q, 9)
+        By solid element of nonlinear bodies, see `constitutive_kernels`; none before the first step.
     solver : object
         What the linear solver keeps from step to step, see `LinearSolver.snapshot`.
     """
@@ -91,6 +93,7 @@ class State:
     forces: Mapping[str, ContactForces] = field(default_factory=dict)
     last_change: tuple[int, float] | None = None
     rigid: RigidPosition | None = None
+    history: Mapping[str, Array] = field(default_factory=dict)
     solver: Any = None
 
     def after_touching(self, pairs: Iterable[str]) -> State:
@@ -112,6 +115,7 @@ class State:
             "locked": dict(self.locked),
             "work": None if self.work is None else dataclasses.asdict(self.work),
             "forces": {name: vars(own) for name, own in self.forces.items()},
+            "history": dict(self.history),
             "active": dict(self.active),
             "pressure": dict(self.pressure),
             "pairs": {
@@ -152,6 +156,7 @@ class State:
         return cls(
             u,
             numbers["round_off"],
+            history=dict(kept.get("history", {})),
             active=dict(kept["active"]),
             pressure=dict(kept["pressure"]),
             obstacles={name: now.copy() for name, now in found["now"].items()},

@@ -14,6 +14,7 @@ from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.seams import joined
 from fastcontact.analysis.state import State
 from fastcontact.elasticity import recovery
+from fastcontact.elasticity.nonlinear_bodies import DeformedBodies
 from fastcontact.model.pretension import section_results
 from fastcontact.model.ramp import multiplier
 from fastcontact.results.material_stress import by_largest_von_mises
@@ -24,7 +25,7 @@ Array = NDArray[np.float64]
 
 def recover(
     problem: Problem, end: State, contact: dict[str, ContactResult], reaction: Array, iterations: dict[str, Any],
-    place: tuple[int, float],
+    place: tuple[int, float], bodies: DeformedBodies | None = None,
 ) -> StepResult:  # fmt: skip
     """Return the result of a load step.
 
@@ -40,6 +41,8 @@ def recover(
         See `StepResult`.
     place : (int, float)
         Number of the step, and its pseudo-time.
+    bodies : DeformedBodies, optional
+        Where they are nonlinear.
     """
     mesh, u = problem.model.mesh, problem.displacement(end.u)
     temperature, initial = (
@@ -52,21 +55,19 @@ def recover(
         pulls = [multiplier(own.ramp, problem.ramp, place[1]) for own in sections]
         found = section_results(sections, u, reaction.reshape(-1, mesh.dim), pulls)
         iterations = {**iterations, "pretension": found}
-    at_places = recovery.nodal_stress(
-        mesh,
-        problem.model.kinematics,
-        problem.field.moduli,
-        problem.field.loops,
-        u,
-        problem.field.treatment,
-        problem.sides,
-        problem.model.stress_offset(temperature, initial, problem.field),
-    )
+    if bodies is None:
+        at_places = recovery.nodal_stress(
+            mesh, problem.model.kinematics, problem.field.moduli, problem.field.loops, u, problem.field.treatment,
+            problem.sides, problem.model.stress_offset(temperature, initial, problem.field),
+        )  # fmt: skip
+    else:
+        at_places = recovery.averaged_stress(bodies.stress, problem.sides)
     stress, by_material = by_largest_von_mises(problem.sides, problem.material_of_cells, at_places, mesh.n_points)
     von_mises = recovery.von_mises(stress)
     return StepResult(
         *place, u.copy(), stress, von_mises, recovery.von_mises_signed(stress, von_mises), reaction.reshape(-1, mesh.dim),
         contact, iterations, material_stress=by_material,
+        cell_fields={} if bodies is None or problem.bodies is None else problem.bodies.cell_fields(bodies, u),
     )  # fmt: skip
 
 

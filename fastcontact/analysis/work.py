@@ -100,6 +100,8 @@ class Work:
         Energy of penalties.
     largest : float
         The largest of these energies and works so far.
+    plastic : float
+        Plastic work.
     """
 
     strain_energy: float = 0.0
@@ -108,24 +110,26 @@ class Work:
     imbalance: float = 0.0
     stored: float = 0.0
     largest: float = 0.0
+    plastic: float = 0.0
 
     @property
     def external(self) -> float:
         """Work of loads, supports and obstacles."""
-        return self.strain_energy + self.friction + self.imbalance + self.stored
+        return self.strain_energy + self.plastic + self.friction + self.imbalance + self.stored
 
-    def after(self, strain_energy: float, stored: float, works: Sequence[float]) -> Work:
-        """Return the work after a step more, from the energies at its end, and the works in it as of `contact_work`."""
+    def after(self, energy: tuple[float, float], stored: float, works: Sequence[float]) -> Work:
+        """Return the work after a step more, from its elastic energy, plastic work and the works of `contact_work`."""
         friction, touching, imbalance = works
         more = self.friction + friction, self.touching + touching, self.imbalance + imbalance
-        found = Work(strain_energy, *more, stored)
-        terms = (self.largest, strain_energy, found.friction, abs(found.external))
+        found = Work(energy[0], *more, stored, plastic=energy[1])
+        terms = (self.largest, *energy, found.friction, abs(found.external))
         return replace(found, largest=max(terms))
 
     def told(self) -> dict[str, float]:
         """Return what results tell, see `StepResult.work`."""
         return {
-            "strain_energy": self.strain_energy, "external_work": self.external, "friction_work": self.friction,
+            "strain_energy": self.strain_energy, "plastic_work": self.plastic,
+            "external_work": self.external, "friction_work": self.friction,
             "friction_while_touching": self.touching, "penalty_energy": self.stored, "imbalance": self.imbalance,
         }  # fmt: skip
 

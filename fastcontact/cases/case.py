@@ -62,6 +62,8 @@ class Case:
         In which the files lie that the case names, absolute.
     sensitivities : list of (tuple, list of tuple)
         Quantities and their parameters, see `fastcontact.sensitivities`.
+    modes : dict, optional
+        Arguments of `fastcontact.modes` about the last step; None where none are asked for.
     deck : Deck, optional
         The input deck of which the case was made.
     """
@@ -82,6 +84,7 @@ class Case:
     approach: dict[str, float] = field(default_factory=dict)
     folder: Path = Path()
     sensitivities: list[tuple[Asked, list[Asked]]] = field(default_factory=list)
+    modes: dict[str, Any] | None = None
     deck: Deck | None = None
 
     def finished(self, step: StepResult) -> StepResult:
@@ -191,9 +194,10 @@ def build_case(
     tolerance = float(solve.get("linear_tolerance", 1e-10))
     check_tolerance(tolerance)
     criteria = Criteria(**{key: value for key, value in solve.items() if not key.startswith("linear_")})
-    theories, approach = _theories(data)
     mesh = _mesh(Path(folder), data["mesh"]) if mesh is None else mesh
     model = build_model(mesh, data, text, Path(folder))
+    pairs = _pairs(data, model)
+    theories, approach = _theories(data, pairs)
     probes = _probes(mesh, data.get("probes", {}))
     return Case(
         name=name,
@@ -207,11 +211,12 @@ def build_case(
         linear_tolerance=tolerance,
         probes=probes,
         theories=theories,
-        checks=_checks(data, probes, theories),
+        checks=_checks(data, probes, pairs, theories),
         units=known_units(data.get("units", {})),
         approach=approach,
         folder=Path(folder).resolve(),
         sensitivities=_sensitivities(model, data),
+        modes=data.get("modes"),
     )
 
 
@@ -223,15 +228,20 @@ def _text(data: dict[str, Any]) -> str:
         return ""
 
 
-def _pairs(data: dict[str, Any]) -> dict[str, Any]:
-    return {**data.get("contact", {}), **data.get("obstacle", {})}
+def _pairs(data: dict[str, Any], model: Model) -> dict[str, Any]:
+    """Return the table of each contact pair and obstacle; pairs that were found have one in common."""
+    named = data.get("contact", {})
+    named = {**(named if isinstance(named, dict) else {}), **data.get("obstacle", {})}
+    return {pair.name: named.get(pair.name, data.get("contacts", {})) for pair in model.contact}
 
 
-def _checks(data: dict[str, Any], probes: Mapping[str, int], theories: Mapping[str, Any]) -> list[Check]:
+def _checks(
+    data: dict[str, Any], probes: Mapping[str, int], pairs: Mapping[str, Any], theories: Mapping[str, Any]
+) -> list[Check]:
     checks = []
     for i, entry in enumerate(tables("check", data.get("check", []))):
         check_keys(f"check[{i}]", entry, CHECK)
-        checks.append(read_check(f"check[{i}]", entry, probes, _pairs(data), theories, str(data["kinematics"])))
+        checks.append(read_check(f"check[{i}]", entry, probes, pairs, theories, str(data["kinematics"])))
     return checks
 
 
@@ -293,12 +303,17 @@ def _probes(mesh: Mesh, data: dict[str, Any]) -> dict[str, int]:
     return {name: mesh.point(group) for name, group in data.items()}
 
 
-def _theories(data: dict[str, Any]) -> tuple[dict[str, dict[str, Any]], dict[str, float]]:
-    """Return the theories of ``[theory.PAIR]`` and, below it, ``mesh_converged``; and their approaches [length]."""
+def _theories(
+    data: dict[str, Any], pairs: Mapping[str, Any] | None = None
+) -> tuple[dict[str, dict[str, Any]], dict[str, float]]:
+    """Return the theories of ``[theory.PAIR]`` and, below it, ``mesh_converged``; and their approaches [length].
+
+    Raises CaseError if a pair is none of `pairs`, where they are known.
+    """
     theories: dict[str, dict[str, Any]] = {}
-    approach, pairs = {}, _pairs(data)
+    approach = {}
     for pair, entry in data.get("theory", {}).items():
-        if pair not in pairs:
+        if pairs is not None and pair not in pairs:
             raise CaseError(unknown("contact pair in 'theory'", pair, pairs))
         own = {key: value for key, value in entry.items() if key not in ("mesh_converged", "share")}
         theories[pair] = {"theory": _theory(f"theory.{pair}", own), "share": _share(f"theory.{pair}", entry)}

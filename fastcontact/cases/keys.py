@@ -42,10 +42,15 @@ STUDY_ENTRIES: dict[str, tuple[Any, str]] = {
     "options": (dict, "a table of options of a formulation"),
     "parameters": (dict, 'a table of laws by path, { "material[0].E" = "value" }'),
 }
+MODES: dict[str, Any] = {"n": int, "stress_stiffening": bool}
 TOP: dict[str, Any] = {
     "title": str,
     "kinematics": str,
-    **dict.fromkeys(("units", "mesh", "contact", "obstacle", "ramp", "solve", "probes", "theory", "study"), dict),
+    "strain": str,
+    "contact": (dict, str),
+    **dict.fromkeys(
+        ("units", "mesh", "contacts", "obstacle", "ramp", "solve", "probes", "theory", "study", "modes"), dict
+    ),
     **dict.fromkeys(("check", "sensitivity"), list),
 }
 
@@ -65,8 +70,8 @@ def check_keys(where: str, data: Any, known: Mapping[str, Any]) -> None:
 
 
 def check_settings(data: Mapping[str, Any]) -> None:
-    """Raise CaseError if a key of ``[study]``, ``[units]`` or ``[solve]`` is unknown, or a value not of its type."""
-    for key, known in (("study", STUDY), ("units", UNITS), ("solve", SOLVE)):
+    """Raise CaseError if a key of a table of settings, such as ``[study]``, is unknown, or a value not of its type."""
+    for key, known in (("study", STUDY), ("units", UNITS), ("solve", SOLVE), ("modes", MODES)):
         check_keys(key, data.get(key, {}), known)
     for key, (kind, form) in STUDY_ENTRIES.items():
         entries = data.get("study", {}).get(key, ())

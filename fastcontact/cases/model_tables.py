@@ -18,6 +18,7 @@ from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropi
 from fastcontact.elasticity.initial_states import COMPONENTS
 from fastcontact.elasticity.material_axes import CylindricalAxes
 from fastcontact.elasticity.materials import CONSTANTS, LinearElastic, Material, check_expansion
+from fastcontact.elasticity.nonlinear_materials import ElasticPlastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
 from fastcontact.elasticity.varying_constants import Tabulated
 from fastcontact.errors import CaseError, unknown
 from fastcontact.mesh.argument_types import types_of
@@ -35,8 +36,9 @@ VALUES = ("E", "nu", "G", "density", "expansion", "value", *COMPONENTS)
 
 
 def _add_material(model: Model, groups: Any = None, **constants: Any) -> None:
-    """Add the material whose constants are given: isotropic, orthotropic where E, nu or G are lists, anisotropic with D."""
+    """Add the material whose constants are given, see `_material_law`."""
     kind = _material_law(constants)
+    constants.pop("law", None)
     if kind is LinearElastic:
         if isinstance(constants.get("expansion"), list):  # no array over cells: case files have tables for that
             check_expansion(constants["expansion"], 1)
@@ -69,6 +71,12 @@ def _add_coupling(model: Model, place: Any = None, **given: Any) -> None:
 
 
 def _material_law(entry: dict[str, Any]) -> type[Material]:
+    """Return the `law` of a material; without one isotropic, orthotropic where E, nu or G are lists, anisotropic with D."""
+    law = entry.get("law", "elastic_plastic" if "yield_stress" in entry else "linear_elastic")
+    if law not in NONLINEAR and law != "linear_elastic":
+        raise CaseError(unknown("law", law, ["linear_elastic", *NONLINEAR]))
+    if law in NONLINEAR:
+        return NONLINEAR[law]
     if "D" in entry:
         return Anisotropic
     return (
@@ -76,16 +84,30 @@ def _material_law(entry: dict[str, Any]) -> type[Material]:
     )
 
 
+# Nonlinear laws by their names in case files.
+NONLINEAR: dict[str, type[Material]] = {
+    "elastic_plastic": ElasticPlastic,
+    "neo_hookean": NeoHookean,
+    "mooney_rivlin": MooneyRivlin,
+    "yeoh": Yeoh,
+    "ogden": Ogden,
+}
 # What each law is called, and the keys of a case file that it needs.
 _LAWS: dict[type[Material], str] = {
     LinearElastic: "isotropic",
     Orthotropic: "orthotropic (E, nu and G are lists of three)",
     Anisotropic: "anisotropic (D is a matrix)",
+    **{law: f"{name} (its law)" for name, law in NONLINEAR.items()},
 }
 _NEEDED: dict[type[Material], tuple[str, ...]] = {
     LinearElastic: ("E", "nu"),
     Orthotropic: ("E", "nu", "G"),
     Anisotropic: ("D",),
+    ElasticPlastic: ("E", "nu", "yield_stress"),
+    NeoHookean: ("E", "nu"),
+    MooneyRivlin: ("C10", "C01", "bulk"),
+    Yeoh: ("C10", "C20", "C30", "bulk"),
+    Ogden: ("mu", "alpha", "bulk"),
 }
 
 
@@ -158,7 +180,9 @@ LISTS: dict[str, tuple[dict[str, Any], Sequence[str]]] = {
             **dict.fromkeys(("E", "nu", "expansion"), (*NUMBER, list, dict)),
             **dict.fromkeys(("G", "D"), list),
             **{"groups": (list, str), "axes": (list, dict), "density": (*NUMBER, dict)},
-            **{"volumetric": str, "incompatible_modes": bool},
+            **{"volumetric": str, "incompatible_modes": bool, "law": str},
+            **dict.fromkeys(("yield_stress", "kinematic", "C10", "C01", "C20", "C30", "bulk"), NUMBER),
+            **{"hardening": list, **dict.fromkeys(("mu", "alpha"), (*NUMBER, list))},
         },
         (),
     ),
@@ -170,7 +194,7 @@ LISTS: dict[str, tuple[dict[str, Any], Sequence[str]]] = {
 def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Model:
     """Return the model that the parsed `data` of a case file describe; meshes of obstacles lie relative to `folder`."""
     mesh = _with_references(_cut(mesh, data.get("pretension", [])), data.get("coupling", []))
-    model = Model(mesh, data["kinematics"], case_text=text)
+    model = Model(mesh, data["kinematics"], case_text=text, strain=data.get("strain", "small"))
     model.units = dict(data.get("units", {}))
     for kind, add in _ADD.items():
         known, needed = LISTS[kind]
@@ -183,7 +207,18 @@ def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Mo
             with at(where):
                 given = _from_files(where, entry, mesh, folder) if kind == "material" else entry
                 add(model, **_arguments(where, _found(folder, _placed(where, given))))
-    for name, entry in data.get("contact", {}).items():
+    _add_contacts(model, data)
+    for name, entry in data.get("obstacle", {}).items():
+        _add_obstacle(model, name, entry, folder)
+    return model
+
+
+def _add_contacts(model: Model, data: dict[str, Any]) -> None:
+    """Add the contact pairs that the data name, and then those that are to be found."""
+    named = data.get("contact", {})
+    if isinstance(named, str) and named != "auto":
+        raise CaseError(f"'contact' must be \"auto\" or tables [contact.NAME], not {repr(named)}")
+    for name, entry in named.items() if isinstance(named, dict) else ():
         if not isinstance(entry, dict):
             raise CaseError(f"'contact' needs a name for each pair: write [contact.NAME] above its keys, not '{name}'")
         for key in ("secondary", "primary"):
@@ -191,9 +226,9 @@ def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Mo
                 raise CaseError(f"contact.{name} needs '{key}', the name of a group of facets")
         with at(f"contact.{name}"):
             model.add_contact(name, **entry)
-    for name, entry in data.get("obstacle", {}).items():
-        _add_obstacle(model, name, entry, folder)
-    return model
+    if named == "auto" or "contacts" in data:
+        with at("contacts"):
+            model.add_contacts(**data.get("contacts", {}))
 
 
 def _from_files(where: str, entry: dict[str, Any], mesh: Mesh, folder: Path) -> dict[str, Any]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from fastcontact._version import __version__
 from fastcontact.analysis.contact_answers import contact_answers
+from fastcontact.analysis.modes import Modes
 from fastcontact.analysis.sensitivities import sensitivities
 from fastcontact.cases.case import Asked, Case
 from fastcontact.cases.checks import at_point, evaluated
@@ -35,8 +36,12 @@ def summarise(
     steps: Sequence[Mapping[str, Any]],
     timings: Mapping[str, float],
     warnings: Sequence[str],
+    found: Modes | None = None,
 ) -> dict[str, Any]:
-    """Return the summary of a run, given its last step and `of_step` of all: numbers, strings, lists and dictionaries."""
+    """Return the summary of a run, given its last step and `of_step` of all: numbers, strings, lists and dictionaries.
+
+    `found` are its modes, where they were asked for.
+    """
     mesh = case.mesh
     top = int(np.argmax(last.von_mises))
     penalties = {pair.name: pair.options.get("penalty") for pair in case.model.contact}
@@ -60,6 +65,7 @@ def summarise(
         },
         "sensitivities": [_sensitivity(case, last, *asked) for asked in case.sensitivities],
         "regularised": last.iterations.get("regularised"),
+        **({} if found is None else {"modes": _modes(found)}),
         "checks": [evaluated(check, last, case.probes, case.theories) for check in case.checks],
         "timings": dict(timings),
         "versions": versions(),
@@ -77,6 +83,10 @@ def _sensitivity(case: Case, last: StepResult, quantity: Asked, by: Sequence[Ask
         return {"quantity": list(quantity), "refused": str(error)}
     derivatives = [{"by": list(parameter), "value": value} for parameter, value in found.derivatives.items()]
     return {"quantity": list(quantity), "value": found.value, "margin": found.margin, "derivatives": derivatives}
+
+
+def _modes(found: Modes) -> dict[str, Any]:
+    return {"frequencies": found.frequencies.tolist(), "effective_mass": found.effective_mass.tolist()}
 
 
 def of_step(step: StepResult) -> dict[str, Any]:
@@ -197,6 +207,9 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
         found += _theory_lines(name, theory)
     for found_here in summary["sensitivities"]:
         found += _sensitivity_lines(found_here)
+    if "modes" in summary:
+        shown = ", ".join(f"{frequency:.6g}" for frequency in summary["modes"]["frequencies"])
+        found.append(f"  frequencies about the last step: {shown}")
     for check in summary["checks"]:
         found += [_check_line(check, unit), *_why(check)]
     return found

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from fastcontact.cli._outputs import check_outputs, save
 from fastcontact.cli._terminal import say
 
 HELP = "show what a mesh, deck or result file holds: groups, sizes, steps, iterations, versions"
@@ -13,11 +14,21 @@ HELP = "show what a mesh, deck or result file holds: groups, sizes, steps, itera
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
-    parser.add_argument("file", help="mesh file, deck (.inp) or result file (.vtkhdf)")
+    parser.add_argument("file", help="mesh file, deck (.inp), result file (.vtkhdf); with --contacts also a case file")
+    parser.add_argument("--contacts", action="store_true", help="the surfaces of bodies that face each other instead")
+    parser.add_argument(
+        "--distance", metavar="LENGTH", type=float, help="the largest gap for --contacts; the size of facets"
+    )
+    parser.add_argument(
+        "--angle", metavar="DEGREES", type=float, default=45.0, help="by how much normals may differ (45)"
+    )
+    parser.add_argument("--png", metavar="FILE", help="picture of the contacts to write")
 
 
 def run(options: argparse.Namespace) -> int:
     """Print what the file holds."""
+    if options.contacts or options.png:
+        return _contacts(options)
     if Path(options.file).suffix == ".vtkhdf":
         from fastcontact.results.reader import open_results
 
@@ -36,6 +47,40 @@ def run(options: argparse.Namespace) -> int:
     mesh, report = read_mesh_report(options.file)
     say("\n".join([str(report), *_mesh_lines(mesh), str(quality(mesh))]))
     return 0
+
+
+def _contacts(options: argparse.Namespace) -> int:
+    """Print the contacts that are found in a mesh, and draw them."""
+    from fastcontact.cases.case import files_of_case, read_case
+    from fastcontact.contact.found_contacts import find_contacts
+    from fastcontact.results import plot
+
+    case = _is_case(Path(options.file))
+    check_outputs(files_of_case(options.file) if case else [options.file], [], [options.png])
+    mesh = read_case(options.file).mesh if case else _mesh_of(options.file)
+    found = find_contacts(mesh, distance=options.distance, angle=options.angle)
+    say(str(found))
+    if options.png:
+        save(plot.contacts(found), options.png)
+        say(f"wrote {options.png}")
+    return 0
+
+
+def _is_case(path: Path) -> bool:
+    """Whether a file is a case file, or a deck that is more than a mesh."""
+    return path.suffix.lower() == ".toml" or (path.suffix.lower() == ".inp" and _is_deck(path))
+
+
+def _mesh_of(file: str) -> Any:
+    """Return the mesh of a result file or a mesh file."""
+    if Path(file).suffix.lower() == ".vtkhdf":
+        from fastcontact.results.reader import open_results
+
+        with open_results(file) as results:
+            return results.mesh
+    from fastcontact.mesh.files.mesh_files import read_mesh
+
+    return read_mesh(file)
 
 
 def _is_deck(path: Path) -> bool:

@@ -40,6 +40,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--json", metavar="FILE", help="write a summary of the last step and the iterations, or why the run failed"
     )
     parser.add_argument("--plot", metavar="PNG", help="plot the contact pressure of the last step against theory")
+    parser.add_argument("--modes", metavar="FILE", help="write the modes about the last step, a step each (.vtkhdf)")
     parser.add_argument("--linear", metavar="SOLVER", help="auto, direct, amg, cholmod or pyamg (default: the case's)")
     parser.add_argument("--estimate-error", action="store_true", help="estimate the error of every cell, into the file")
     parser.add_argument("--strict", action="store_true", help="exit with code 3 if a check of the case fails")
@@ -56,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
     if options.threads is not None:
         _set_threads(options.threads)
     output = Path(options.output or f"{case_path(options.case).stem}.vtkhdf")
-    check_outputs(files_of_case(options.case), [output, options.json], [options.plot])
+    check_outputs(files_of_case(options.case), [output, options.json, options.modes], [options.plot])
     with warnings_shown() as early:
         case = read_case(options.case)
     read = time.perf_counter()
@@ -65,8 +66,9 @@ def run(options: argparse.Namespace) -> int:
         caught += early
         done, last, steps = _solved(options, case, output)
     texts = list(dict.fromkeys([*done.warnings, *caught]))
+    found = _modes(options, case, last)
     timings = {"read": read - started, "solve": time.perf_counter() - read, "cpu": time.process_time()}
-    numbers = summary.summarise(case, last, steps, timings, texts)
+    numbers = summary.summarise(case, last, steps, timings, texts, found)
     if options.json:
         write_json(options.json, numbers)
     if options.plot:
@@ -78,13 +80,33 @@ def run(options: argparse.Namespace) -> int:
         say("\n".join(summary.lines(numbers)))
         say(
             "  "
-            + _written(output, len(done.summaries), len(steps), [path for path in (options.json, options.plot) if path])
+            + _written(
+                output,
+                len(done.summaries),
+                len(steps),
+                [path for path in (options.json, options.plot, options.modes) if path],
+            )
         )
     failed = [check["name"] for check in numbers["checks"] if not check["passed"]]
     if options.strict and failed:
         say(f"{len(failed)} of {len(numbers['checks'])} checks of the case failed: {', '.join(failed)}", error=True)
         return 3
     return 0
+
+
+def _modes(options: argparse.Namespace, case: Case, last: StepResult) -> Any:
+    """Return the modes that the case or the command asks for, written to their file; None for none."""
+    from fastcontact.analysis.modes import modes
+    from fastcontact.results.writer import ResultWriter
+
+    if case.modes is None and not options.modes:
+        return None
+    found = modes(case.model, last, **{"linear_solver": options.linear or case.linear_solver, **(case.modes or {})})
+    if options.modes:
+        with ResultWriter(options.modes, case.model, case_text=case.text) as writer:
+            for mode in found:
+                writer.write(mode)
+    return found
 
 
 class _Done(NamedTuple):

@@ -67,7 +67,7 @@ class TiedPair:
 
 def tied(part: Constraints) -> TiedPair:
     """Return the equations that tie what the constraints `part`, with tangents, pair."""
-    moments = _moments(part)
+    moments = moments_of(part)
     size = np.maximum(np.asarray(abs(moments).sum(axis=1)).ravel(), 1e-300)
     positions = abs(moments) @ part.positions / size[:, None]
     rows = tuple(_cleaned(csr_array(moments @ along)) for along in (part.B, *part.tangents))
@@ -75,7 +75,7 @@ def tied(part: Constraints) -> TiedPair:
     return TiedPair(moments, rows, part.directions, positions, part.nodal, part.nodes)
 
 
-def _moments(part: Constraints) -> csr_array:
+def moments_of(part: Constraints) -> csr_array:
     """Return the matrix (q, m) whose rows are the functions that the multipliers are combinations of."""
     if not isinstance(part.compliance, Projection):
         return csr_array(eye_array(len(part.gap0), format="csr"))

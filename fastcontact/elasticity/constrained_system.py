@@ -7,6 +7,7 @@ everything that is no unknown only the diagonal is left.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -98,7 +99,18 @@ class System:
         self._reacting: Mask = self.fixed | related  # supports and relations may exert forces here
         self._constraints = ConstrainedMotion(self.fixed, relations)
         self.T = self._constraints.T if relations else None
-        self.free: Mask = self._constraints.free
+        self._without_stiffness = without_stiffness
+        self._take(K, given)
+
+    def renewed(self, K: bsr_array) -> System:
+        """Return the system with another stiffness K (n, n), which is changed as the first one."""
+        system = copy.copy(self)
+        system._take(K, diagonal_of(K))
+        return system
+
+    def _take(self, K: bsr_array, given: Array) -> None:
+        """Take a stiffness with the diagonal `given` (n,)."""
+        self.free: Mask = self._constraints.free.copy()
         if self.T is None:
             self.K = Stiffness(supports_apart(K, self.fixed, given))
             self.matrix = self.K.parts[0]
@@ -110,7 +122,7 @@ class System:
             diagonal = diagonal_of(transformed)
             cancelling = self.T.multiply(self.T).T @ given
             # Not points that relations couple to nothing but each other.
-            self.free &= (cancelling > 0.0) | without_stiffness
+            self.free &= (cancelling > 0.0) | self._without_stiffness
             self.weightless = self.free & (diagonal <= ROUND_OFF * cancelling)
             self.matrix = supports_apart(transformed, ~self.free, diagonal)[0]
         self._no_unknowns = np.flatnonzero(~self.free)

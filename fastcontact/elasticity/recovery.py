@@ -95,6 +95,17 @@ def nodal_stress(
     return average.result()
 
 
+def averaged_stress(at_points: dict[str, Array], sides: MaterialSides) -> Array:
+    """Return the stress (n_places, n_components) [pressure] at the nodes of each material: the average over its cells.
+
+    From `at_points` (n_cells, n_q, n_components) [pressure], by solid element.
+    """
+    average = NodalAverage(len(sides.node), next(iter(at_points.values())).shape[2])
+    for name, values in at_points.items():
+        average.add(sides.cells[name], elements.get(name).extrapolation, values)
+    return average.result()
+
+
 class NodalAverage:
     """The plain average, at each node, of the stresses of its cells there."""
 

@@ -162,6 +162,14 @@ def stiffened(K: bsr_array, springs: Sequence[Springs]) -> bsr_array:
     return total
 
 
+def spring_force(springs: Sequence[Springs], u: Array) -> Array:
+    """Return the nodal forces (n,) [force] that hold springs at the displacements `u` (n,) [length]."""
+    if not springs:
+        return np.zeros_like(u)
+    R = stacked(springs, len(u))
+    return np.asarray(R.T @ (np.concatenate([spring.stiffness for spring in springs]) * (R @ u)))
+
+
 def too_stiff(K: bsr_array, springs: Sequence[Springs]) -> list[str]:
     """Return a warning for each of the springs that costs digits, being so much stiffer than the bodies at its ends.
 

@@ -13,7 +13,9 @@ Indices = NDArray[np.int32]
 Mask = NDArray[np.bool_]
 
 
-def facets_with_nodes(solids: Mapping[str, Indices], chosen: Mask, between: bool) -> dict[str, Indices]:
+def facets_with_nodes(
+    solids: Mapping[str, Indices], chosen: Mask, between: bool, own: Mapping[str, Mask] | None = None
+) -> dict[str, Indices]:
     """Return by facet element the facets (n_facets, n_nodes) of solid cells all of whose nodes are chosen.
 
     Each once, as its first cell has it, which is outward for those of one cell.
@@ -25,18 +27,26 @@ def facets_with_nodes(solids: Mapping[str, Indices], chosen: Mask, between: bool
     chosen : ndarray of bool (n_points,)
     between : bool
         Facets of two cells; otherwise those of one.
+    own : mapping of str to ndarray of bool (n_cells,), optional
+        The cells that the facets must belong to, by default all.
     """
     found: dict[str, list[Indices]] = {}
+    owned: dict[str, list[Mask]] = {}
     for name, block in solids.items():
         element = elements.get(name)
         for facet, kind in zip(element.facets, element.facet_elements, strict=True):
             nodes = block[:, list(facet)]
-            found.setdefault(kind, []).append(nodes[chosen[nodes].all(axis=1)])
-    kept = {}
+            inside = chosen[nodes].all(axis=1)
+            found.setdefault(kind, []).append(nodes[inside])
+            owned.setdefault(kind, []).append(np.ones(int(inside.sum()), bool) if own is None else own[name][inside])
+    kept, wanted = {}, 2 if between else 1
     for kind, blocks in found.items():
-        facets = np.concatenate(blocks)
-        _, first, count = np.unique(np.sort(facets, axis=1), axis=0, return_index=True, return_counts=True)
-        rows = np.sort(first[count == (2 if between else 1)])
+        facets, ours = np.concatenate(blocks), np.concatenate(owned[kind])
+        _, first, group, count = np.unique(
+            np.sort(facets, axis=1), axis=0, return_index=True, return_inverse=True, return_counts=True
+        )
+        mine = np.bincount(group.ravel(), ours, len(count))
+        rows = np.sort(first[(count == wanted) & (mine == wanted)])
         if len(rows):
             kept[kind] = facets[rows]
     return kept
@@ -44,12 +54,9 @@ def facets_with_nodes(solids: Mapping[str, Indices], chosen: Mask, between: bool
 
 def added(block: Indices, facets: Indices) -> tuple[Indices, NDArray[np.intp]]:
     """Return a block of facets with those that it lacks at its end, and the rows where all of them are."""
-    rows = {tuple(row): i for i, row in enumerate(np.sort(block, axis=1).tolist())}
-    place: list[int] = []
-    missing: list[int] = []
-    for i, key in enumerate(map(tuple, np.sort(facets, axis=1).tolist())):
-        if key not in rows:
-            rows[key] = len(block) + len(missing)
-            missing.append(i)
-        place.append(rows[key])
-    return np.concatenate([block, facets[missing]]), np.array(place, np.intp)
+    both = np.concatenate([block, facets])
+    _, first, facet = np.unique(np.sort(both, axis=1), axis=0, return_index=True, return_inverse=True)
+    row = first[facet.ravel()]  # the first of the same nodes
+    new = (row == np.arange(len(both))) & (np.arange(len(both)) >= len(block))
+    place = np.where(np.arange(len(both)) < len(block), np.arange(len(both)), len(block) + np.cumsum(new) - 1)
+    return np.concatenate([block, both[new]]), place[row[len(block) :]].astype(np.intp)

@@ -241,7 +241,14 @@ class Mesh:
         )
 
     @typed(MeshError)
-    def with_facet_group(self, name: str, where: Callable[[Array], ArrayLike], *, between: bool = False) -> Mesh:
+    def with_facet_group(
+        self,
+        name: str,
+        where: Callable[[Array], ArrayLike],
+        *,
+        between: bool = False,
+        of: str | None = None,
+    ) -> Mesh:
         """Return the mesh with a new group of facets of its solids, chosen by place; facets that it lacks are added.
 
         Parameters
@@ -252,8 +259,12 @@ class Mesh:
             From positions (n_points, dim) [length] to bool (n_points,). A facet belongs to the group if all its nodes do.
         between : bool
             Facets between two cells, such as a section through a body; by default those on the outside.
+        of : str, optional
+            Group of the solid cells that the facets belong to, by default all: it tells faces of two bodies apart that
+            coincide.
 
-        MeshError if there is no such facet, there is a group of points of that name, or `where` returns anything else.
+        MeshError if there is no such facet, there is a group of points of that name, `of` holds no solid cells, or `where`
+        returns anything else.
 
         Examples
         --------
@@ -269,23 +280,45 @@ class Mesh:
                 f"the function of facet group '{name}' returned {chosen.dtype} of shape {chosen.shape}: it must return True "
                 f"or False for each point, shape ({self.n_points},)"
             )
-        facets = facets_with_nodes(self.solids, chosen, between)
+        facets = facets_with_nodes(self.solids, chosen, between, None if of is None else self._cells_inside(name, of))
         if not facets:
+            theirs = f" of '{of}'" if of else ""
             raise MeshError(
-                f"facet group '{name}' would be empty: its function chooses {int(chosen.sum())} points, but no facet "
+                f"facet group '{name}' would be empty: its function chooses {int(chosen.sum())} points, but no facet{theirs} "
                 f"{'between two cells' if between else 'on the outside'} has all its nodes among them; compare coordinates "
                 "with a tolerance"
             )
-        cells, rows = dict(self.cells), {}
-        for kind, block in facets.items():
-            cells[kind], rows[kind] = added(cells.get(kind, block[:0]), block)
+        return self.with_facets({name: facets})
+
+    def _cells_inside(self, name: str, group: str) -> dict[str, NDArray[np.bool_]]:
+        """Return by element which solid cells (n_cells,) are in a group; MeshError that names facet group `name` if none."""
+        if not self.cells_of(group, dim=self.dim):
+            raise MeshError(
+                f"facet group '{name}' is to be of '{group}', which holds no solid cells: name a body's group"
+            )
+        rows = self.split(self.cell_groups[group])
+        return {kind: np.isin(np.arange(len(block)), rows.get(kind, [])) for kind, block in self.solids.items()}
+
+    @typed(MeshError)
+    def with_facets(self, groups: Mapping[str, Mapping[str, ArrayLike]]) -> Mesh:
+        """Return the mesh with new groups of facets; facets that it lacks are added, groups of the same names replaced.
+
+        `groups` (n_facets, n_nodes) of int has their nodes by name of the group and by element.
+        """
+        cells = dict(self.cells)
+        rows: dict[str, dict[str, Indices]] = {}
+        for name, facets in groups.items():
+            rows[name] = {}
+            for kind, block in facets.items():
+                block = np.asarray(block, np.int32)
+                cells[kind], rows[name][kind] = added(cells.get(kind, block[:0]), block)
         starts = dict(zip(cells, np.cumsum([0, *map(len, cells.values())]).tolist(), strict=False))
-        groups = {
-            own: np.concatenate([starts[kind] + place for kind, place in self.split(members).items()] or [members])
-            for own, members in self.cell_groups.items()
-        }
-        groups[name] = np.concatenate([starts[kind] + place for kind, place in rows.items()])
-        return self.replace(cells=cells, cell_groups=groups)
+
+        def numbers(of: Mapping[str, Indices]) -> Indices:
+            return np.concatenate([starts[kind] + place for kind, place in of.items()] or [np.empty(0, np.intp)])
+
+        kept = {own: numbers(self.split(members)) for own, members in self.cell_groups.items()}
+        return self.replace(cells=cells, cell_groups={**kept, **{name: numbers(rows[name]) for name in rows}})
 
     @typed(MeshError)
     def merged_groups(self, name: str, members: Iterable[str]) -> Mesh:

@@ -153,9 +153,15 @@ def cells_joined_by_facets(mesh: Mesh) -> NDArray[np.int32]:
     return _facets(mesh)[1]
 
 
+@typed(MeshError)
+def cells_of_outer_facets(mesh: Mesh) -> Mapping[str, NDArray[np.int32]]:
+    """Return by facet element the number (n_facets,) of the solid cell behind each of the `outer_facets`."""
+    return _facets(mesh)[2]
+
+
 @remembered
-def _facets(mesh: Mesh) -> tuple[Mapping[str, Indices], NDArray[np.int32]]:
-    """Return `outer_facets` and `cells_joined_by_facets`."""
+def _facets(mesh: Mesh) -> tuple[Mapping[str, Indices], NDArray[np.int32], Mapping[str, NDArray[np.int32]]]:
+    """Return `outer_facets`, `cells_joined_by_facets` and `cells_of_outer_facets`."""
     found: dict[str, list[Indices]] = {}
     owners: dict[str, list[Indices]] = {}
     for name, block in mesh.solids.items():
@@ -163,16 +169,18 @@ def _facets(mesh: Mesh) -> tuple[Mapping[str, Indices], NDArray[np.int32]]:
         for facet, facet_element in zip(element.facets, element.facet_elements, strict=True):
             found.setdefault(facet_element, []).append(block[:, list(facet)])
             owners.setdefault(facet_element, []).append(numbers)
-    parent, kept = np.arange(sum(map(len, mesh.cells.values())), dtype=np.int32), {}
+    parent, kept, behind = np.arange(sum(map(len, mesh.cells.values())), dtype=np.int32), {}, {}
     for name, blocks in found.items():
         facets = np.ascontiguousarray(np.concatenate(blocks))
         alone = np.empty(len(facets), bool)
-        topology_kernels.alone(facets, np.concatenate(owners[name]), mesh.n_points, alone, parent)
-        kept[name] = np.ascontiguousarray(facets[alone])
-        kept[name].setflags(write=False)
+        owner = np.concatenate(owners[name])
+        topology_kernels.alone(facets, owner, mesh.n_points, alone, parent)
+        if alone.any():
+            kept[name], behind[name] = np.ascontiguousarray(facets[alone]), owner[alone]
+            kept[name].setflags(write=False)
     while not (parent[parent] == parent).all():
         parent = parent[parent]
-    return MappingProxyType({name: facets for name, facets in kept.items() if len(facets)}), parent
+    return MappingProxyType(kept), parent, MappingProxyType(behind)
 
 
 @dataclass(frozen=True, eq=False)

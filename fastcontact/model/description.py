@@ -9,6 +9,7 @@ import numpy as np
 
 from fastcontact.elasticity.incompatible_modes import BENDING
 from fastcontact.elasticity.initial_states import ALWAYS, COMPONENTS
+from fastcontact.elasticity.nonlinear_materials import NonlinearElastic
 from fastcontact.model.contact_pair import ContactPair
 
 KINDS = {
@@ -65,9 +66,16 @@ def sentences(model: Any) -> Iterator[str]:
     if not model.contact:
         yield "Contact: none."
     yield (
-        "Solved are small strains and linear elasticity, without inertia, step by step along the ramp given to solve "
+        f"Solved are {_solved(model)}, without inertia, step by step along the ramp given to solve "
         "(20 equal steps without one)" + ("; the contact geometry follows the deformation." if model.contact else ".")
     )
+
+
+def _solved(model: Any) -> str:
+    nonlinear = any(isinstance(law, NonlinearElastic) for law, _ in model.materials)
+    if model.strain == "finite":
+        return "finite strains, loads keeping their directions and areas"
+    return "small strains with plasticity" if nonlinear else "small strains and linear elasticity"
 
 
 def _supports(model: Any) -> Iterator[str]:

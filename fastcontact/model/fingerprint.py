@@ -40,6 +40,7 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
     parts: dict[str, Any] = {
         "the mesh": mesh,
         "the kinematics": model.kinematics,
+        **({"the strain": model.strain} if model.strain != "small" else {}),
         "the materials": model.materials,
         "the supports": _unordered(model.supports, mesh),
         "the loads": _unordered(model.loads, mesh),

@@ -48,6 +48,10 @@ class Model(ModelSupports):
         ``"plane_strain"``, ``"plane_stress"`` or ``"3d"``.
     case_text : str
         Text kept in result files beside the numbers, usually the case file.
+    strain : {"small", "finite"}
+        ``"finite"``: the bodies may stretch and turn (total Lagrangian): `NeoHookean` and its like, and `LinearElastic` as
+        Saint Venant-Kirchhoff's law, for small strains under large rotations. Loads keep their directions and act on the
+        reference areas; stresses are Cauchy's.
 
     Examples
     --------
@@ -78,6 +82,8 @@ class Model(ModelSupports):
     def check(self, ramp: Ramp | None = None) -> None:
         """Check the whole model, and its histories against `ramp`; `solve` does so before any numerics."""
         self.material_numbers()
+        if self.temperatures or self.initial_states:
+            self.refuse_nonlinear("temperatures and initial states are")
         fixed, prescribed = self.prescribed_by_ramp()
         self._tell_axis()
         forces = self.forces_by_ramp()

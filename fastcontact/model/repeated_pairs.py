@@ -51,6 +51,14 @@ def _check_sides(mesh: Mesh, pair: ContactPair, other: ContactPair, ours: str, t
         )
 
 
+def joined_already(mesh: Mesh, sides: tuple[str, str], other: ContactPair) -> bool:
+    """Return whether a contact with another body joins facets of two groups, in whichever roles."""
+    if other.obstacle is not None:
+        return False
+    roles = (other.secondary, other.primary), (other.primary, other.secondary)
+    return any(all(len(shared_facets(mesh, *both)) for both in zip(sides, role)) for role in roles)
+
+
 def _check_obstacles(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
     """Compare the obstacles where the two sides share facets; at a corner between two obstacles they differ."""
     if pair.obstacle is None or other.obstacle is None or _moved(pair) != _moved(other):

@@ -317,9 +317,9 @@ class StepResult:
     def work(self) -> dict[str, float]:
         """Energies at the end of the step, and works of all steps so far [energy].
 
-        ``strain_energy``, of springs of the model, too, and of temperatures as if they were forces; ``external_work``, of
-        loads, supports and obstacles; ``friction_work``; ``friction_while_touching``, what of it nodes do in the step
-        in which they close, which is too large where steps are long; ``penalty_energy``, of springs at contacts;
+        ``strain_energy``, of springs of the model, too, and of temperatures as if they were forces; ``plastic_work``;
+        ``external_work``, of loads, supports and obstacles; ``friction_work``; ``friction_while_touching``, what of it nodes
+        do in the step in which they close, which is too large in long steps; ``penalty_energy``, of springs at contacts;
         ``imbalance``, the external work less all others. Empty in files from before it was told, and behind steps of these.
         """
         return dict(self.iterations.get("work", {}))

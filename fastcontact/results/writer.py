@@ -65,7 +65,8 @@ class ResultWriter:
     overwrite : bool
         Whether an existing result file may be replaced.
     cell_fields : iterable of str
-        Names of the `StepResult.cell_fields` of every step; viewers show them, the XDMF sidecar does not.
+        Names of further `StepResult.cell_fields` of every step, beside those of the model; viewers show them, the XDMF
+        sidecar does not.
     resume : bool
         Whether to keep the steps of an existing file of this mesh and write after them. A file that is missing or holds no
         complete step is begun. The file is not changed before there is something to add.
@@ -116,6 +117,7 @@ class ResultWriter:
         background: bool = False,
     ) -> None:
         self._material: Any = None
+        cell_fields = dict.fromkeys((*getattr(mesh, "cell_fields", ()), *cell_fields))
         if not isinstance(mesh, Mesh):
             if not isinstance(getattr(mesh, "mesh", None), Mesh) or not hasattr(mesh, "kinematics"):
                 raise ModelError(f"results need a mesh or a model to stand on, not {type(mesh).__name__}")

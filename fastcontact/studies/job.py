@@ -91,8 +91,11 @@ def case_data(settings: Settings, combination: Combination) -> dict[str, Any]:
     """
     data = copy.deepcopy({key: value for key, value in settings.data.items() if key != "study"})
     formulation = combination.formulation
-    for name, entry in data.get("contact", {}).items() if formulation else ():
+    named = data.get("contact", {})
+    for name, entry in named.items() if formulation and isinstance(named, dict) else ():
         _exchange(entry, str(formulation), settings, settings.formulations[name])
+    if formulation and (named == "auto" or "contacts" in data):
+        _exchange(data.setdefault("contacts", {}), str(formulation), settings, settings.own.formulation or "")
     for name, entry in data.get("obstacle", {}).items() if formulation in AGAINST_OBSTACLES else ():
         _exchange(entry, str(formulation), settings, settings.formulations[name])
     if settings.load_steps is not None:

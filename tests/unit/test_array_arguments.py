@@ -16,7 +16,10 @@ ARRAYS = ("ArrayLike", "ndarray", "Sequence", "Array", "Value", "Constant", "Tab
 # Of numbers among them, in words of the annotation: names and objects have neither masks nor imaginary parts.
 WITHOUT_NUMBERS = ("Sequence[str]", "Iterable[str]", "Sequence[StepResult]", "Mapping[str, str]", "dict[str, str]")
 # What the package itself makes and hands over; `ResultWriter.write` refuses masks in them.
-RESULTS = ("ContactAnswers", "ContactResult", "Deck", "ErrorEstimate", "OrderedLine", "Sensitivities", "StepResult")
+RESULTS = (
+    "ContactAnswers", "ContactResult", "Deck", "ErrorEstimate", "FoundContacts", "Modes", "OrderedLine", "Sensitivities",
+    "StepResult",
+)  # fmt: skip
 MASK = np.ma.array([1.0, 2.0], mask=[False, True])
 REFUSED = "has entries that are masked, and masks are not kept: fill them first"
 

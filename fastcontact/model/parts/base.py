@@ -13,6 +13,7 @@ from scipy.sparse import csr_array, vstack
 from fastcontact.elasticity.initial_states import InitialState
 from fastcontact.elasticity.loads import Load, Value
 from fastcontact.elasticity.materials import KINEMATICS, Material
+from fastcontact.elasticity.nonlinear_materials import STRAINS
 from fastcontact.elasticity.relations import Relation, stacked_rows
 from fastcontact.elasticity.springs import Springs, stacked
 from fastcontact.elasticity.temperature import Temperature
@@ -61,9 +62,11 @@ class ModelBase:
     """Mesh, kinematics, and what was added to them."""
 
     @typed(ModelError)
-    def __init__(self, mesh: Mesh, kinematics: str, case_text: str = "") -> None:
+    def __init__(self, mesh: Mesh, kinematics: str, case_text: str = "", *, strain: str = "small") -> None:
         if kinematics not in KINEMATICS:
             raise ModelError(unknown("kinematics", kinematics, KINEMATICS))
+        if strain not in STRAINS:
+            raise ModelError(unknown("strain", strain, STRAINS))
         if (kinematics == "3d") != (mesh.dim == 3):
             fitting = ", ".join(f"'{name}'" for name in KINEMATICS if (name == "3d") == (mesh.dim == 3))
             raise ModelError(f"kinematics '{kinematics}' do not fit a mesh in {mesh.dim} dimensions: use {fitting}")
@@ -79,6 +82,7 @@ class ModelBase:
                 )
         self.mesh = mesh
         self.kinematics = kinematics
+        self.strain = strain
         self.case_text = case_text
         self.units: dict[str, str] = {}  # names of the units of length, force, pressure where they are known
         self.materials: list[tuple[Material, tuple[str, ...] | None]] = []

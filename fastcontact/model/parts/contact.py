@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import dataclasses
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from fastcontact.contact.default_formulation import against_obstacle, default_formulation
 from fastcontact.contact.formulations import FORMULATIONS, Formulation
+from fastcontact.contact.found_contacts import FoundContacts, find_contacts, nothing_found
 from fastcontact.contact.held_motions import HeldMotions
 from fastcontact.contact.obstacles import MeshedSurface, Obstacle
 from fastcontact.contact.obstacles.rigid_side import RigidSide
@@ -29,7 +30,7 @@ from fastcontact.model.pair_options import SHARED_OPTIONS, pair_options
 from fastcontact.model.parts.connections import ModelConnections
 from fastcontact.model.periodicity import same_place
 from fastcontact.model.ramp import History, table_of
-from fastcontact.model.repeated_pairs import check_repeated
+from fastcontact.model.repeated_pairs import check_repeated, joined_already
 
 log = logging.getLogger("fastcontact")
 
@@ -93,6 +94,59 @@ class ModelContact(ModelConnections):
             formulation, options, reason = default_formulation(self.mesh.dim, options)
             log.info("contact '%s': %s, since %s", name, method(formulation, options), reason)
         self._add_pair(ContactPair(name, secondary, primary, formulation, options))
+
+    @typed(ModelError)
+    def add_contacts(
+        self,
+        *,
+        distance: float | None = None,
+        angle: float = 45.0,
+        groups: Sequence[str] | None = None,
+        formulation: str | None = None,
+        **options: Any,
+    ) -> FoundContacts:
+        """Find the surfaces of different bodies that face each other, and let each two of them come into contact.
+
+        The mesh of the model gets the groups of their facets. Contacts that were added before stay: what they join is left
+        out, and so are pretension sections.
+
+        Parameters
+        ----------
+        distance, angle, groups
+            As in `find_contacts`. Of equally fine sides that of the softer material is the secondary one, where materials
+            were given before.
+        formulation, **options
+            Of all these contacts, as in `add_contact`: ``friction=0.2``, ``kind="tied"``.
+
+        Returns
+        -------
+        FoundContacts
+            What was added.
+
+        Raises
+        ------
+        ContactError
+            If no bodies face each other; the message tells how far apart they are.
+        """
+        moduli = None
+        if self.materials:
+            own = np.array([material.contact_modulus for material, _ in self.materials])
+            moduli = {name: own[rows] for name, rows in self.material_of_cells().items()}
+        found = find_contacts(self.mesh, distance=distance, angle=angle, groups=groups, moduli=moduli)
+        if not found.pairs:
+            raise ContactError(nothing_found(self.mesh, distance, angle, groups))
+        self.mesh, added = found.mesh, []
+        for pair in found:
+            sides = {"secondary": pair.secondary, "primary": pair.primary}
+            ends = [self.mesh.points_of(group) for group in sides.values()]
+            if any(np.isin(side, [cut.nodes, cut.opposite]).all() for cut in self.pretensions for side in ends):
+                continue
+            if any(joined_already(self.mesh, (pair.secondary, pair.primary), other) for other in self.contact):
+                log.info("contact '%s' is left out, since another one joins its facets already", pair.name)
+                continue
+            self.add_contact(pair.name, formulation=formulation, **sides, **options)
+            added.append(pair)
+        return FoundContacts(self.mesh, tuple(added))
 
     @typed(ModelError)
     def add_obstacle(

@@ -246,5 +246,5 @@ class ModelLoads(ModelMaterials):
         """Return the nodal forces (n_points, dim) of a load at multiplier 1 [force]."""
         density = None
         if isinstance(load, InertiaLoad):
-            density = Densities([m for m, _ in self.materials], self._material_of_cells())
+            density = Densities([m for m, _ in self.materials], self.material_of_cells())
         return load.vector(self.mesh, self.kinematics, density)

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from fastcontact.elasticity.material_field import MaterialField, material_field
 from fastcontact.elasticity.materials import Material
+from fastcontact.elasticity.nonlinear_bodies import NonlinearBodies, check_law, field_names, nonlinear_bodies
+from fastcontact.elasticity.nonlinear_materials import NonlinearElastic
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.errors import ModelError
 from fastcontact.mesh.argument_types import typed
@@ -24,7 +26,24 @@ class ModelMaterials(ModelBase):
     def add_material(self, material: Material, groups: Sequence[str] | str | None = None) -> None:
         """Give a material to groups of solid cells, by default to all; groups override what was given to all before."""
         names = self._solid_groups(groups, ", so it cannot have a material")
+        check_law(material, self.strain)
         self.materials.append((material.bound(self._cells_of(names)), names))
+
+    @property
+    def cell_fields(self) -> tuple[str, ...]:
+        """Names of the `StepResult.cell_fields` that steps of this model have: none for linear elasticity."""
+        return field_names([material for material, _ in self.materials], self.strain)
+
+    def nonlinear_bodies(self, field: MaterialField) -> NonlinearBodies | None:
+        """Return the solid cells as nonlinear bodies; None where they are linear."""
+        return nonlinear_bodies(self.mesh, self.kinematics, self.strain, field)
+
+    def refuse_nonlinear(self, what: str) -> None:
+        """Raise ModelError if bodies are nonlinear, for `what` is there for linear elasticity alone."""
+        nonlinear = [type(law).__name__ for law, _ in self.materials if isinstance(law, NonlinearElastic)]
+        if self.strain != "small" or nonlinear:
+            named = nonlinear[0] if nonlinear else f"strain='{self.strain}'"
+            raise ModelError(f"{what} there for linear elasticity alone, not with {named}")
 
     def material_numbers(self) -> tuple[Array, dict[str, NDArray[np.int32]]]:
         """Return moduli (n_moduli, 4, 4), in 3D (n_moduli, 6, 6) [pressure], and by element every solid cell's number there.
@@ -37,10 +56,10 @@ class ModelMaterials(ModelBase):
     def material_field(self) -> MaterialField:
         """Return the materials of all solid cells; ModelError if a cell has none, or two."""
         return material_field(
-            self.mesh, self.kinematics, [material for material, _ in self.materials], self._material_of_cells()
+            self.mesh, self.kinematics, [material for material, _ in self.materials], self.material_of_cells()
         )
 
-    def _material_of_cells(self) -> dict[str, NDArray[np.int32]]:
+    def material_of_cells(self) -> dict[str, NDArray[np.int32]]:
         """Return by element every solid cell's material (n_cells,)."""
         if not self.materials:
             raise ModelError("no material: call add_material(LinearElastic(E=..., nu=...)) for the solid cells")
@@ -101,5 +120,10 @@ class ModelMaterials(ModelBase):
             raise ModelError(
                 f"the displacement has the shape {np.shape(displacement)}, but the mesh {self.mesh.points.shape}"
             )
+        bodies = self.nonlinear_bodies(field)
+        if bodies is not None:
+            if self.strain == "small":
+                raise ModelError("forces of plastic bodies depend on their history, not on the displacement alone")
+            return bodies.at(np.reshape(displacement, self.mesh.points.shape), bodies.beginning).force
         K = stiffness(self.mesh, self.kinematics, field.moduli, field.loops, None, field.treatment)
         return np.asarray(K @ np.ravel(displacement)).reshape(-1, self.mesh.dim)

@@ -33,7 +33,8 @@ WRITERS = {
     "profile": (["profile", "old.vtkhdf"], ["--csv", "--agr", "--png"], ["old.vtkhdf"]),
     "plot": (["plot", "old.vtkhdf"], ["--png", "--animate"], ["old.vtkhdf"]),
     "export": (["export", "old.vtkhdf"], ["--med", "--xdmf"], ["old.vtkhdf"]),
-    "run": (["run", "case.toml"], ["-o", "--json", "--plot"], ["case.toml", "coarse.med"]),
+    "run": (["run", "case.toml"], ["-o", "--json", "--plot", "--modes"], ["case.toml", "coarse.med"]),
+    "info": (["info", "case.toml"], ["--png"], ["case.toml", "coarse.med"]),
     "converge": (["converge", "case.toml"], ["--json", "--csv", "--png", "--html", "-o"], ["case.toml", "coarse.med"]),
     "sweep": (
         ["sweep", "case.toml", "--set", "material[0].E=1,2"],

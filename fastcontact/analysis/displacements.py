@@ -1,0 +1,35 @@
+"""All displacements of a load step, once its contact forces are known."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from fastcontact.analysis.geometry_loop import SettledContact
+from fastcontact.analysis.problem import Problem, StepLoad
+from fastcontact.analysis.state import State
+from fastcontact.linear.protocol import Loaded
+
+Array = NDArray[np.float64]
+
+
+def with_loads(problem: Problem, load: StepLoad) -> Loaded:
+    """Return the equations of the step: the prepared matrix with the right-hand side of its loads."""
+    return problem.solver.load(problem.system.right(load.force, load.lift))
+
+
+def solve_displacements(
+    problem: Problem, start: State, load: StepLoad, loaded: Loaded, settled: SettledContact | None
+) -> tuple[Array, Array]:
+    """Return all displacements [length] and the contact forces [force], both (n_dofs,)."""
+    system, lift = problem.system, load.lift
+    if settled is None:
+        none = csr_array((0, len(lift))), np.empty(0)
+        v = loaded.solve(*none, guess=system.unknowns(start.u, lift))[0]
+        return system.displacement(v, lift), np.zeros(len(lift))
+    contact_force, rigid = settled.force, settled.iterate.rigid
+    if problem.unsupported_bodies is not None and rigid is not None:
+        lift = lift + problem.unsupported_bodies.rigid(rigid.position)
+    v = loaded.full_solution(system.reduced(contact_force), settled.solution.u)
+    return system.displacement(v, lift), contact_force

@@ -1,0 +1,1 @@
+"""Small vibrations about a settled load step."""

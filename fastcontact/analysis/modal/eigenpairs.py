@@ -1,0 +1,129 @@
+"""The lowest eigenpairs of ``K v = eigenvalue M v``, by factors of a shifted matrix or by multigrid.
+
+With factors of ``K + s M`` by the Lanczos method on its inverse (Ericsson and Ruhe, Math. Comp. 35, 1980); where factors cost
+too much, by the locally optimal block preconditioned conjugate gradients of Knyazev (SIAM J. Sci. Comput. 23, 2001), with one
+cycle of the multigrid hierarchy as preconditioner.
+"""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+from scipy.sparse import bsr_array
+from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh, lobpcg
+
+from fastcontact.errors import ConvergenceError, ModelError
+from fastcontact.linear.multigrid.solver import Multigrid
+from fastcontact.linear.protocol import LinearSolver
+
+Array = NDArray[np.float64]
+# Error of vectors, to the square of which eigenvalues are right.
+ACCURACY = 1e-5
+# Below so many unknowns all eigenvalues are found at once.
+FEW = 200
+UNSTABLE = (
+    "the settled step is not stable: small motions about it grow by themselves, or what has no mass is free; take a lower "
+    "load, hold it, or leave out the stiffness by stresses (stress_stiffening=False)"
+)
+# Iterations until that is looked at, and how often.
+ROUND, ROUNDS = 20, 15
+
+
+def lowest(
+    solver: LinearSolver, matrices: tuple[bsr_array, bsr_array], near_nullspace: Array, free: NDArray[np.bool_],
+    n: int, shift: float,
+) -> tuple[Array, Array]:  # fmt: skip
+    """Return the n lowest eigenvalues (n,), ascending, and their vectors (size, n), orthonormal by M.
+
+    Parameters
+    ----------
+    solver : LinearSolver
+    matrices : (bsr_array (size, size), bsr_array (size, size))
+        K, whose rows of unknowns that are not free have the diagonal alone, and M, which has none there.
+    near_nullspace : ndarray (size, k)
+        Vectors that cost little energy.
+    free : ndarray of bool (size,)
+        The unknowns.
+    n : int
+    shift : float
+        s, such that ``K + s M`` is positive definite.
+
+    Raises
+    ------
+    ModelError
+        If it is not.
+    ConvergenceError
+        If the iteration does not end.
+    """
+    K, M = matrices
+    if free.sum() < max(FEW, 3 * n):
+        return _of_few(K, M, np.flatnonzero(free), n, shift)
+    shifted = bsr_array(K + shift * M)
+    shifted.sort_indices()
+    try:
+        solver.prepare(shifted, near_nullspace, np.empty(0, np.intp))
+    except ModelError as error:
+        raise ModelError(f"{UNSTABLE} ({error})") from error
+    rng = np.random.default_rng(0)
+    if isinstance(solver, Multigrid):
+        start = rng.normal(size=(len(free), n + n // 2 + 2)) * free[:, None]
+        found = _by_multigrid(solver, shifted, M, start, n)
+    else:
+        found = _by_factors(solver, shifted, M, rng.normal(size=len(free)) * free, n)
+    # Ritz values in the span: more accurate than those of the iteration, and vectors of equal ones are orthogonal.
+    small, mass = found.T @ (K @ found), found.T @ (M @ found)
+    lower = np.linalg.inv(np.linalg.cholesky(mass))
+    values, vectors = np.linalg.eigh(lower @ (0.5 * (small + small.T)) @ lower.T)
+    return values[:n], (found @ (lower.T @ vectors))[:, :n]
+
+
+def _of_few(K: bsr_array, M: bsr_array, free: NDArray[np.intp], n: int, shift: float) -> tuple[Array, Array]:
+    """Return what `lowest` does for so few unknowns `free` (k,) that all eigenvalues are found at once."""
+    stiff, heavy = (np.asarray(matrix.tocsr()[free][:, free].todense()) for matrix in (K, M))
+    try:  # the inverse eigenvalues, since M may be singular
+        inverse, own = eigh(heavy, stiff + shift * heavy, subset_by_index=[len(free) - n, len(free) - 1])
+    except np.linalg.LinAlgError as error:
+        raise ModelError(UNSTABLE) from error
+    vectors = np.zeros((K.shape[0], n))
+    vectors[free] = own[:, ::-1] / np.sqrt(inverse[::-1])
+    return 1.0 / inverse[::-1] - shift, vectors
+
+
+def _by_factors(solver: LinearSolver, shifted: bsr_array, M: bsr_array, start: Array, n: int) -> Array:
+    zero = np.zeros(len(start))
+    loaded = solver.load(zero)
+    inverse = LinearOperator(shifted.shape, matvec=loaded.full_solution, dtype=float)
+    try:
+        return np.asarray(eigsh(shifted, n, M, sigma=0.0, OPinv=inverse, v0=loaded.full_solution(M @ start))[1])
+    except ArpackNoConvergence as error:
+        raise ConvergenceError(
+            f"Lanczos iterations found {len(error.eigenvalues)} of {n} modes: ask for fewer"
+        ) from error
+
+
+def _by_multigrid(solver: Multigrid, shifted: bsr_array, M: bsr_array, start: Array, n: int) -> Array:
+    def cycle(residuals: Array) -> Array:
+        out = np.zeros((residuals.shape[1], residuals.shape[0]))
+        for z, own in zip(out, residuals.T, strict=True):
+            r = np.ascontiguousarray(own)
+            if norm := float(np.linalg.norm(r)):
+                solver.precondition(r, norm, z)
+        return out.T
+
+    unit = LinearOperator(shifted.shape, matvec=lambda r: cycle(r.reshape(-1, 1)).ravel(), matmat=cycle, dtype=float)
+    vectors = start
+    for _ in range(ROUNDS):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # it tells that a round is short
+            values, vectors = lobpcg(shifted, vectors, M, unit, tol=1e-300, maxiter=ROUND, largest=False)
+        residuals = shifted @ vectors[:, :n] - (M @ vectors[:, :n]) * values[:n]
+        # By the energy of the error, whatever the units: eigenvalues are off by its square.
+        if (np.einsum("ij,ij->j", residuals, cycle(residuals)) <= ACCURACY**2 * values[:n]).all():
+            return np.asarray(vectors)
+    raise ConvergenceError(
+        f"{n} modes did not settle in {ROUNDS * ROUND} iterations of multigrid: ask for fewer, or use "
+        'linear_solver="direct" if memory allows'
+    )

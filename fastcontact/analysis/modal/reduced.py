@@ -1,0 +1,93 @@
+"""Stiffness and mass of the motions that supports, relations and closed contact allow."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import qr, solve_triangular
+from scipy.sparse import bsr_array, csr_array, diags_array
+
+from fastcontact.elasticity.constrained_system import System, diagonal_of, supports_apart
+from fastcontact.linear.elimination.coupled_pivots import RepeatedError
+from fastcontact.linear.elimination.elimination import eliminate
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+Mask = NDArray[np.bool_]
+# Rows that others make up but for this part of them repeat them.
+REPEATED = 1e-9
+
+
+class Reduced:
+    """Motions ``u = T v`` of a system under further equations ``rows @ u = 0``.
+
+    Parameters
+    ----------
+    system : System
+        With supports and relations.
+    mass : bsr_array (n, n)
+        [mass].
+    rows : csr_array (m, n)
+        They may repeat each other [-].
+    nodes : ndarray of int (m,)
+        A node that each row belongs to: a hint which unknowns to eliminate.
+
+    Attributes
+    ----------
+    K, M : bsr_array (n, n)
+        Stiffness [force / length] and mass [mass] of v; where nothing is free K has its diagonal alone, and M nothing.
+    free : ndarray of bool (n,)
+        Which of v are unknowns.
+    """
+
+    def __init__(self, system: System, mass: bsr_array, rows: csr_array, nodes: Indices) -> None:
+        n, size = mass.shape[0], mass.blocksize[0]
+        unit = diags_array(system.free.astype(float))
+        self._T = csr_array(unit if system.T is None else system.T @ unit)
+        self.K, self.free = system.matrix, system.free.copy()
+        own = system.rows(rows, np.zeros(rows.shape[0]), np.zeros(n))[0]
+        kept = np.flatnonzero(np.diff(own.indptr) > 0)
+        if len(kept):
+            pivots, weights = _eliminated(csr_array(own[kept]), nodes[kept], size)
+            self.free[pivots] = False
+            place = csr_array((np.ones(len(pivots)), (pivots, np.arange(len(pivots)))), shape=(n, len(pivots)))
+            among = csr_array(diags_array(self.free.astype(float)) + place @ weights)
+            K = csr_array(among.T @ self.K.tocsr() @ among).tobsr((size, size))
+            K.sort_indices()
+            self.K, self._T = supports_apart(K, ~self.free, diagonal_of(K))[0], csr_array(self._T @ among)
+        self.M = csr_array(self._T.T @ mass.tocsr() @ self._T).tobsr((size, size))
+
+    def displacement(self, v: Array) -> Array:
+        """Return the displacements (n, k) of motions v (n, k) [unit of v]."""
+        return np.asarray(self._T @ v)
+
+
+def _eliminated(rows: csr_array, nodes: Indices, size: int) -> tuple[Indices, csr_array]:
+    """Return the unknowns (p,) that equations (m, n) eliminate, and their weights (p, n) of the others.
+
+    Where the equations repeat each other, as at corners where several sides meet, those that are independent.
+    """
+    try:
+        found = eliminate(rows, np.zeros(rows.shape[0]), None, nodes, size)
+    except RepeatedError:
+        return _independent(rows)
+    weights = found.weights
+    if found.coupled is not None:
+        columns = np.unique(weights.indices)
+        full = found.coupled.solve(weights[:, columns].toarray())
+        weights = csr_array(full @ _selection(columns, rows.shape[1]))
+    return found.pivots, weights
+
+
+def _independent(rows: csr_array) -> tuple[Indices, csr_array]:
+    columns = np.unique(rows.indices)
+    _, R, order = qr(rows[:, columns].toarray(), mode="economic", pivoting=True)
+    rank = int((np.abs(np.diag(R)) > REPEATED * abs(R[0, 0])).sum())
+    weights = -solve_triangular(R[:rank, :rank], R[:rank, rank:])
+    others = _selection(columns[order[rank:]], rows.shape[1])
+    return columns[order[:rank]].astype(np.intp), csr_array(csr_array(weights) @ others)
+
+
+def _selection(columns: Indices, n: int) -> csr_array:
+    """Return the matrix (k, n) that puts k columns in their places."""
+    return csr_array((np.ones(len(columns)), (np.arange(len(columns)), columns)), shape=(len(columns), n))

@@ -1,0 +1,190 @@
+"""Newton iterations of a load step with nonlinear bodies: linearise, solve, until displacement and forces stand still.
+
+Bodies alone are linearised; contact, with its geometry, is solved as for linear bodies (the Newton method of Josephy, 1979,
+for generalised equations). So iterations converge quadratically, and few matrices are factorised.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact._jit.norms_kernels import largest, largest_difference
+from fastcontact.analysis.balance import Balance, balance
+from fastcontact.analysis.criteria import LOOSEST
+from fastcontact.analysis.displacements import solve_displacements, with_loads
+from fastcontact.analysis.extrapolation import Extrapolation
+from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
+from fastcontact.analysis.inequalities import StepContext
+from fastcontact.analysis.iterate import Iterate
+from fastcontact.analysis.problem import Problem, StepLoad
+from fastcontact.analysis.state import State
+from fastcontact.elasticity.nonlinear_bodies import DeformedBodies
+from fastcontact.errors import ConvergenceError, ModelError
+
+log = logging.getLogger("fastcontact")
+Array = NDArray[np.float64]
+# Newton iterations of a load step, and how often one is halved where it turns cells inside out.
+MOST, HALVINGS = 40, 6
+# Iterations after which the change of the displacement must have fallen at least once by the factor.
+PATIENCE, FALL = 12, 0.5
+# Contact geometry of the linearised bodies settles to this part of the last relative change of the displacement.
+FORCING = 1e-3
+# Relative error of the displacement below which iterations end. Changes below SCATTER that do not fall to the part STAYS of
+# the one before are round-off, which is that much in slender bodies.
+UNCHANGED, SCATTER, STAYS = 1e-9, 1e-6, 0.3
+
+
+@dataclass(frozen=True, eq=False)
+class NewtonSolution:
+    """The end of a load step with nonlinear bodies.
+
+    Attributes
+    ----------
+    settled : SettledContact, optional
+        None without contact.
+    u : ndarray (n_dofs,)
+        [length]
+    balance : Balance
+    bodies : DeformedBodies
+    history : list of dict
+        An entry for each iteration.
+    """
+
+    settled: SettledContact | None
+    u: Array
+    balance: Balance
+    bodies: DeformedBodies
+    history: list[dict[str, Any]]
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Pairings and active-set iterations of all iterations, see `StepResult.iterations`."""
+        names = {"geometry_updates": "pairings", "active_set_iterations": "active_set_iterations"}
+        return {name: sum(entry[key] for entry in self.history) for name, key in names.items()}
+
+
+def newton(problem: Problem, start: State, load: StepLoad, expected: float) -> NewtonSolution:
+    """Return the equilibrium of a load step.
+
+    Parameters
+    ----------
+    problem : Problem
+        With nonlinear bodies.
+    start : State
+        At the beginning of the step.
+    load : StepLoad
+    expected : float
+        Displacement to expect in the first step, if forces alone act [length].
+
+    Raises
+    ------
+    ConvergenceError
+        If the iterations do not end, or a cell turns inside out.
+    """
+    if start.extrapolation.ratio:
+        try:
+            return _iterated(problem, start, load, expected, start.extrapolation.displacement(start.u))
+        except ConvergenceError as error:
+            log.info("the step starts anew, not from an extrapolated displacement: %s", error)
+    return _iterated(problem, start, load, expected, start.u)
+
+
+def _iterated(problem: Problem, start: State, load: StepLoad, expected: float, place: Array) -> NewtonSolution:
+    """Return the equilibrium of a load step by iterations that begin at displacements `place` (n_dofs,) [length]."""
+    iterate, history = Iterate.of(start), []
+    u, bodies, changes = place, problem.deformed(place, start), [1.0]
+    for _ in range(MOST):
+        settled, target, force = _solve(problem, start, load, (bodies, u), iterate, (expected, changes[-1]))
+        before, (u, bodies, whole) = u, _reach(problem, start, u, target)
+        moved, size = largest_difference(u, before), max(largest(u), largest(load.lift))
+        balanced = balance(problem, u, force, load.force, start.largest_force, problem.internal(bodies, u))
+        changes.append(moved / size if size else 0.0)
+        history.append(_told(iterate, changes[-1], balanced, whole))
+        if whole and balanced.excess <= 1.0 and (_still(problem, changes) or moved <= start.gap_round_off):
+            return NewtonSolution(settled, u, balanced, bodies, history)
+        if len(changes) > PATIENCE and min(changes[-PATIENCE:]) > FALL * min(changes[:-PATIENCE]):
+            break
+    raise ConvergenceError(
+        f"Newton's iterations do not converge: after {len(history)} the displacement still changes by {changes[-1]:.1e} of "
+        f"its largest component and forces are out of balance by {balanced.relative:.1e}; take smaller load steps",
+        history,
+    )
+
+
+def _still(problem: Problem, changes: list[float]) -> bool:
+    """Return whether the relative `changes` of the displacement leave an error below the criterion, or are round-off."""
+    before, last = changes[-2:]
+    left = last * min(last / before, 1.0) if before else last
+    return left <= max(problem.criteria.geometry, UNCHANGED) or (last <= SCATTER and last > STAYS * before)
+
+
+def _solve(
+    problem: Problem, start: State, load: StepLoad, at: tuple[DeformedBodies, Array], iterate: Iterate,
+    scale: tuple[float, float],
+) -> tuple[SettledContact | None, Array, Array]:  # fmt: skip
+    """Return contact, displacements (n_dofs,) [length] and contact forces (n_dofs,) [force] of the bodies linearised.
+
+    `at` are the bodies and their displacements (n_dofs,) [length], `scale` the displacement to expect [length] and the last
+    relative change: contact geometry settles to a part of that. Where the tangent is not positive definite, there is no
+    equilibrium to lead to, and the part of the pressure that turns is left out.
+    """
+    try:
+        return _linear_contact(problem, start, load, at, iterate, scale)
+    except (ModelError, ConvergenceError) as error:
+        log.info("the tangent leaves out how pressure turns: %s", error)
+    try:
+        definite = problem.deformed(at[1], start, geometric=False)
+        return _linear_contact(problem, start, load, (definite, at[1]), iterate, scale)
+    except ModelError as error:
+        raise ConvergenceError(
+            f"the tangent stiffness of the bodies cannot be factorised ({error}): they buckle, or the load step is too large"
+        ) from None
+
+
+def _linear_contact(
+    problem: Problem, start: State, load: StepLoad, at: tuple[DeformedBodies, Array], iterate: Iterate,
+    scale: tuple[float, float],
+) -> tuple[SettledContact | None, Array, Array]:  # fmt: skip
+    """Return what `_solve` does, with the tangent as it is."""
+    tangent, linear = problem.linearised(*at, load, iterate.rigid)
+    iterate.u, iterate.history = at[1].copy(), []
+    loaded, settled = with_loads(tangent, linear), None
+    if tangent.pairs:
+        enough = min(max(tangent.criteria.geometry, FORCING * scale[1]), LOOSEST)
+        inner = replace(tangent, criteria=replace(tangent.criteria, geometry=enough))
+        dofs = tangent.dofs.for_step(iterate.u, linear.lift)
+        step = StepContext(inner, start, linear, dofs.loaded(loaded), dofs)
+        settled = settle_geometry(step, Extrapolation(), scale[0], iterate)
+    return settled, *solve_displacements(tangent, start, linear, loaded, settled)
+
+
+def _reach(problem: Problem, start: State, u: Array, target: Array) -> tuple[Array, DeformedBodies, bool]:
+    """Return the displacements to go on from, the bodies there, and whether they are the `target` (n_dofs,) [length].
+
+    Half of the way, of that half, and so on, is gone where cells turn inside out farther on.
+    """
+    part = 1.0
+    for _ in range(HALVINGS):
+        there = target if part == 1.0 else u + part * (target - u)
+        try:
+            return there, problem.deformed(there, start), part == 1.0
+        except ConvergenceError as error:
+            failed = error
+        part *= 0.5
+    raise failed
+
+
+def _told(iterate: Iterate, change: float, balanced: Balance, whole: bool) -> dict[str, Any]:
+    """Return the entry of an iteration in the history."""
+    inner = iterate.history
+    return {
+        "displacement_change": change, "residual": balanced.relative, "pairings": len(inner),
+        "active": inner[-1]["active"] if inner else 0,
+        "active_set_iterations": sum(entry["active_set_iterations"] for entry in inner),
+        **({} if whole else {"damped": True}),
+    }  # fmt: skip

@@ -1,0 +1,206 @@
+"""Facets of different bodies that face each other, found by the closest facet to points on each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from fastcontact.contact.projection import CORNER
+from fastcontact.contact.search.closest import closest_of_kinds
+from fastcontact.mesh import elements
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.topology import cells_of_outer_facets, outer_facets
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+ROUNDING = 1e-9  # of the size of a facet
+
+
+@dataclass(frozen=True, eq=False)
+class OuterFacets:
+    """The facets on the outside of bodies, numbered through blocks of one kind each.
+
+    Attributes
+    ----------
+    mesh : Mesh
+    blocks : dict of str to ndarray of int (n_facets, n_nodes)
+        Connectivity by element, normals outward.
+    body, cell : ndarray of int (n,)
+        Of each facet: its body, and the number of the solid cell behind it.
+    """
+
+    mesh: Mesh
+    blocks: dict[str, NDArray[np.int32]]
+    body: Indices
+    cell: Indices
+
+    @classmethod
+    def of(cls, mesh: Mesh, body_of_cells: Indices) -> OuterFacets:
+        """Return the outer facets of the cells whose body, in `body_of_cells` (n_cells,) of int, is not -1."""
+        blocks, cells = {}, []
+        for name, facets in outer_facets(mesh).items():
+            behind = cells_of_outer_facets(mesh)[name]
+            kept = body_of_cells[behind] >= 0
+            blocks[name] = facets[kept]
+            cells.append(behind[kept])
+        cell = np.concatenate(cells).astype(np.intp)
+        return cls(mesh, blocks, body_of_cells[cell], cell)
+
+    @cached_property
+    def first(self) -> Indices:
+        """The number of the first facet of each block, and that of all."""
+        return np.cumsum([0, *map(len, self.blocks.values())])
+
+    @cached_property
+    def samples(self) -> tuple[Indices, Array, Array]:
+        """Points inside the facets: the facet (m,) of each, where it is (m, dim) [length], the outward normal (m, dim)."""
+        owner, place, normal = [], [], []
+        for (name, facets), first in zip(self.blocks.items(), self.first):
+            shape, gradient, _ = elements.get(name).tables
+            corners = self.mesh.points[facets]
+            place.append((shape @ corners).reshape(-1, self.mesh.dim))
+            normal.append(_normals(gradient, corners).reshape(-1, self.mesh.dim))
+            owner.append(np.repeat(first + np.arange(len(facets)), len(shape)))
+        normals = np.concatenate(normal)
+        return np.concatenate(owner), np.concatenate(place), normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+    @cached_property
+    def area(self) -> Array:
+        """Areas (n,), in 2D lengths [length^(dim - 1)]."""
+        found = [np.empty(0)]
+        for name, facets in self.blocks.items():
+            _, gradient, weights = elements.get(name).tables
+            found.append(np.linalg.norm(_normals(gradient, self.mesh.points[facets]), axis=2) @ weights)
+        return np.concatenate(found)
+
+    @cached_property
+    def size(self) -> Array:
+        """Sizes (n,) [length]."""
+        return np.asarray(self.area ** (1.0 / (self.mesh.dim - 1)))
+
+    @cached_property
+    def spacing(self) -> Array:
+        """Distances between nodes (n,) [length]: half the size of quadratic facets."""
+        order = [elements.get(name).order for name in self.blocks]
+        return self.size / np.repeat(order, np.diff(self.first))
+
+    @cached_property
+    def boxes(self) -> tuple[Array, Array]:
+        """Lower and upper corners (n, dim) of the boxes around the nodes [length]."""
+        corners = [self.mesh.points[facets] for facets in self.blocks.values()]
+        return np.concatenate([c.min(axis=1) for c in corners]), np.concatenate([c.max(axis=1) for c in corners])
+
+    @cached_property
+    def smooth_face(self) -> Indices:
+        """The smooth face (n,) that each facet belongs to: facets go on in each other where they meet without a corner."""
+        keys, facet, normal = [], [], []
+        for (name, facets), first in zip(self.blocks.items(), self.first):
+            element = elements.get(name)
+            at_nodes = _normals(element.gradient(element.nodes), self.mesh.points[facets])
+            at_nodes /= np.linalg.norm(at_nodes, axis=2, keepdims=True)
+            for ends in [(0, 0), (1, 1)] if self.mesh.dim == 2 else element.edges:
+                keys.append(np.sort(facets[:, ends], axis=1))
+                normal.append(at_nodes[:, ends].sum(axis=1))
+                facet.append(first + np.arange(len(facets)))
+        key, along, number = np.concatenate(keys), np.concatenate(normal), np.concatenate(facet)
+        along /= np.linalg.norm(along, axis=1, keepdims=True)
+        order = np.lexsort(key.T)
+        one, other = order[:-1], order[1:]
+        joined = (key[one] == key[other]).all(axis=1)
+        joined &= np.einsum("nd,nd->n", along[one], along[other]) > np.cos(np.radians(CORNER))
+        first_of, second_of = number[one[joined]], number[other[joined]]
+        graph = coo_array((np.ones(len(first_of)), (first_of, second_of)), shape=(len(self.body),) * 2)
+        return np.asarray(connected_components(graph, directed=False)[1], np.intp)
+
+    def facets(self, numbers: Indices) -> dict[str, NDArray[np.int32]]:
+        """Return the connectivity of some facets by element."""
+        found = {}
+        for (name, block), first in zip(self.blocks.items(), self.first):
+            inside = numbers[(numbers >= first) & (numbers < first + len(block))] - first
+            if len(inside):
+                found[name] = block[inside]
+        return found
+
+
+def _normals(gradient: Array, corners: Array) -> Array:
+    """Return outward vectors (n, k, dim), as long as the facets with nodes (n, m, dim) are stretched, at k points."""
+    along = np.einsum("kmj,nmd->nkjd", gradient, corners)
+    if corners.shape[2] == 2:
+        return np.stack([along[:, :, 0, 1], -along[:, :, 0, 0]], axis=2)
+    return np.cross(along[:, :, 0], along[:, :, 1])
+
+
+@dataclass(frozen=True, eq=False)
+class Facing:
+    """Points of facets that face another body.
+
+    Attributes
+    ----------
+    facet, other : ndarray of int (n,)
+        The facet that a point lies in, and the closest one of all other bodies.
+    gap : ndarray (n,)
+        Distance between them, negative where bodies overlap [length].
+    """
+
+    facet: Indices
+    other: Indices
+    gap: Array
+
+
+def facing(outside: OuterFacets, distance: float | None, angle: float) -> Facing:
+    """Return where facets face another body, see `find_contacts` for `distance` [length] and `angle` [degrees].
+
+    Between two bodies that both look at each other, a third one hides them: only the closest facet of all counts.
+    """
+    everywhere = np.ones(len(outside.body), bool)
+    near = _search(outside, distance, angle, everywhere)
+    if distance is not None:
+        return near
+    # Smooth faces that are near somewhere face each other as far as they look at each other.
+    face = outside.smooth_face
+    key = np.sort(np.column_stack([face[near.facet], face[near.other]]), axis=1) @ [len(face), 1]
+    far = _search(outside, np.inf, angle, np.isin(face, face[np.concatenate([near.facet, near.other])]))
+    both = np.sort(np.column_stack([face[far.facet], face[far.other]]), axis=1) @ [len(face), 1]
+    ahead, touching = np.isin(both, key) & (far.gap > 0.0), near.gap <= 0.0
+    parts = ((near.facet, far.facet), (near.other, far.other), (near.gap, far.gap))
+    return Facing(*(np.concatenate([one[touching], other[ahead]]) for one, other in parts))
+
+
+def _search(outside: OuterFacets, distance: float | None, angle: float, among: NDArray[np.bool_]) -> Facing:
+    """Return what points in the facets `among` (n,) all face."""
+    found = [_faced_by(outside, body, distance, angle, among) for body in np.unique(outside.body)]
+    return Facing(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+
+
+def _faced_by(
+    outside: OuterFacets, body: int, distance: float | None, angle: float, among: NDArray[np.bool_]
+) -> tuple[Indices, Indices, Array]:
+    """Return what points in those facets of one body face that are `among` (n,): see `Facing`."""
+    owner, place, normal = outside.samples
+    (low, high), size = outside.boxes, outside.size
+    own = outside.body == body
+    reach = float(size.max()) if distance is None else distance
+    rest = ~own & ((high >= low[own].min(axis=0) - reach) & (low <= high[own].max(axis=0) + reach)).all(axis=1)
+    ours = np.flatnonzero((own & among)[owner])
+    if rest.any():
+        at = place[ours]
+        ours = ours[((at >= low[rest].min(axis=0) - reach) & (at <= high[rest].max(axis=0) + reach)).all(axis=1)]
+    if not rest.any() or not len(ours):
+        return np.empty(0, np.intp), np.empty(0, np.intp), np.empty(0)
+    kinds = [block[rest[first : first + len(block)]] for block, first in zip(outside.blocks.values(), outside.first)]
+    closest = closest_of_kinds(place[ours], [outside.mesh.points[block] for block in kinds if len(block)])
+    facet, other = owner[ours], np.flatnonzero(rest)[closest.facet]
+    apart = place[ours] - closest.position
+    gap = np.einsum("nd,nd->n", apart, closest.normal)
+    beside = np.linalg.norm(apart - gap[:, None] * closest.normal, axis=1)
+    larger = np.maximum(size[facet], size[other])
+    opposed = np.einsum("nd,nd->n", normal[ours], closest.normal) <= -np.cos(np.radians(angle))
+    near = closest.distance <= (larger if distance is None else distance) + ROUNDING * larger
+    ahead = beside <= np.abs(gap) * np.tan(np.radians(angle)) + ROUNDING * larger
+    kept = opposed & near & ahead
+    return facet[kept], other[kept], gap[kept]

@@ -1,0 +1,296 @@
+"""Contact pairs that a mesh has by itself: bodies whose surfaces face each other, with groups for both sides."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from fastcontact.contact.facing_facets import Facing, OuterFacets, facing
+from fastcontact.errors import ContactError, FileError
+from fastcontact.mesh.argument_types import typed
+from fastcontact.mesh.companion_groups import OPPOSITE
+from fastcontact.mesh.html_table import html_table
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.topology import bodies
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+# Sides whose nodes, and bodies whose moduli, differ by less are alike.
+ALIKE = 0.1
+_COLUMNS = (
+    "contact", "secondary", "primary", "facets secondary", "facets primary", "spacing secondary", "spacing primary",
+    "gap from", "gap to", "secondary since",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class FoundContact:
+    """Two surfaces that face each other.
+
+    Attributes
+    ----------
+    name : str
+        Of the pair: both bodies, and a number where they have several faces.
+    bodies : (str, str)
+        The secondary and the primary body: the cell group that is all of it, or ``"body 1"`` and so on.
+    secondary, primary : str
+        Groups of facets in `FoundContacts.mesh`.
+    facets : (int, int)
+        Number of facets of each side.
+    spacing : (float, float)
+        Distance between nodes of each side, the geometric mean over where they face each other [length].
+    gap : (float, float)
+        The least and the largest gap, negative where bodies overlap [length].
+    reason : str
+        Why this side is the secondary one.
+    """
+
+    name: str
+    bodies: tuple[str, str]
+    secondary: str
+    primary: str
+    facets: tuple[int, int]
+    spacing: tuple[float, float]
+    gap: tuple[float, float]
+    reason: str
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FoundContacts(Sequence[FoundContact]):
+    """What `find_contacts` has found: a sequence of `FoundContact` that prints as a table.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        The mesh with a group of facets for each side.
+    pairs : tuple of FoundContact
+    """
+
+    mesh: Mesh
+    pairs: tuple[FoundContact, ...] = field(default=())
+
+    def __len__(self) -> int:
+        return len(self.pairs)
+
+    def __getitem__(self, place: Any) -> Any:
+        return self.pairs[place]
+
+    def __iter__(self) -> Iterator[FoundContact]:
+        return iter(self.pairs)
+
+    def __repr__(self) -> str:
+        if not self.pairs:
+            return "no bodies that face each other"
+        rows = [_COLUMNS, *self._rows("{:.4g}")]
+        widths = [max(len(str(row[k])) for row in rows) for k in range(len(_COLUMNS))]
+        return "\n".join("  ".join(str(text).ljust(width) for text, width in zip(row, widths)).rstrip() for row in rows)
+
+    def _repr_html_(self) -> str:
+        return html_table(self._rows("{:.4g}"), _COLUMNS, "Contacts found")
+
+    def to_pandas(self) -> Any:
+        """Return the table as a ``pandas.DataFrame``, lengths as numbers; FileError if pandas is not installed."""
+        try:
+            import pandas
+        except ImportError as error:
+            raise FileError("to_pandas needs pandas: pip install pandas") from error
+        return pandas.DataFrame(self._rows(None), columns=list(_COLUMNS))
+
+    def _rows(self, numbers: str | None) -> list[tuple[Any, ...]]:
+        def shown(value: float) -> Any:
+            return value if numbers is None else numbers.format(value)
+
+        return [
+            (p.name, *p.bodies, *p.facets, *map(shown, p.spacing), *map(shown, p.gap), p.reason) for p in self.pairs
+        ]
+
+
+@typed(ContactError)
+def find_contacts(
+    mesh: Mesh,
+    *,
+    distance: float | None = None,
+    angle: float = 45.0,
+    groups: Sequence[str] | None = None,
+    moduli: Mapping[str, ArrayLike] | None = None,
+) -> FoundContacts:
+    """Find the surfaces of different bodies that face each other, and which side of each pair should be the secondary one.
+
+    Points inside of all outer facets are projected on the closest facet of all other bodies. Two facets face each other if
+    that is near enough, along their normals, and these are opposed. A secondary body whose facing surface has corners of 45
+    degrees or more gets one pair for each smooth face, since a side of a pair has one normal at each node. Secondary is the
+    side with the finer mesh; of equally fine ones that of the softer body, else the smaller one.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    distance : float, optional
+        Largest gap or overlap [length]. By default smooth faces of two bodies are a pair that come as near to each other as
+        the size of the larger of two facets, as far as they look at each other.
+    angle : float
+        By how much normals may differ from opposite ones, more than 0 and less than 90 [degrees].
+    groups : sequence of str, optional
+        Groups of solid cells that are bodies, by default all sets of cells that nodes connect. Between the cells of one body
+        there is no contact.
+    moduli : mapping of str to array_like (n_cells,), optional
+        By element, how stiff the solid cells are [pressure]; `Model.add_contacts` knows them from the materials.
+
+    Returns
+    -------
+    FoundContacts
+        Its mesh has groups for both sides of every pair.
+
+    Raises
+    ------
+    ContactError
+        If a number does not fit, groups share cells, or a group holds no solid cells.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> lower = fc.generate.block((2.0, 1.0), (4, 2))
+    >>> upper = fc.generate.block((1.0, 1.0), (4, 4))
+    >>> found = fc.find_contacts(fc.generate.union(lower, fc.generate.transformed(upper, translate=(0.5, 1.0))))
+    >>> [(pair.name, pair.facets) for pair in found]
+    [('body 2 on body 1', (4, 2))]
+    """
+    if distance is not None and not 0.0 <= distance < np.inf:
+        raise ContactError(f"distance = {distance:g} must be a length, at least 0")
+    if not 0.0 < angle < 90.0:
+        raise ContactError(f"angle = {angle:g} must be more than 0 and less than 90 degrees")
+    body = _bodies_of_cells(mesh, groups)
+    if body.max(initial=-1) < 1:
+        return FoundContacts(mesh)
+    outside = OuterFacets.of(mesh, body)
+    search = facing(outside, distance, angle)
+    stiff = np.ones(mesh.n_cells)
+    for name, values in (moduli or {}).items():
+        stiff[mesh.offsets[name] : mesh.offsets[name] + len(mesh.cells[name])] = values
+    names = list(groups) if groups is not None else _names(mesh, body)
+    pairs: list[FoundContact] = []
+    sides: dict[str, Mapping[str, ArrayLike]] = {}
+    for found in _pairs(outside, search, stiff):
+        title = f"{names[found.bodies[0]]} on {names[found.bodies[1]]}" + (f" {found.number}" if found.number else "")
+        groups_of = f"{title} (secondary)", f"{title} (primary)"
+        sides.update(zip(groups_of, map(outside.facets, found.sides)))
+        both = names[found.bodies[0]], names[found.bodies[1]]
+        many = len(found.sides[0]), len(found.sides[1])
+        pairs.append(FoundContact(title, both, *groups_of, many, found.spacing, found.gap, found.reason))
+    return FoundContacts(mesh.with_facets(sides), tuple(pairs))
+
+
+def nothing_found(mesh: Mesh, distance: float | None, angle: float, groups: Sequence[str] | None) -> str:
+    """Return why `find_contacts` finds nothing, and what to do."""
+    if groups is None and _whole_bodies(mesh).max() < 1:
+        return (
+            "the mesh is one body, since nodes connect all of its cells: name groups of cells as bodies, or duplicate the "
+            "nodes where they touch"
+        )
+    size = float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
+    apart = find_contacts(mesh, distance=size, angle=angle, groups=groups)
+    if not apart.pairs:
+        return f"no surfaces of different bodies look at each other within {angle:g} degrees: name both sides of each contact"
+    nearest = min((pair.gap for pair in apart), key=lambda gap: abs(gap[0]))[0]
+    within = "the size of their facets" if distance is None else f"{distance:.4g}"
+    return (
+        f"no bodies face each other within {within}: the nearest are {abs(nearest):.4g} apart; give distance = "
+        f"{1.1 * abs(nearest):.3g} or more"
+    )
+
+
+def _bodies_of_cells(mesh: Mesh, groups: Sequence[str] | None) -> Indices:
+    """Return the body (n_cells,) of each cell, -1 for facets, and for cells that are in none of the groups."""
+    found = np.full(mesh.n_cells, -1, np.intp)
+    if groups is None:
+        body = _whole_bodies(mesh)
+        for name, block in mesh.solids.items():
+            found[mesh.offsets[name] : mesh.offsets[name] + len(block)] = body[block[:, 0]]
+        return found
+    for number, group in enumerate(groups):
+        if not mesh.cells_of(group, dim=mesh.dim):
+            raise ContactError(f"group '{group}' holds no solid cells, so it is no body")
+        rows = mesh.split(mesh.cell_groups[group])
+        cells = np.concatenate([mesh.offsets[name] + rows[name] for name in rows if name in mesh.solids])
+        if (found[cells] >= 0).any():
+            other = groups[found[cells].max()]
+            raise ContactError(f"groups '{other}' and '{group}' share solid cells: bodies must be apart")
+        found[cells] = number
+    return found
+
+
+def _whole_bodies(mesh: Mesh) -> NDArray[np.int32]:
+    """Return the body (n_points,) of each point, -1 without any; both sides of a cut are one body."""
+    count, body = bodies(mesh)
+    cuts = [name for name in mesh.group_names if name + OPPOSITE in mesh.group_names]
+    sides = [body[[mesh.points_of(name)[0], mesh.points_of(name + OPPOSITE)[0]]] for name in cuts]
+    ends = np.array(sides, np.intp).reshape(-1, 2).T
+    label = connected_components(coo_array((np.ones(ends.shape[1]), ends), shape=(count, count)), directed=False)[1]
+    return np.asarray(np.where(body >= 0, label[body], -1), np.int32)
+
+
+def _names(mesh: Mesh, body: Indices) -> list[str]:
+    """Return what bodies are called: by a cell group that is all of a body, else by their number from 1."""
+    names, count = [f"body {k + 1}" for k in range(body.max() + 1)], np.bincount(body[body >= 0])
+    for group in reversed(list(mesh.cell_groups)):
+        members = body[mesh.cell_groups[group]]
+        members = members[members >= 0]
+        if len(members) and (members == members[0]).all() and len(members) == count[members[0]]:
+            names[members[0]] = group
+    return names
+
+
+@dataclass(frozen=True)
+class _Pair:
+    """Two sides that face each other: bodies and facets of the secondary and the primary one; number 0 for a single pair."""
+
+    bodies: tuple[int, int]
+    sides: tuple[Indices, Indices]
+    number: int
+    spacing: tuple[float, float]
+    gap: tuple[float, float]
+    reason: str
+
+
+def _pairs(outside: OuterFacets, search: Facing, stiff: Array) -> Iterator[_Pair]:
+    """Yield the pairs of smooth faces of two bodies each, where `stiff` (n_cells,) is each cell's modulus [pressure]."""
+    of = np.sort(np.column_stack([outside.body[search.facet], outside.body[search.other]]), axis=1)
+    for pair in np.unique(of, axis=0):
+        rows = np.flatnonzero((of == pair).all(axis=1))
+        ends = np.column_stack([search.facet[rows], search.other[rows]])
+        swapped = outside.body[ends[:, 0]] != pair[0]
+        ends[swapped] = ends[swapped][:, ::-1]
+        second, reason = _secondary(outside, ends, stiff)
+        ends, numbers = (ends, pair) if second == 0 else (ends[:, ::-1], pair[::-1])
+        face = outside.smooth_face[ends[:, 0]]
+        for number, one in enumerate(order := np.unique(face), start=1):
+            mine = face == one
+            gap, spacing = search.gap[rows[mine]], _spacing(outside, ends[mine])
+            yield _Pair(
+                (int(numbers[0]), int(numbers[1])), (np.unique(ends[mine, 0]), np.unique(ends[mine, 1])),
+                number if len(order) > 1 else 0, (float(spacing[0]), float(spacing[1])),
+                (float(gap.min()), float(gap.max())), reason,
+            )  # fmt: skip
+
+
+def _spacing(outside: OuterFacets, ends: Indices) -> Array:
+    """Return the geometric means (2,) of the distances between nodes of facets (n, 2) that face each other [length]."""
+    return np.asarray(np.exp(np.log(outside.spacing[ends]).mean(axis=0)))
+
+
+def _secondary(outside: OuterFacets, ends: Indices, stiff: Array) -> tuple[int, str]:
+    """Return which side of facets (n, 2) should be the secondary one, and why."""
+    measures = (
+        ("finer", _spacing(outside, ends)),
+        ("softer", stiff[outside.cell[ends]].mean(axis=0)),
+        ("smaller", np.array([outside.area[np.unique(side)].sum() for side in ends.T])),
+    )
+    for word, values in measures:
+        if values.min() < (1.0 - ALIKE) * values.max():
+            return int(np.argmin(values)), word
+    return 0, "alike"

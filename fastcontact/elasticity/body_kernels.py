@@ -1,0 +1,249 @@
+# mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
+"""Element loop of bodies with nonlinear laws: tangent stiffness, internal forces, stress, energy, history.
+
+In the reference configuration (total Lagrangian): nodal forces are integrals of P : dN/dX, the tangent is those of
+dN/dX : A : dN/dX (Bonet and Wood, 2008, chapter 9). For small strains the same loop takes P as the Cauchy stress and J as
+one plus the trace of the strain.
+"""
+
+import numpy as np
+
+from fastcontact._jit.decorators import kernel
+from fastcontact.elasticity.constitutive_kernels import add_second_derivative, cofactor, determinant, respond
+
+TWO_PI = 2.0 * np.pi
+# Newton iterations for the strain across plane stress, and when they end, relative to the modulus.
+THROUGH, ENOUGH = 50, 1e-13
+# What `linearise` returns beside the number of a cell.
+INVERTED, NO_PLANE_STRESS = 1, 2
+
+
+@kernel
+def _gradients(points, cell, N, dN, weights, axisymmetric, gradient, hoop, volume):
+    """Fill shape derivatives `gradient` (n_q, n_nodes, dim), N / r in `hoop` (n_q, n_nodes), weights `volume` (n_q,)."""
+    n_q, n_nodes, dim = dN.shape
+    jacobian, cofactors = np.zeros((3, 3)), np.empty((3, 3))
+    jacobian[2, 2] = 1.0
+    for q in range(n_q):
+        for i in range(dim):
+            for j in range(dim):
+                jacobian[i, j] = 0.0
+                for a in range(n_nodes):
+                    jacobian[i, j] += points[cell[a], i] * dN[q, a, j]
+        det = determinant(jacobian)
+        cofactor(jacobian, cofactors)
+        volume[q], radius = weights[q] * det, 0.0
+        for a in range(n_nodes):
+            radius += N[q, a] * points[cell[a], 0]
+            for i in range(dim):
+                gradient[q, a, i] = 0.0
+                for j in range(dim):
+                    gradient[q, a, i] += cofactors[i, j] * dN[q, a, j] / det
+        if axisymmetric:
+            volume[q] *= TWO_PI * radius
+            for a in range(n_nodes):
+                hoop[q, a] = N[q, a] / radius
+
+
+@kernel
+def _deformation(displacement, cell, gradient, hoop, F):
+    """Fill F (3, 3) from shape derivatives (n_nodes, dim)."""
+    F[:] = 0.0
+    F[0, 0] = F[1, 1] = F[2, 2] = 1.0
+    for a in range(gradient.shape[0]):
+        for i in range(gradient.shape[1]):
+            for j in range(gradient.shape[1]):
+                F[i, j] += displacement[cell[a], i] * gradient[a, j]
+        F[2, 2] += displacement[cell[a], 0] * hoop[a]
+
+
+@kernel
+def _dilatation(F, finite, G):
+    """Return J and fill G (3, 3) with its derivative; for small strains one plus the trace of the strain."""
+    if finite:
+        cofactor(F, G)
+        return determinant(F)
+    G[:] = 0.0
+    G[0, 0] = G[1, 1] = G[2, 2] = 1.0
+    return F[0, 0] + F[1, 1] + F[2, 2] - 2.0
+
+
+@kernel
+def _add_volumetric(F, G, geometric, pressure, bulk, P, A):
+    """Add the part of the dilatation to P and A: `pressure` times dJ/dF, and its change, by `bulk` with J and with dJ/dF."""
+    for row in range(9):
+        P[row // 3, row % 3] += pressure * G[row // 3, row % 3]
+        for column in range(9):
+            A[row, column] += bulk * G[row // 3, row % 3] * G[column // 3, column % 3]
+    if geometric:
+        add_second_derivative(F, pressure, A)
+
+
+@kernel
+def _through(constants, D, bulk, finite, F, old, new, P, A, G):
+    """Respond with the F_zz at which P_zz vanishes, eliminated from A; return the energy, and whether it was found."""
+    F[2, 2] = 1.0 + old[8]
+    for _ in range(THROUGH):
+        energy = respond(constants, D, F, old, new, P, A)
+        J = _dilatation(F, finite, G)
+        _add_volumetric(F, G, finite, bulk * (J - 1.0), bulk, P, A)
+        if not A[8, 8] > 0.0:
+            return energy, False
+        if abs(P[2, 2]) <= ENOUGH * A[8, 8]:
+            new[8] = F[2, 2] - 1.0
+            for row in range(8):
+                for column in range(8):
+                    A[row, column] -= A[row, 8] * A[8, column] / A[8, 8]
+            return energy + 0.5 * bulk * (J - 1.0) ** 2, True
+        F[2, 2] = max(F[2, 2] - P[2, 2] / A[8, 8], 0.2 * F[2, 2])
+    return 0.0, False
+
+
+@kernel
+def _add_tangent(gradient, hoop, weight, A, product, local):
+    """Add a point's tangent to `local` (n_nodes, n_nodes, dim, dim), of nodes a <= b; `product` (9, dim) is room."""
+    n_nodes, dim = gradient.shape
+    for b in range(n_nodes):
+        for row in range(9):
+            if row != 8 and (row // 3 >= dim or row % 3 >= dim):
+                continue
+            for k in range(dim):
+                value = 0.0
+                for m in range(dim):
+                    value += A[row, 3 * k + m] * gradient[b, m]
+                if k == 0 and hoop[b] != 0.0:
+                    value += A[row, 8] * hoop[b]
+                product[row, k] = weight * value
+        for a in range(b + 1):
+            for i in range(dim):
+                for k in range(dim):
+                    value = 0.0
+                    for j in range(dim):
+                        value += gradient[a, j] * product[3 * i + j, k]
+                    if i == 0 and hoop[a] != 0.0:
+                        value += hoop[a] * product[8, k]
+                    local[a, b, i, k] += value
+
+
+@kernel
+def _forces(gradient, hoop, weight, P, forces):
+    """Add a point's nodal forces to `forces` (n_nodes, dim)."""
+    for a in range(gradient.shape[0]):
+        for i in range(gradient.shape[1]):
+            for j in range(gradient.shape[1]):
+                forces[a, i] += weight * P[i, j] * gradient[a, j]
+        forces[a, 0] += weight * P[2, 2] * hoop[a]
+
+
+@kernel
+def _cauchy(F, P, finite, out):
+    """Fill `out` with the Cauchy stress xx, yy, zz, xy, in 3D also yz, xz."""
+    J = determinant(F) if finite else 1.0
+    for c in range(out.shape[0]):
+        i, j = (c, c) if c < 3 else ((0, 1) if c == 3 else ((1, 2) if c == 4 else (0, 2)))
+        if not finite:
+            out[c] = P[i, j]
+            continue
+        value = 0.0
+        for k in range(3):
+            value += P[i, k] * F[j, k]
+        out[c] = value / J
+
+
+@kernel
+def linearise(
+    points, cells, N, dN, weights, polynomials, axisymmetric, plane_stress, finite, geometric, displacement,
+    constants, moduli, bulk,
+    material, old, slots, owner, part, data, force, new, stress, energy,
+):  # fmt: skip
+    """Add the tangent to `data` (n_blocks, dim, dim) and forces to `force` (n_points, dim), in rows of nodes of a `part`.
+
+    Of its cells, those whose first node it has, it fills the history `new` (n_cells, n_q, 9), the Cauchy `stress`
+    (n_cells, n_q, n_components) and `energy` (n_cells, 2): elastic, plastic work. With `bulk` (n_materials, 2): bulk
+    modulus of the dilatation projected on `polynomials` (n_q, m), and of the rest. Returns a status and the number of a
+    cell, zero and -1 where all went well. Without `geometric` the tangent leaves out how
+    dJ/dF turns under pressure.
+    """
+    n_cells, n_nodes = cells.shape
+    n_q, dim, m = N.shape[0], points.shape[1], polynomials.shape[1]
+    gradient, hoop, volume = np.empty((n_q, n_nodes, dim)), np.zeros((n_q, n_nodes)), np.empty(n_q)
+    F, J, G = np.empty((n_q, 3, 3)), np.empty(n_q), np.empty((3, 3))
+    P, A, product = np.empty((3, 3)), np.empty((9, 9)), np.empty((9, dim))
+    local, forces = np.empty((n_nodes, n_nodes, dim, dim)), np.empty((n_nodes, dim))
+    mass, projection, dilatation = np.empty((m, m)), np.empty((m, n_nodes * dim)), np.empty(m)
+    history, mine = np.empty(9), np.empty(n_nodes, np.bool_)
+    for c in range(n_cells):
+        involved = False
+        for a in range(n_nodes):
+            mine[a] = owner[cells[c, a]] == part
+            involved = involved or mine[a]
+        if not involved:
+            continue
+        _gradients(points, cells[c], N, dN, weights, axisymmetric, gradient, hoop, volume)
+        whole = bulk[material[c, 0], 0]
+        local[:], forces[:], mass[:], projection[:], dilatation[:] = 0.0, 0.0, 0.0, 0.0, 0.0
+        for q in range(n_q):
+            _deformation(displacement, cells[c], gradient[q], hoop[q], F[q])
+            J[q] = _dilatation(F[q], finite, G)
+            if finite and not (J[q] > 0.0):
+                return INVERTED, c
+            for k in range(m if whole > 0.0 else 0):
+                share = volume[q] * polynomials[q, k]
+                dilatation[k] += share * (J[q] - 1.0)
+                for n in range(m):
+                    mass[k, n] += share * polynomials[q, n]
+                for a in range(n_nodes):
+                    for i in range(dim):
+                        value = G[2, 2] * hoop[q, a] if i == 0 else 0.0
+                        for j in range(dim):
+                            value += G[i, j] * gradient[q, a, j]
+                        projection[k, a * dim + i] += share * value
+        stored = dissipated = 0.0
+        if whole > 0.0:
+            solved = np.linalg.solve(mass, projection)
+            coefficients = np.linalg.solve(mass, dilatation)
+            stored += 0.5 * whole * (coefficients * dilatation).sum()
+            for b in range(n_nodes):
+                for a in range(b + 1):
+                    for i in range(dim):
+                        for k in range(dim):
+                            for n in range(m):
+                                local[a, b, i, k] += whole * projection[n, a * dim + i] * solved[n, b * dim + k]
+        for q in range(n_q):
+            row = material[c, q]
+            law, rest = constants[row], bulk[row, 1]
+            if plane_stress:
+                own, settled = _through(law, moduli[row], rest, finite, F[q], old[c, q], history, P, A, G)
+                if not settled:
+                    return NO_PLANE_STRESS, c
+            else:
+                own = respond(law, moduli[row], F[q], old[c, q], history, P, A) + 0.5 * rest * (J[q] - 1.0) ** 2
+                pressure = rest * (J[q] - 1.0)
+                for k in range(m if whole > 0.0 else 0):
+                    pressure += whole * polynomials[q, k] * coefficients[k]
+                _dilatation(F[q], finite, G)
+                _add_volumetric(F[q], G, geometric, pressure, rest, P, A)
+            stored += volume[q] * own
+            dissipated += volume[q] * history[7]
+            _add_tangent(gradient[q], hoop[q], volume[q], A, product, local)
+            _forces(gradient[q], hoop[q], volume[q], P, forces)
+            if mine[0]:
+                new[c, q] = history
+                _cauchy(F[q], P, finite, stress[c, q])
+        if mine[0]:
+            energy[c, 0], energy[c, 1] = stored, dissipated
+        for b in range(n_nodes):
+            if mine[b]:
+                for i in range(dim):
+                    force[cells[c, b], i] += forces[b, i]
+            for a in range(b + 1):
+                upper, lower = slots[c, a, b], slots[c, b, a]
+                for i in range(dim):
+                    for k in range(dim):
+                        # The diagonal block is symmetric but for round-off.
+                        value = local[a, b, i, k] if a != b or i <= k else local[a, b, k, i]
+                        if mine[a]:
+                            data[upper, i, k] += value
+                        if a != b and mine[b]:
+                            data[lower, k, i] += value
+    return 0, -1

@@ -1,0 +1,330 @@
+# mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
+"""Constitutive laws at one quadrature point: first Piola-Kirchhoff stress, its tangent, history.
+
+Shared arguments: ``F`` (3, 3) is the deformation gradient [-], ``P`` (3, 3) the first Piola-Kirchhoff stress [pressure] and
+``A`` (9, 9) its derivative dP/dF, of which components iJ have the number 3 i + J. Laws for small strains take the symmetric
+part of F - I; their P is the Cauchy stress. `constants` (n_constants,) begin with the number of the law, see
+`nonlinear_materials`; `old` and `new` (9,) are the history at the beginning and the end of the load step: the plastic strain
+(xx, yy, zz, xy, yz, xz, tensor components), the equivalent plastic strain, the plastic work [energy / volume], and in plane
+stress F_zz - 1. The volumetric part of a law with a bulk modulus, U(J) = K (J - 1)^2 / 2, is added by the element loop.
+"""
+
+import numpy as np
+
+from fastcontact._jit.decorators import kernel
+
+LINEAR, PLASTIC, SAINT_VENANT, INVARIANTS, OGDEN = range(5)
+# A trial stress this much above the yield stress is at it, but for round-off.
+YIELDING = 1e-12
+# Relative distance of squared stretches below which the tangent takes them as equal.
+EQUAL = 1e-7
+
+
+@kernel
+def determinant(F):
+    """Return det F."""
+    return (
+        F[0, 0] * (F[1, 1] * F[2, 2] - F[1, 2] * F[2, 1])
+        - F[0, 1] * (F[1, 0] * F[2, 2] - F[1, 2] * F[2, 0])
+        + F[0, 2] * (F[1, 0] * F[2, 1] - F[1, 1] * F[2, 0])
+    )
+
+
+@kernel
+def cofactor(F, G):
+    """Fill G (3, 3) with dJ/dF = J F^-T."""
+    for i in range(3):
+        k, m = (i + 1) % 3, (i + 2) % 3
+        for j in range(3):
+            p, r = (j + 1) % 3, (j + 2) % 3
+            G[i, j] = F[k, p] * F[m, r] - F[k, r] * F[m, p]
+
+
+@kernel
+def add_second_derivative(F, factor, A):
+    """Add factor d2J/dF2 to A (9, 9)."""
+    for i in range(3):
+        for step in range(1, 3):
+            k = (i + step) % 3
+            for j in range(3):
+                for other in range(1, 3):
+                    p = (j + other) % 3
+                    sign = 1.0 if step == other else -1.0
+                    A[3 * i + j, 3 * k + p] += factor * sign * F[3 - i - k, 3 - j - p]
+
+
+@kernel
+def _voigt(i, j):
+    """Return the number of a component in the order xx, yy, zz, xy, yz, xz."""
+    if i == j:
+        return i
+    if i + j == 1:
+        return 3
+    return 4 if i + j == 3 else 5
+
+
+@kernel
+def _hooke(D, strain, stress):
+    """Fill `stress` (3, 3) with D (6, 6) times a symmetric `strain` (3, 3); return half their product."""
+    energy = 0.0
+    for i in range(3):
+        for j in range(3):
+            row, value = _voigt(i, j), 0.0
+            for k in range(3):
+                for m in range(3):
+                    value += D[row, _voigt(k, m)] * strain[k, m]
+            stress[i, j] = value
+            energy += 0.5 * value * strain[i, j]
+    return energy
+
+
+@kernel
+def _linear(D, F, P, A):
+    """Hooke's law for small strains, by moduli D (6, 6); return the energy density."""
+    strain = 0.5 * (F + F.T)
+    for i in range(3):
+        strain[i, i] -= 1.0
+    for row in range(9):
+        for column in range(9):
+            A[row, column] = D[_voigt(row // 3, row % 3), _voigt(column // 3, column % 3)]
+    return _hooke(D, strain, P)
+
+
+@kernel
+def _yield_stress(constants, p):
+    """Return the yield stress and its slope at the equivalent plastic strain p, and where the slope ends."""
+    n = int(constants[4])
+    for k in range(n - 1):
+        p0, s0, p1, s1 = constants[5 + 2 * k], constants[6 + 2 * k], constants[7 + 2 * k], constants[8 + 2 * k]
+        if p < p1:
+            slope = (s1 - s0) / (p1 - p0)
+            return s0 + slope * (p - p0), slope, p1
+    return constants[4 + 2 * n], 0.0, np.inf
+
+
+@kernel
+def _plastic(constants, F, old, new, P, A):
+    """Von Mises plasticity with the radial return (Simo and Hughes, 1998, boxes 3.1 and 3.2); return the elastic energy.
+
+    The deviatoric part: isotropic hardening by a table, linear kinematic hardening (Prager).
+    """
+    mu, kinematic = constants[1], constants[3]
+    strain, xi = 0.5 * (F + F.T), np.empty((3, 3))
+    third = (strain[0, 0] + strain[1, 1] + strain[2, 2]) / 3.0
+    square = 0.0
+    for i in range(3):
+        strain[i, i] -= third
+        for j in range(3):
+            xi[i, j] = 2.0 * mu * strain[i, j] - (2.0 * mu + 2.0 / 3.0 * kinematic) * old[_voigt(i, j)]
+            square += xi[i, j] ** 2
+    trial = np.sqrt(1.5 * square)
+    p, work, remaining = old[6], old[7], trial
+    limit, slope, end = _yield_stress(constants, p)
+    while remaining > limit * (1.0 + YIELDING):
+        step = min((remaining - limit) / (3.0 * mu + kinematic + slope), end - p)
+        remaining -= (3.0 * mu + kinematic) * step
+        work += (limit + 0.5 * slope * step) * step
+        p += step
+        if p < end:
+            break
+        limit, slope, end = _yield_stress(constants, p)
+    increment = p - old[6]
+    flow = 1.5 * increment / trial if increment > 0.0 else 0.0
+    new[6] = p
+    before = after = energy = 0.0
+    for i in range(3):
+        for j in range(3):
+            c = _voigt(i, j)
+            before += old[c] ** 2
+            new[c] = old[c] + flow * xi[i, j]
+            after += new[c] ** 2
+            P[i, j] = 2.0 * mu * (strain[i, j] - new[c])
+            energy += P[i, j] * P[i, j] / (4.0 * mu)
+    new[7] = work + kinematic / 3.0 * (after - before)
+    shear = 2.0 * mu * (1.0 - 2.0 * mu * flow)
+    turn = 0.0
+    if increment > 0.0:
+        turn = 9.0 * mu * mu / trial**2 * (1.0 / (3.0 * mu + kinematic + slope) - increment / trial)
+    for row in range(9):
+        i, j = row // 3, row % 3
+        for column in range(9):
+            k, m = column // 3, column % 3
+            value = -turn * xi[i, j] * xi[k, m]
+            if i == k and j == m:
+                value += 0.5 * shear
+            if i == m and j == k:
+                value += 0.5 * shear
+            if i == j and k == m:
+                value -= shear / 3.0
+            A[row, column] = value
+    return energy
+
+
+@kernel
+def _pushed(F, S, C, P, A):
+    """Fill P and A from the second Piola-Kirchhoff stress S (3, 3) and its moduli C (9, 9) for Green-Lagrange strains."""
+    half = np.empty((9, 9))
+    for i in range(3):
+        for j in range(3):
+            value = 0.0
+            for k in range(3):
+                value += F[i, k] * S[k, j]
+            P[i, j] = value
+            for column in range(9):
+                value = 0.0
+                for k in range(3):
+                    value += F[i, k] * C[3 * k + j, column]
+                half[3 * i + j, column] = value
+    for row in range(9):
+        for k in range(3):
+            for m in range(3):
+                value = S[row % 3, m] if row // 3 == k else 0.0
+                for n in range(3):
+                    value += half[row, 3 * n + m] * F[k, n]
+                A[row, 3 * k + m] = value
+
+
+@kernel
+def _saint_venant(D, F, P, A):
+    """Hooke's law between Green-Lagrange strain and second Piola-Kirchhoff stress; return the energy density."""
+    strain, S, C = 0.5 * (F.T @ F), np.empty((3, 3)), np.empty((9, 9))
+    for i in range(3):
+        strain[i, i] -= 0.5
+    energy = _hooke(D, strain, S)
+    for row in range(9):
+        for column in range(9):
+            C[row, column] = D[_voigt(row // 3, row % 3), _voigt(column // 3, column % 3)]
+    _pushed(F, S, C, P, A)
+    return energy
+
+
+@kernel
+def _modified(value, first, second, power, J, G, F, slope, tangent):
+    """Turn an invariant with its derivatives (3, 3), (9, 9) into ``J**-power`` times it; return that, in place.
+
+    Arrays `slope` (3, 3) and `tangent` (9, 9) take the derivatives.
+    """
+    scale = J**-power
+    for row in range(9):
+        i, j = row // 3, row % 3
+        slope[i, j] = scale * (first[i, j] - power * value / J * G[i, j])
+        for column in range(9):
+            k, m = column // 3, column % 3
+            mixed = first[i, j] * G[k, m] + G[i, j] * first[k, m]
+            tangent[row, column] = scale * (
+                second[row, column] - power / J * mixed + power * (power + 1.0) * value / J**2 * G[i, j] * G[k, m]
+            )
+    add_second_derivative(F, -scale * power * value / J, tangent)
+    return scale * value
+
+
+@kernel
+def _invariants(constants, F, P, A):
+    """C10 (I1 - 3) + C20 (I1 - 3)^2 + C30 (I1 - 3)^3 + C01 (I2 - 3) of isochoric invariants; return the energy density.
+
+    (Rivlin and Saunders, 1951; Yeoh, 1993.)
+    """
+    C10, C01, C20, C30 = constants[3], constants[4], constants[5], constants[6]
+    G, slope, tangent, second = np.empty((3, 3)), np.empty((3, 3)), np.empty((9, 9)), np.zeros((9, 9))
+    cofactor(F, G)
+    J, C = determinant(F), F.T @ F
+    I1 = C[0, 0] + C[1, 1] + C[2, 2]
+    for row in range(9):
+        second[row, row] = 2.0
+    x = _modified(I1, 2.0 * F, second, 2.0 / 3.0, J, G, F, slope, tangent) - 3.0
+    W1, W11 = C10 + 2.0 * C20 * x + 3.0 * C30 * x * x, 2.0 * C20 + 6.0 * C30 * x
+    energy = C10 * x + C20 * x**2 + C30 * x**3
+    for row in range(9):
+        P[row // 3, row % 3] = W1 * slope[row // 3, row % 3]
+        for column in range(9):
+            bend = W11 * slope[row // 3, row % 3] * slope[column // 3, column % 3]
+            A[row, column] = W1 * tangent[row, column] + bend
+    if C01 == 0.0:
+        return energy
+    left, FC = F @ F.T, F @ C
+    I2 = 0.5 * (I1 * I1 - (C * C).sum())
+    for row in range(9):
+        i, j = row // 3, row % 3
+        for column in range(9):
+            k, m = column // 3, column % 3
+            value = 2.0 * F[i, j] * F[k, m] - F[i, m] * F[k, j]
+            if row == column:
+                value += I1
+            if i == k:
+                value -= C[m, j]
+            if j == m:
+                value -= left[i, k]
+            second[row, column] = 2.0 * value
+    energy += C01 * (_modified(I2, 2.0 * (I1 * F - FC), second, 4.0 / 3.0, J, G, F, slope, tangent) - 3.0)
+    for row in range(9):
+        P[row // 3, row % 3] += C01 * slope[row // 3, row % 3]
+        for column in range(9):
+            A[row, column] += C01 * tangent[row, column]
+    return energy
+
+
+@kernel
+def _ogden(constants, F, P, A):
+    """Sum of 2 mu / alpha^2 (l1^alpha + l2^alpha + l3^alpha - 3) of isochoric stretches (Ogden, 1972); return the energy.
+
+    Moduli in principal axes by Simo and Taylor (1991, equation 2.28).
+    """
+    n = int(constants[3])
+    squared, axes = np.linalg.eigh(F.T @ F)
+    scale = (squared[0] * squared[1] * squared[2]) ** (-1.0 / 6.0)
+    beta, gamma, energy = np.zeros(3), np.zeros((3, 3)), 0.0
+    powers = np.empty(3)
+    for term in range(n):
+        mu, alpha = constants[4 + 2 * term], constants[5 + 2 * term]
+        for a in range(3):
+            powers[a] = (scale * np.sqrt(squared[a])) ** alpha
+        total = powers[0] + powers[1] + powers[2]
+        energy += 2.0 * mu / alpha**2 * (total - 3.0)
+        for a in range(3):
+            beta[a] += 2.0 * mu / alpha * (powers[a] - total / 3.0)
+            for b in range(3):
+                gamma[a, b] += 2.0 * mu * (total / 9.0 - (powers[a] + powers[b]) / 3.0)
+            gamma[a, a] += 2.0 * mu * powers[a]
+    S, C = np.zeros((3, 3)), np.zeros((9, 9))
+    for a in range(3):
+        for b in range(3):
+            normal = (gamma[a, b] - (2.0 * beta[a] if a == b else 0.0)) / (squared[a] * squared[b])
+            shear = 0.0
+            if a != b:
+                apart = squared[b] - squared[a]
+                if abs(apart) > EQUAL * squared[b]:
+                    shear = (beta[b] / squared[b] - beta[a] / squared[a]) / apart
+                else:
+                    shear = 0.5 * (gamma[b, b] - 2.0 * beta[b] - gamma[a, b]) / (squared[b] * squared[b])
+            for row in range(9):
+                i, j = row // 3, row % 3
+                left, mixed = axes[i, a] * axes[j, a], axes[i, a] * axes[j, b]
+                for column in range(9):
+                    k, m = column // 3, column % 3
+                    C[row, column] += normal * left * axes[k, b] * axes[m, b]
+                    if a != b:
+                        C[row, column] += shear * mixed * (axes[k, a] * axes[m, b] + axes[k, b] * axes[m, a])
+        for i in range(3):
+            for j in range(3):
+                S[i, j] += beta[a] / squared[a] * axes[i, a] * axes[j, a]
+    _pushed(F, S, C, P, A)
+    return energy
+
+
+@kernel
+def respond(constants, D, F, old, new, P, A):
+    """Fill `new`, P and A by the law of `constants` and return the elastic energy [energy / volume].
+
+    All of the law but its volumetric part, `constants[2]` being its bulk modulus. D (6, 6) are the moduli of Hooke's laws.
+    """
+    law = int(constants[0])
+    new[:] = old
+    if law == LINEAR:
+        return _linear(D, F, P, A)
+    if law == PLASTIC:
+        return _plastic(constants, F, old, new, P, A)
+    if law == SAINT_VENANT:
+        return _saint_venant(D, F, P, A)
+    if law == INVARIANTS:
+        return _invariants(constants, F, P, A)
+    return _ogden(constants, F, P, A)

@@ -1,0 +1,106 @@
+"""Matrices by which modes differ from statics: the consistent mass, and the stiffness that stresses give by themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import bsr_array
+
+from fastcontact.elasticity.cell_stress import CellStress
+from fastcontact.elasticity.energy import cell_volumes, integration_rule
+from fastcontact.elasticity.loads import DensityField
+from fastcontact.elasticity.stiffness import Sparsity, sparsity
+from fastcontact.errors import ModelError
+from fastcontact.mesh import elements
+from fastcontact.mesh.mesh import Mesh
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+# Numbers of local matrices that are formed at a time.
+AT_ONCE = 2_000_000
+# The components of symmetric tensors in the order of stresses.
+_TENSOR = {2: [[0, 3], [3, 1]], 3: [[0, 3, 5], [3, 1, 4], [5, 4, 2]]}
+
+
+def mass(mesh: Mesh, kinematics: str, density: DensityField) -> bsr_array:
+    """Return the consistent mass matrix (n_dofs, n_dofs) [mass] of the solid cells, in axisymmetry of the full circle.
+
+    Integrals are exact on straight cells. ModelError if some cells have no density, or all have none.
+    """
+    missing = 0
+
+    def local(name: str, rows: Indices) -> Array:
+        nonlocal missing
+        element = elements.get(name)
+        xi, weights = integration_rule(element)
+        N, corners = element.shape(xi), mesh.points[mesh.cells[name][rows]]
+        own = density.at(name, rows, N)
+        missing += int(np.isnan(own).any(axis=1).sum())
+        volume = cell_volumes(corners, N, element.gradient(xi), kinematics == "axisymmetric") * weights
+        return np.einsum("cq,qa,qb->cab", own * volume, N, N, optimize=True)[..., None]
+
+    found = _assembled(mesh, sparsity(mesh), local)
+    if missing:
+        raise ModelError(
+            f"modes need densities, but the materials of {missing} solid cells have none: give them density=..., 0.0 for a "
+            "body without mass"
+        )
+    if not found.data.any():
+        raise ModelError("all densities are zero, and what has no mass has no modes: give the materials density=...")
+    return found
+
+
+def stress_stiffness(mesh: Mesh, stresses: CellStress, material: Mapping[str, Any], axisymmetric: bool) -> bsr_array:
+    """Return the matrix (n_dofs, n_dofs) of the work of stresses on rotations of the material [force / length].
+
+    It is the geometric or initial-stress stiffness (Bathe, Finite Element Procedures, 2014, section 6.2.3): the integrals of
+    ``grad(N_a) . stress . grad(N_b)`` for every component, in axisymmetry with the hoop stress on the radial ones beside.
+    At the quadrature points of the stiffness.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    stresses : CellStress
+    material : mapping of str to ndarray of int (n_cells,) or (n_cells, n_q)
+        As for `stiffness`.
+    axisymmetric : bool
+    """
+
+    def local(name: str, rows: Indices) -> Array:
+        element, cells = elements.get(name), mesh.cells[name][rows]
+        xi, weights = element.quadrature
+        N, dN, _ = element.tables
+        corners = mesh.points[cells]
+        stress = stresses.at(name, xi, cells, material[name][rows], rows)
+        slopes = np.einsum("qak,cad->cqdk", dN, corners, optimize=True)
+        gradient = np.einsum("qak,cqkd->cqad", dN, np.linalg.inv(slopes), optimize=True)
+        weighted = cell_volumes(corners, N, dN, axisymmetric)[..., None] * weights[:, None] * stress
+        tensor = weighted[..., np.array(_TENSOR[mesh.dim])]
+        every = np.einsum("cqai,cqij,cqbj->cab", gradient, tensor, gradient, optimize=True)
+        out = np.repeat(every[..., None], mesh.dim, axis=3)
+        if axisymmetric:
+            radius = np.einsum("qa,ca->cq", N, corners[:, :, 0])
+            out[..., 0] += np.einsum("cq,qa,qb->cab", weighted[:, :, 2] / radius**2, N, N, optimize=True)
+        return out
+
+    return _assembled(mesh, sparsity(mesh), local)
+
+
+def _assembled(mesh: Mesh, pattern: Sparsity, local: Callable[[str, Indices], Array]) -> bsr_array:
+    """Return the matrix with blocks that are diagonal, of the diagonals (n_cells, n_nodes, n_nodes, dim or 1) of cells."""
+    diagonals = np.zeros((mesh.dim, len(pattern.indices)))
+    for name, cells in mesh.solids.items():
+        size = max(1, AT_ONCE // cells.shape[1] ** 2)
+        for first in range(0, len(cells), size):
+            rows = np.arange(first, min(first + size, len(cells)))
+            found, slots = local(name, rows), pattern.slots[name][rows].ravel()
+            for k in range(mesh.dim):
+                own = found[..., min(k, found.shape[3] - 1)].ravel()
+                diagonals[k] += np.bincount(slots, own, len(pattern.indices))
+    data = np.zeros((len(pattern.indices), mesh.dim, mesh.dim))
+    data[:, range(mesh.dim), range(mesh.dim)] = diagonals.T
+    n = mesh.n_points * mesh.dim
+    return bsr_array((data, pattern.indices, pattern.indptr), shape=(n, n))

@@ -1,0 +1,260 @@
+"""Solid cells with nonlinear laws or finite strains as one term of the equilibrium: forces, tangent, history."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import bsr_array
+
+from fastcontact._jit import parallel
+from fastcontact.elasticity import body_kernels, dilatation
+from fastcontact.elasticity.constitutive_kernels import LINEAR, SAINT_VENANT
+from fastcontact.elasticity.dilatation import REMAINDER
+from fastcontact.elasticity.material_field import MaterialField, material_field
+from fastcontact.elasticity.materials import LinearElastic, Material
+from fastcontact.elasticity.nonlinear_materials import ElasticPlastic, NonlinearElastic
+from fastcontact.elasticity.recovery import von_mises
+from fastcontact.elasticity.stiffness import Sparsity, sparsity
+from fastcontact.errors import ConvergenceError, ModelError
+from fastcontact.mesh import elements
+from fastcontact.mesh.mesh import Mesh
+
+Array = NDArray[np.float64]
+History = dict[str, Array]
+# Numbers of the history of a quadrature point, see `constitutive_kernels`.
+HISTORY, PLASTIC_STRAIN, ACROSS = 9, 6, 8
+
+
+@dataclass(frozen=True, eq=False)
+class DeformedBodies:
+    """The bodies at a displacement.
+
+    Attributes
+    ----------
+    K : bsr_array (n_dofs, n_dofs)
+        Tangent stiffness [force / length].
+    force : ndarray (n_points, dim)
+        Internal forces [force].
+    history : dict of str to ndarray (n_cells, n_q, 9)
+        By solid element, if the load step ended here.
+    stress : dict of str to ndarray (n_cells, n_q, n_components)
+        Cauchy stress [pressure].
+    energy, plastic_work : float
+        Elastic energy, and the plastic work since the beginning [energy].
+    """
+
+    K: bsr_array
+    force: Array
+    history: History
+    stress: History
+    energy: float
+    plastic_work: float
+
+
+class NonlinearBodies:
+    """The solid cells of a model with nonlinear laws or finite strains; see `body_kernels`.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    kinematics : str
+    strain : {"small", "finite"}
+    field : MaterialField
+        Of the model.
+    """
+
+    def __init__(self, mesh: Mesh, kinematics: str, strain: str, field: MaterialField) -> None:
+        self.mesh, self.kinematics, self.finite = mesh, kinematics, strain == "finite"
+        if kinematics == "plane_stress":  # the strain across follows from the whole law
+            field = material_field(mesh, "plane_strain", field.materials, field.number)
+        self._materials, self._owner = field.materials, field.owner
+        self._moduli = _six_by_six(field.moduli)
+        self._cells = {name: _at_points(field.loops[name], name) for name in mesh.solids}
+        self._averaged = field.averaged & (kinematics != "plane_stress")
+        self._constants = self._rows()
+        self._pattern: Sparsity = sparsity(mesh)
+
+    def _rows(self) -> Array:
+        """Return the constants (n_moduli, n_constants) of all laws."""
+        hooke = SAINT_VENANT if self.finite else LINEAR
+        own = [law.constants if isinstance(law, NonlinearElastic) else [hooke] for law in self._materials]
+        rows = np.zeros((len(own), max(4, *map(len, own))))
+        for row, constants in zip(rows, own, strict=True):
+            row[: len(constants)] = constants
+        return np.ascontiguousarray(rows[self._owner])
+
+    @property
+    def beginning(self) -> History:
+        """The history before the first load step."""
+        return {name: np.zeros((*numbers.shape, HISTORY)) for name, numbers in self._cells.items()}
+
+    def _split(self, name: str) -> tuple[Array, Array]:
+        """Return moduli without dilatation, and bulk moduli (n_moduli, 2) of the projected one and the rest."""
+        moduli, element = self._moduli.copy(), elements.get(name)
+        bulk = np.zeros((len(moduli), 2))
+        bulk[:, 1] = self._constants[:, 2]
+        of_hooke = np.isin(self._constants[:, 0], (LINEAR, SAINT_VENANT))
+        projected = self._averaged & (element.dilatation is not None) & (self._constants[:, 0] != SAINT_VENANT)
+        whole = moduli[:, :3, :3].sum(axis=(1, 2)) / 9.0
+        taken = np.where(projected & of_hooke, whole, 0.0)
+        moduli[:, :3, :3] -= taken[:, None, None]
+        bulk[:, 1] += taken
+        shear = np.where(of_hooke, moduli[:, 3, 3], self._constants[:, 1])
+        rest = 0.0 if element.dilatation == element.order - 1 else np.minimum(bulk[:, 1], REMAINDER * shear)
+        bulk[projected] = np.column_stack([bulk[:, 1] - rest, np.broadcast_to(rest, len(bulk))])[projected]
+        return moduli, bulk
+
+    def at(self, displacement: Array, before: Mapping[str, Array], *, geometric: bool = True) -> DeformedBodies:
+        """Return the bodies at `displacement` (n_points, dim) [length], with the history `before` the load step.
+
+        Without `geometric` the tangent has no part of the mean pressure that turns: it is positive definite farther from the
+        solution.
+
+        Raises
+        ------
+        ConvergenceError
+            If a cell turns inside out, or a point finds no plane stress.
+        """
+        mesh, dim, pattern = self.mesh, self.mesh.dim, self._pattern
+        data, force = np.zeros((len(pattern.indices), dim, dim)), np.zeros((mesh.n_points, dim))
+        history, stress, energy = {}, {}, np.zeros(2)
+        finite = self.finite, self.finite and geometric
+        flags = self.kinematics == "axisymmetric", self.kinematics == "plane_stress", *finite
+        for name, cells in mesh.solids.items():
+            N, dN, weights = elements.get(name).tables
+            moduli, bulk = self._split(name)
+            polynomials = np.ascontiguousarray(dilatation.basis(name, elements.get(name).quadrature[0]))
+            if (bulk[:, 1] > 0.0).any():  # what is left is no linear function's
+                polynomials = polynomials[:, :1].copy() if elements.get(name).dilatation == 0 else polynomials
+            owner, parts = pattern.owners(mesh, name)
+            new, own = np.empty_like(before[name]), np.empty((*before[name].shape[:2], 6 if dim == 3 else 4))
+            energies, numbers, slots, old = (
+                np.zeros((len(cells), 2)),
+                self._cells[name],
+                pattern.slots[name],
+                before[name],
+            )
+
+            def part(number: int) -> tuple[int, int]:
+                rows = slice(*parts[number])  # noqa: B023
+                status, cell = body_kernels.linearise(
+                    mesh.points, cells[rows], N, dN, weights, polynomials, *flags, displacement, self._constants, moduli,  # noqa: B023
+                    bulk, numbers[rows], old[rows], slots[rows], owner, number, data, force, new[rows], own[rows],  # noqa: B023
+                    energies[rows],  # noqa: B023
+                )  # fmt: skip
+                return status, int(cell) + rows.start
+
+            for status, cell in parallel.shared(part, range(len(parts))):
+                if status:
+                    raise ConvergenceError(self._failure(status, name, cell, displacement))
+            history[name], stress[name] = new, own
+            energy += energies.sum(axis=0)
+        size = mesh.n_points * dim
+        K = bsr_array((data, pattern.indices, pattern.indptr), shape=(size, size))
+        return DeformedBodies(K, force, history, stress, float(energy[0]), float(energy[1]))
+
+    def _failure(self, status: int, name: str, cell: int, displacement: Array) -> str:
+        where = self.mesh.points[self.mesh.cells[name][cell]].mean(axis=0)
+        what = "turns inside out" if status == body_kernels.INVERTED else "finds no strain across its plane stress"
+        return (
+            f"cell {cell} of {name} near {where} {what}: smaller load steps, or a mesh that is coarser there, may help"
+        )
+
+    def cell_fields(self, bodies: DeformedBodies, displacement: Array) -> dict[str, Array]:
+        """Return the fields of `field_names` (n_solids,): of cells, the extremes of their points but for the volume."""
+        fields = (
+            {name: self._stretches(name, bodies, displacement) for name in self._cells}
+            if self.finite
+            else {name: self._yielding(name, bodies) for name in self._cells}
+        )
+        names = field_names(self._materials, "finite" if self.finite else "small")
+        return {name: np.concatenate([own[i] for own in fields.values()]) for i, name in enumerate(names)}
+
+    def _yielding(self, name: str, bodies: DeformedBodies) -> tuple[Array, Array]:
+        """Return the largest equivalent plastic strain and yield ratio (n_cells,) of cells."""
+        history, owner = bodies.history[name], self._owner[self._cells[name]]
+        strain = history[..., PLASTIC_STRAIN]
+        ratio = np.zeros(strain.shape)
+        for index, law in enumerate(self._materials):
+            if isinstance(law, ElasticPlastic):
+                at = owner == index
+                stress = bodies.stress[name][at]
+                relative = stress - 2.0 / 3.0 * law.kinematic * history[at][:, : stress.shape[1]]
+                ratio[at] = von_mises(relative) / law.yield_at(strain[at])
+        return strain.max(axis=1), ratio.max(axis=1)
+
+    def _stretches(self, name: str, bodies: DeformedBodies, displacement: Array) -> tuple[Array, Array]:
+        """Return v / V of cells (n_cells,), and their principal logarithmic strain of largest size."""
+        N, dN, weights = elements.get(name).tables
+        points, u = self.mesh.points[self.mesh.cells[name]], displacement[self.mesh.cells[name]]
+        jacobian = np.einsum("qaj,cai->cqij", dN, points)
+        volume, to_reference = weights * np.linalg.det(jacobian), np.linalg.inv(jacobian)
+        F = np.zeros((*to_reference.shape[:2], 3, 3))
+        F[..., range(3), range(3)] = 1.0
+        dim = self.mesh.dim
+        F[..., :dim, :dim] += np.einsum("qak,cai,cqkj->cqij", dN, u, to_reference)
+        if self.kinematics == "axisymmetric":
+            radius = points[:, :, 0] @ N.T
+            F[..., 2, 2] += (u[:, :, 0] @ N.T) / radius
+            volume *= radius
+        if self.kinematics == "plane_stress":
+            F[..., 2, 2] += bodies.history[name][..., ACROSS]
+        logarithms = np.log(np.linalg.svd(F, compute_uv=False))
+        ratio = (volume * np.exp(logarithms.sum(axis=2))).sum(axis=1) / volume.sum(axis=1)
+        return ratio, _farthest(logarithms.reshape(len(F), -1))
+
+
+def _farthest(values: Array) -> Array:
+    """Return of each row of `values` (n, k) the one of largest size (n,)."""
+    return np.take_along_axis(values, np.abs(values).argmax(axis=1)[:, None], axis=1)[:, 0]
+
+
+def field_names(materials: Sequence[Material], strain: str) -> tuple[str, ...]:
+    """Return the names of the fields of cells that steps with these materials have; none for linear bodies."""
+    if strain == "finite":
+        return "J", "logarithmic_strain"
+    return ("plastic_strain", "yield_ratio") if any(isinstance(law, ElasticPlastic) for law in materials) else ()
+
+
+def nonlinear_bodies(mesh: Mesh, kinematics: str, strain: str, field: MaterialField) -> NonlinearBodies | None:
+    """Return the solid cells as nonlinear bodies; None where they are linear."""
+    if strain == "small" and not any(isinstance(law, NonlinearElastic) for law in field.materials):
+        return None
+    return NonlinearBodies(mesh, kinematics, strain, field)
+
+
+def check_law(law: Material, strain: str) -> None:
+    """Raise ModelError if a material is none for bodies of these strains."""
+    if isinstance(law, NonlinearElastic) and law.strain != strain:
+        wanted = (
+            f"Model(..., strain='{law.strain}')"
+            if law.strain == "finite"
+            else "strain='small', the default: plasticity of finite strains is not there"
+        )
+        raise ModelError(f"{type(law).__name__} is for {law.strain} strains: take {wanted}")
+    if law.incompatible_modes and (strain == "finite" or isinstance(law, NonlinearElastic)):
+        raise ModelError("incompatible modes are there for linear bodies alone: leave incompatible_modes out")
+    if strain == "finite" and not isinstance(law, NonlinearElastic) and law.averaged:
+        told = "NeoHookean(E=..., nu=...)" if isinstance(law, LinearElastic) else "a hyperelastic law"
+        raise ModelError(
+            f"a nearly incompressible material ({law.described}) locks in elements of finite strains: take {told}"
+        )
+
+
+def _six_by_six(moduli: Array) -> Array:
+    """Return moduli (n, 6, 6) of moduli (n, 4, 4) of plane strain, or of those in 3D."""
+    if moduli.shape[1] == 6:
+        return np.ascontiguousarray(moduli)
+    whole = np.zeros((len(moduli), 6, 6))
+    whole[:, :4, :4] = moduli
+    return whole
+
+
+def _at_points(numbers: NDArray[np.int32], name: str) -> NDArray[np.int32]:
+    """Return the moduli of every quadrature point (n_cells, n_q), of those of cells or points."""
+    n_q = len(elements.get(name).quadrature[1])
+    whole = numbers[:, None] if numbers.ndim == 1 else numbers
+    return np.ascontiguousarray(np.broadcast_to(whole, (len(whole), n_q)))

@@ -1,0 +1,151 @@
+"""Bodies with nonlinear laws: tangents by differences, energies, the linear limit, refusals."""
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from fastcontact.elasticity.nonlinear_bodies import NonlinearBodies
+from fastcontact.elasticity.stiffness import stiffness
+from fastcontact.mesh import elements
+
+PLASTIC = fc.ElasticPlastic(
+    E=100.0, nu=0.3, yield_stress=0.3, hardening=[(0.0, 0.3), (0.01, 0.5), (0.1, 2.0)], kinematic=4.0
+)
+LAWS = {
+    "Hooke": (fc.LinearElastic(E=100.0, nu=0.3), "small"),
+    "nearly incompressible": (fc.LinearElastic(E=100.0, nu=0.499), "small"),
+    "plastic": (PLASTIC, "small"),
+    "Saint Venant-Kirchhoff": (fc.LinearElastic(E=100.0, nu=0.3), "finite"),
+    "neo-Hookean": (fc.NeoHookean(E=100.0, nu=0.3), "finite"),
+    "neo-Hookean, nearly incompressible": (fc.NeoHookean(E=100.0, nu=0.499), "finite"),
+    "Mooney-Rivlin": (fc.MooneyRivlin(20.0, 10.0, bulk=100.0), "finite"),
+    "Yeoh": (fc.Yeoh(20.0, 3.0, 1.0, bulk=100.0), "finite"),
+    "Ogden": (fc.Ogden([20.0, 5.0], [1.7, -2.3], bulk=100.0), "finite"),
+}
+CELLS = [
+    ("plane_strain", "tri3"), ("plane_strain", "tri6"), ("plane_strain", "quad8"), ("plane_stress", "quad4"),
+    ("axisymmetric", "quad4"), ("axisymmetric", "quad8"), ("3d", "tet4"), ("3d", "tet10"), ("3d", "hex8"), ("3d", "wedge6"),
+]  # fmt: skip
+
+
+def single(element: str, kinematics: str, law, strain: str):
+    """Return a distorted cell as a model, and as nonlinear bodies."""
+    nodes, rng = elements.get(element).nodes, np.random.default_rng(0)
+    points = 1.3 * nodes + 0.04 * rng.normal(size=nodes.shape) + (3.0 if kinematics == "axisymmetric" else 0.0)
+    mesh = fc.Mesh(points, {element: np.arange(len(points), dtype=np.int32)[None]})
+    model = fc.Model(mesh, kinematics, strain=strain)
+    model.add_material(law)
+    return model, NonlinearBodies(mesh, kinematics, strain, model.material_field())
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize(("kinematics", "element"), CELLS)
+def test_tangent_and_forces_are_derivatives(kinematics: str, element: str, law: str) -> None:
+    material, strain = LAWS[law]
+    model, bodies = single(element, kinematics, material, strain)
+    shape, rng = model.mesh.points.shape, np.random.default_rng(1)
+    u = (0.01 if strain == "small" else 0.05) * rng.normal(size=shape)
+    before, along, step = bodies.beginning, rng.normal(size=shape), 1e-6
+    here = bodies.at(u, before)
+    ahead, behind = (bodies.at(u + sign * step * along, before) for sign in (1.0, -1.0))
+    K = here.K.toarray()
+    change = (ahead.force - behind.force).ravel() / (2 * step)
+    assert np.abs(K @ along.ravel() - change).max() <= 1e-7 * np.abs(change).max()
+    assert np.abs(K - K.T).max() <= 1e-12 * np.abs(K).max()
+    work = (ahead.energy + ahead.plastic_work - behind.energy - behind.plastic_work) / (2 * step)
+    assert work == pytest.approx((here.force * along).sum(), rel=1e-6)
+    if law == "plastic":
+        assert max(values[..., 6].max() for values in here.history.values()) > 1e-3
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("element", ["tri3", "quad4", "quad8", "tet4", "hex8", "hex20", "hex27", "wedge6", "pyramid5"])
+def test_the_tangent_begins_as_linear_stiffness(element: str, law: str) -> None:
+    material, strain = LAWS[law]
+    flat = elements.get(element).dim == 2
+    for kinematics in ("plane_strain", "plane_stress", "axisymmetric") if flat else ("3d",):
+        model, bodies = single(element, kinematics, material, strain)
+        field = model.material_field()
+        K = stiffness(model.mesh, kinematics, field.moduli, field.loops, None, field.treatment).toarray()
+        found = bodies.at(np.zeros_like(model.mesh.points), bodies.beginning).K.toarray()
+        assert np.abs(found - K).max() <= 1e-11 * np.abs(K).max()
+
+
+@pytest.mark.parametrize("law", [name for name, (_, strain) in LAWS.items() if strain == "finite"])
+@pytest.mark.parametrize("element", ["quad4", "tri6", "hex8", "tet10"])
+def test_forces_turn_with_the_body(element: str, law: str) -> None:
+    material, strain = LAWS[law]
+    model, bodies = single(element, "plane_strain" if elements.get(element).dim == 2 else "3d", material, strain)
+    points = model.mesh.points
+    dim, rng = points.shape[1], np.random.default_rng(2)
+    turn = np.linalg.qr(rng.normal(size=(dim, dim)))[0]
+    turn[:, 0] *= np.sign(np.linalg.det(turn))
+    u = 0.05 * rng.normal(size=points.shape)
+    turned = (points + u) @ turn.T - points
+    plain, there = bodies.at(u, bodies.beginning), bodies.at(turned, bodies.beginning)
+    assert np.abs(there.force - plain.force @ turn.T).max() <= 1e-11 * np.abs(plain.force).max()
+    rigid = bodies.at(points @ turn.T - points, bodies.beginning)
+    assert max(np.abs(values).max() for values in rigid.stress.values()) <= 1e-10 * 100.0
+
+
+def test_threads_do_not_change_bits(monkeypatch: pytest.MonkeyPatch) -> None:
+    from fastcontact._jit import parallel
+
+    mesh = fc.generate.box((1.0, 1.0, 1.0), (5, 4, 3))
+    model = fc.Model(mesh, "3d", strain="finite")
+    model.add_material(fc.MooneyRivlin(20.0, 10.0, bulk=1000.0))
+    u = 0.02 * np.random.default_rng(0).normal(size=mesh.points.shape)
+    found = []
+    for count in (1, 2, 3):
+        monkeypatch.setattr(parallel, "WORTHWHILE", 1)
+        monkeypatch.setattr(parallel.decorators, "threads", lambda count=count: count)
+        bodies = NonlinearBodies(mesh, "3d", "finite", model.material_field())
+        here = bodies.at(u, bodies.beginning)
+        found.append((here.K.data, here.force, here.stress["hex8"], here.energy))
+    for other in found[1:]:
+        assert all(np.array_equal(one, two) for one, two in zip(found[0], other, strict=True))
+
+
+def test_a_cell_turned_inside_out_is_named() -> None:
+    model, bodies = single("quad4", "plane_strain", *LAWS["neo-Hookean"])
+    with pytest.raises(fc.ConvergenceError, match=r"cell 0 of quad4 near .* turns inside out"):
+        bodies.at(model.mesh.points * [-2.0, 0.0], bodies.beginning)
+
+
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (lambda: fc.ElasticPlastic(E=1.0, nu=0.3, yield_stress=0.0), "the yield stress = 0.0 must be a positive number"),
+        (lambda: fc.ElasticPlastic(E=1.0, nu=0.3, yield_stress=1.0, hardening=[(0.0, 2.0)]), "hardening begins with"),
+        (lambda: fc.ElasticPlastic(E=1.0, nu=0.3, yield_stress=1.0, hardening=[1.0]), "must be pairs"),
+        (lambda: fc.ElasticPlastic(E=1.0, nu=0.3, yield_stress=1.0, hardening=[(0.2, 2.0), (0.1, 3.0)]), "ascending"),
+        (lambda: fc.ElasticPlastic(E=1.0, nu=0.3, yield_stress=1.0, hardening=[(0.1, 0.1)]), "falls faster"),
+        (lambda: fc.ElasticPlastic(E=1.0, nu=0.3, yield_stress=1.0, kinematic=-1.0), "must be zero or more"),
+        (lambda: fc.ElasticPlastic(E=lambda x: x, nu=0.3, yield_stress=1.0), "do not vary"),
+        (lambda: fc.MooneyRivlin(-1.0, 0.5, bulk=10.0), r"shear modulus 2 \(C10 \+ C01\) = -1 .* must be positive"),
+        (lambda: fc.Yeoh(1.0, 0.0, 0.0, bulk=0.0), "the bulk modulus = 0.0 must be a positive number"),
+        (lambda: fc.Ogden([1.0, 2.0], [2.0], bulk=10.0), "2 mu and 1 alpha"),
+        (lambda: fc.Ogden(1.0, 0.0, bulk=10.0), "no alpha zero"),
+        (lambda: model_with(fc.NeoHookean(E=1.0, nu=0.3)), "NeoHookean is for finite strains: take Model"),
+        (lambda: model_with(PLASTIC, "finite"), "ElasticPlastic is for small strains"),
+        (lambda: model_with(fc.LinearElastic(E=1.0, nu=0.4999), "finite"), "locks .*: take NeoHookean"),
+        (lambda: fc.Model(fc.generate.block(), "plane_strain", strain="large"), "strain.*large.*finite"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_is_refused(make, text: str) -> None:
+    with pytest.raises(fc.ModelError, match=text):
+        make()
+
+
+def model_with(law, strain: str = "small") -> fc.Model:
+    model = fc.Model(fc.generate.block(), "plane_strain", strain=strain)
+    model.add_material(law)
+    return model
+
+
+def test_temperatures_and_sensitivities_are_refused() -> None:
+    model = model_with(PLASTIC)
+    model.fix("BOTTOM", "xy")
+    model.add_temperature(20.0)
+    with pytest.raises(fc.ModelError, match="temperatures and initial states are there for linear elasticity alone"):
+        fc.solve(model, 1)

@@ -1,0 +1,222 @@
+"""Finite strains against closed forms: bars of every law, simple shear, an inflated tube, the elastica; contact."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.optimize import brentq
+
+import fastcontact as fc
+from tests.verification.test_plasticity import bar
+
+
+def isochoric(stretch: np.ndarray) -> np.ndarray:
+    """Return stretches (3,) without their change of volume [-]."""
+    return stretch * stretch.prod() ** (-1.0 / 3.0)
+
+
+def invariants(stretch: np.ndarray) -> tuple[float, float]:
+    """Return both invariants of isochoric stretches (3,), less 3 [-]."""
+    square = isochoric(stretch) ** 2
+    return square.sum() - 3.0, (1.0 / square).sum() - 3.0
+
+
+def volume(bulk: float, stretch: np.ndarray) -> float:
+    """Return the energy of a change of volume."""
+    return 0.5 * bulk * (stretch.prod() - 1.0) ** 2
+
+
+def yeoh(stretch: np.ndarray) -> float:
+    x = invariants(stretch)[0]
+    return 0.5 * x - 0.02 * x**2 + 0.01 * x**3 + volume(5.0, stretch)
+
+
+def ogden(stretch: np.ndarray) -> float:
+    terms = ((0.6, 2.5), (0.3, -1.5))
+    return sum(2.0 * mu / a**2 * ((isochoric(stretch) ** a).sum() - 3.0) for mu, a in terms) + volume(5.0, stretch)
+
+
+def kirchhoff(stretch: np.ndarray) -> float:
+    strain = 0.5 * (stretch**2 - 1.0)
+    return 0.5 * 3.0 * 0.3 / (1.3 * 0.4) * strain.sum() ** 2 + 3.0 / 2.6 * (strain**2).sum()
+
+
+LAWS = {
+    "neo-Hookean": (
+        fc.NeoHookean(E=2.8, nu=0.4), lambda s: 0.5 * invariants(s)[0] + volume(2.8 / 0.6, s)
+    ),
+    "Mooney-Rivlin": (
+        fc.MooneyRivlin(0.4, 0.2, bulk=5.0), lambda s: 0.4 * invariants(s)[0] + 0.2 * invariants(s)[1] + volume(5.0, s)
+    ),
+    "Yeoh": (fc.Yeoh(0.5, -0.02, 0.01, bulk=5.0), yeoh),
+    "Ogden": (fc.Ogden([0.6, 0.3], [2.5, -1.5], bulk=5.0), ogden),
+    "Saint Venant-Kirchhoff": (fc.LinearElastic(E=3.0, nu=0.3), kirchhoff),
+}  # fmt: skip
+
+
+def slope(energy, stretch: np.ndarray, axis: int) -> float:
+    """Return the derivative of an energy by a stretch, by complex differences."""
+    moved = stretch.astype(complex)
+    moved[axis] += 1e-30j
+    return float(np.imag(energy(moved)) / 1e-30)
+
+
+def uniaxial(energy, stretch: float) -> float:
+    """Return the nominal stress of a bar."""
+    across = brentq(lambda s: slope(energy, np.array([stretch, s, s]), 1), 0.5, 1.6, xtol=1e-15)
+    return slope(energy, np.array([stretch, across, across]), 0)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize(
+    ("kinematics", "element"),
+    [("plane_stress", "quad4"), ("plane_stress", "tri6"), ("axisymmetric", "quad8"), ("3d", "hex8"), ("3d", "tet10")],
+)
+def test_a_bar(kinematics: str, element: str, law: str) -> None:
+    material, energy = LAWS[law]
+    far = 0.1 if law == "Saint Venant-Kirchhoff" else 1.0
+    ramp = [(0.0, 0.0), (1.0, 0.5 * far), (2.0, far), (3.0, -0.3 * far)]
+    steps, stress, mesh = bar(kinematics, element, material, ramp, "finite")
+    exact = [uniaxial(energy, 1.0 + strain) for _, strain in ramp[1:]]
+    assert stress == pytest.approx(exact, rel=1e-9)
+    # Cauchy stress: the force over the area that is left.
+    axis = 2 if kinematics == "3d" else 1
+    moved = steps[-1].displacement[mesh.points_of("XMAX" if kinematics == "3d" else "RIGHT"), 0]
+    if kinematics != "plane_stress":
+        assert steps[-1].stress[:, axis] == pytest.approx(exact[-1] / (1.0 + moved.mean()) ** 2, rel=1e-9)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize(
+    ("kinematics", "element"), [("plane_strain", "quad4"), ("plane_strain", "tri6"), ("3d", "hex8")]
+)
+def test_simple_shear(kinematics: str, element: str, law: str) -> None:
+    """Every node moves along x by its height; the shear force is the derivative of the energy by the shear."""
+    material, energy = LAWS[law]
+    solid = kinematics == "3d"
+    mesh = fc.generate.box((1.0, 1.0, 1.0), (2, 2, 2), element=element) if solid else fc.generate.block(element=element)
+    model = fc.Model(mesh, kinematics, strain="finite")
+    model.add_material(material)
+    bottom, top, sides = ("YMIN", "YMAX", ("XMIN", "XMAX")) if solid else ("BOTTOM", "TOP", ("LEFT", "RIGHT"))
+    model.fix(bottom, "x")
+    model.prescribe(top, x=0.4)
+    for side in sides:
+        model.prescribe(side, x=lambda points: 0.4 * points[:, 1])
+    for group in (bottom, top, *sides):
+        model.fix(group, "y")
+    if solid:
+        model.fix("BOX", "z")
+    step = fc.solve(model, 2)[-1]
+
+    def sheared(amount: float) -> float:
+        F = np.eye(3)
+        F[0, 1] = amount
+        return energy(np.sqrt(np.linalg.eigvalsh(F.T @ F)))
+
+    exact = (sheared(0.4 + 1e-5) - sheared(0.4 - 1e-5)) / 2e-5
+    inside = np.setdiff1d(np.arange(mesh.n_points), np.concatenate([mesh.points_of(side) for side in sides]))
+    assert step.displacement[inside, 0] == pytest.approx(0.4 * mesh.points[inside, 1], abs=1e-9)
+    P = step.stress[:, 3]  # of a shear along x, J = 1 and sigma_xy = P_xy
+    assert pytest.approx(exact, rel=1e-7) == P
+
+
+@pytest.mark.parametrize(("element", "count"), [("quad4", 32), ("quad8", 12), ("tri6", 12)])
+def test_a_tube_is_blown_up_to_twice_its_inner_radius(element: str, count: int) -> None:
+    """Rivlin (1949): pressure as the integral of (sigma_hh - sigma_rr) / r over the wall, incompressible."""
+    inner, outer, nu = 1.0, 2.0, 0.4999
+    mesh = fc.generate.block((outer - inner, 0.05), (count, 1), element=element, origin=(inner, 0.0))
+    model = fc.Model(mesh, "axisymmetric", strain="finite")
+    model.add_material(fc.NeoHookean(E=2.0 * (1.0 + nu), nu=nu))
+    model.fix("BOTTOM", "y")
+    model.fix("TOP", "y")
+    model.prescribe("LEFT", x=inner)
+    steps = fc.solve(model, 5)
+    force = steps[-1].reaction[mesh.points_of("LEFT"), 0].sum()
+
+    def difference(R: float) -> float:
+        r = np.sqrt(R**2 + 3.0 * inner**2)
+        return ((r / R) ** 2 - (R / r) ** 2) * R / r**2
+
+    assert force / (2.0 * np.pi * 2.0 * inner * 0.05) == pytest.approx(quad(difference, inner, outer)[0], rel=5e-4)
+    assert max(len(step.iterations["history"]) for step in steps) <= 6
+    # The radius of the outside follows from the volume.
+    outside = mesh.points_of("RIGHT")
+    assert outer + steps[-1].displacement[outside, 0] == pytest.approx(np.sqrt(7.0), rel=5e-4)
+
+
+@pytest.mark.parametrize("element", ["quad8", "quad9"])
+def test_the_elastica(element: str) -> None:
+    """Mattiasson (1981): the tip of a cantilever under P L^2 / E I = 10."""
+    length, depth, E = 10.0, 0.1, 1e6
+    mesh = fc.generate.block((length, depth), (40, 1), element=element)
+    model = fc.Model(mesh, "plane_stress", strain="finite")
+    model.add_material(fc.LinearElastic(E=E, nu=0.0))
+    model.fix("LEFT", "xy")
+    model.add_traction("RIGHT", y=-10.0 * E * depth**3 / 12.0 / length**2 / depth)
+    tip = fc.solve(model, 5)[-1].displacement[mesh.points_of("RIGHT")].mean(axis=0)
+    assert -tip / length == pytest.approx([0.55500, 0.81061], rel=2e-3)
+
+
+@pytest.mark.filterwarnings("ignore:a displacement of 2 is prescribed")
+def test_rigid_rotation_by_90_degrees_leaves_no_stress() -> None:
+    mesh = fc.generate.block((1.0, 1.0), (3, 3), element="quad8")
+    model = fc.Model(mesh, "plane_strain", strain="finite")
+    model.add_material(fc.LinearElastic(E=1.0, nu=0.3))
+    for side in ("BOTTOM", "TOP", "LEFT", "RIGHT"):
+        model.prescribe(
+            side, x=lambda points: -points[:, 0] - points[:, 1], y=lambda points: points[:, 0] - points[:, 1]
+        )
+    steps = fc.solve(model, 1)
+    assert np.abs(steps[-1].stress).max() <= 1e-10
+
+
+def test_iterations_converge_quadratically() -> None:
+    material, _ = LAWS["Mooney-Rivlin"]
+    mesh = fc.generate.block((1.0, 1.0), (4, 4), element="quad8")
+    model = fc.Model(mesh, "plane_strain", strain="finite")
+    model.add_material(material)
+    model.fix("BOTTOM", "xy")
+    model.prescribe("TOP", x=0.3, y=-0.2)
+    changes = [entry["displacement_change"] for entry in fc.solve(model, 1)[-1].iterations["history"]]
+    for before, after in zip(changes[-3:-1], changes[-2:], strict=True):
+        assert after <= 10.0 * before**2 + 1e-13
+
+
+def balls(law, strain: str, approach: float, **options):
+    mesh = fc.generate.half_spheres(element="quad4")
+    model = fc.Model(mesh, "axisymmetric", strain=strain)
+    model.add_material(law)
+    model.fix("A1A2", "x")
+    model.fix("A1B1", "y")
+    model.prescribe("A2B2", y=-approach)
+    model.add_contact("pair", secondary="CONT1", primary="CONT2", **options)
+    return fc.solve(model, 4), model
+
+
+@pytest.mark.parametrize("formulation", [None, "node_to_segment", "continuous"])
+def test_two_balls_squeezed_flat(formulation: str | None) -> None:
+    law = fc.NeoHookean(E=20_000.0, nu=0.3)
+    steps, model = balls(law, "finite", 12.0, formulation=formulation)
+    force = steps[-1].contact["pair"].force[1]
+    assert abs(force) == pytest.approx(3.667e6, rel=2e-3)
+    assert max(len(step.iterations["history"]) for step in steps) <= 8
+    residual = model.internal_forces(steps[-1].displacement) - steps[-1].reaction
+    for side in (steps[-1].contact["pair"],):
+        np.subtract.at(residual, side.points, side.force_vectors)
+        np.subtract.at(residual, side.primary_points, side.primary_force_vectors)
+    assert np.abs(residual).max() <= 1e-6 * abs(force)
+
+
+def test_small_loads_agree_with_linear_elasticity() -> None:
+    small, _ = balls(fc.LinearElastic(E=20_000.0, nu=0.3), "small", 0.004)
+    for law in (fc.LinearElastic(E=20_000.0, nu=0.3), fc.NeoHookean(E=20_000.0, nu=0.3)):
+        finite, _ = balls(law, "finite", 0.004)
+        assert finite[-1].contact["pair"].force == pytest.approx(small[-1].contact["pair"].force, rel=4e-3, abs=1e-9)
+
+
+def test_cells_tell_their_change_of_volume_and_their_logarithmic_strain() -> None:
+    material, _ = LAWS["neo-Hookean"]
+    for kinematics, element in (("plane_stress", "quad4"), ("axisymmetric", "quad8"), ("3d", "hex8")):
+        steps, _, mesh = bar(kinematics, element, material, [(0.0, 0.0), (1.0, 0.5)], "finite")
+        across = 1.0 + steps[-1].displacement[mesh.points_of("XMAX" if kinematics == "3d" else "RIGHT"), 0].mean()
+        assert steps[-1].cell_fields["J"] == pytest.approx(1.5 * across**2, rel=1e-9)
+        assert steps[-1].cell_fields["logarithmic_strain"] == pytest.approx(np.log(1.5), rel=1e-9)

@@ -1,0 +1,281 @@
+"""Modes: bars, beams, plates and rings of the textbooks; bodies joined by contact as whole ones; closed forms of preload."""
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from fastcontact.cli import main
+from fastcontact.mesh import elements
+
+block, box, union = fc.generate.block, fc.generate.box, fc.generate.union
+FLAT = ("tri3", "quad4", "tri6", "quad8", "quad9")
+SOLID = ("tet4", "hex8", "wedge6", "pyramid5", "tet10", "hex20", "hex27", "wedge15", "pyramid13")
+
+
+def model_of(mesh, kinematics, nu=0.0, E=1.0):
+    model = fc.Model(mesh, kinematics)
+    model.add_material(fc.LinearElastic(E=E, nu=nu, density=1.0))
+    return model
+
+
+def bar(element, kinematics, n=(1, 16), name="BAR", bottom=0.0, height=1.0):
+    """Return a bar of width 0.1 along y; its ends are called after it."""
+    if kinematics == "3d":
+        mesh = box((0.1, height, 0.1), (n[0], n[1], n[0]), element, (0.0, bottom, 0.0), name=name)
+        return fc.generate.renamed(
+            mesh, lambda own: {"YMIN": f"{name} BOTTOM", "YMAX": f"{name} TOP", name: name}.get(own)
+        )
+    mesh = block((0.1, height), n, element, (0.0, bottom), name=name)
+    return fc.generate.renamed(mesh, lambda own: own if own == name else f"{name} {own}")
+
+
+@pytest.mark.parametrize(
+    ("kinematics", "element"),
+    [(k, e) for k in ("plane_strain", "plane_stress", "axisymmetric") for e in FLAT] + [("3d", e) for e in SOLID],
+)
+def test_a_bar_along_its_axis(kinematics, element):
+    """Without Poisson's ratio ``f = (2 k + 1) / (4 L) sqrt(E / density)``; all of its mass is effective in the end."""
+    model = model_of(bar(element, kinematics, (1, 16 if element in FLAT else 8)), kinematics)
+    model.fix("BAR BOTTOM", "xyz"[: model.mesh.dim])
+    model.prescribe("BAR", **dict.fromkeys("xyz"[: model.mesh.dim].replace("y", ""), 0.0))
+    found = fc.modes(model, n=3)
+    exact = np.array([0.25, 0.75, 1.25])
+    quadratic = elements.get(element).order == 2
+    assert found.frequencies == pytest.approx(exact, rel=1e-3 if quadratic else 5e-2)
+    assert found.frequencies[0] == pytest.approx(0.25, rel=1e-4 if quadratic else 5e-3)
+    assert (found.frequencies >= exact * (1 - 1e-12)).all()  # from above, with a consistent mass
+    assert found.effective_mass[:, 1] / found.mass[1] == pytest.approx(8 / (np.pi * np.array([1, 3, 5])) ** 2, rel=0.03)
+    volume = {"3d": 0.01, "axisymmetric": np.pi * 0.01}.get(kinematics, 0.1)
+    assert found.mass[1] == pytest.approx(volume, rel=1e-12)
+    for shape in found.shapes:  # sin((2 k + 1) pi y / 2)
+        assert np.abs(shape[:, 0]).max() == 0.0
+
+
+@pytest.mark.parametrize("element", ["quad8", "tri6", "hex20"])
+def test_a_cantilever(element):
+    """Euler and Bernoulli: ``f = 1.8751^2 / (2 pi L^2) sqrt(E I / (density A))``, slender enough for 1e-3 and 6e-3."""
+    flat = element in FLAT
+    mesh = block((1.0, 0.02), (40, 1), element) if flat else box((1.0, 0.02, 0.02), (25, 1, 1), element)
+    model = model_of(mesh, "plane_stress" if flat else "3d")
+    model.fix("LEFT" if flat else "XMIN", "xyz"[: mesh.dim])
+    exact = np.array([1.875104, 4.694091]) ** 2 / (2 * np.pi) * 0.02 / np.sqrt(12.0)
+    found = fc.modes(model, n=2 if flat else 4).frequencies
+    found = found if flat else found[::2]  # two directions
+    assert found == pytest.approx(exact, rel=4e-3)
+    assert found[0] == pytest.approx(exact[0], rel=6e-4)
+
+
+@pytest.mark.parametrize(("kinematics", "rigid"), [("plane_strain", 3), ("axisymmetric", 1), ("3d", 6)])
+@pytest.mark.parametrize("solver", ["direct", "amg"])
+def test_a_free_body_moves_rigidly_and_vibrates(kinematics, rigid, solver):
+    mesh = box((1.0, 0.8, 0.6), (4, 4, 4)) if kinematics == "3d" else block((1.0, 0.8), (6, 6), "quad8")
+    found = fc.modes(model_of(mesh, kinematics, 0.3), n=rigid + 2, linear_solver=solver)
+    assert np.abs(found.frequencies[:rigid]).max() < 1e-5 * found.frequencies[rigid]
+    assert found.effective_mass.sum(axis=0) == pytest.approx(found.mass, rel=1e-6, abs=1e-12)
+
+
+def test_a_clamped_disc_and_a_ring():
+    """``10.2158 / (2 pi R^2) sqrt(D / (density h))`` of a thin plate; ``sqrt(E / density) / (2 pi R)`` of a thin ring."""
+    plate = model_of(block((1.0, 0.02), (60, 2), "quad8"), "axisymmetric", 0.3)
+    plate.fix("RIGHT", "xy")
+    plate.fix("LEFT", "x")
+    stiff = 0.02**3 / (12 * (1 - 0.09))
+    assert fc.modes(plate, n=1).frequencies[0] == pytest.approx(10.2158 / (2 * np.pi) * np.sqrt(stiff / 0.02), rel=1e-3)
+    ring = model_of(block((0.01, 0.01), (1, 1), "quad8", origin=(0.995, 0.0)), "axisymmetric", 0.3)
+    ring.fix("BOTTOM", "y")
+    assert fc.modes(ring, n=1).frequencies[0] == pytest.approx(1 / (2 * np.pi), rel=1e-4)
+    # Under pressure inside its hoop stress stiffens: E + stress in place of E.
+    ring.add_pressure("LEFT", 0.001 / 0.995)
+    (step,) = fc.solve(ring, 1)
+    assert fc.modes(ring, step, 1).frequencies[0] == pytest.approx(np.sqrt(1.1) / (2 * np.pi), rel=2e-3)
+
+
+@pytest.mark.parametrize("element", ["quad8", "tri6", "hex20"])
+@pytest.mark.parametrize("stress", [0.01, -0.0002])
+def test_tension_stiffens_a_beam_and_pressure_softens_it(element, stress):
+    """Simply supported: ``(2 pi f)^2 = (pi / L)^2 (T + E I (pi / L)^2) / (density A)``."""
+    height, flat = 0.02, element in FLAT
+    mesh = (
+        block((1.0, height), (20, 2), element, origin=(0.0, -0.5 * height))
+        if flat
+        else box((1.0, height, height), (24, 2, 1), element, origin=(0.0, -0.5 * height, 0.0))
+    )
+    ends = ("LEFT", "RIGHT") if flat else ("XMIN", "XMAX")
+    middle = np.abs(mesh.points[:, 1]) < 1e-9
+    pins = {f"PIN {x:g}": np.flatnonzero(middle & (np.abs(mesh.points[:, 0] - x) < 1e-9)) for x in (0.0, 1.0)}
+    model = model_of(mesh.with_groups(points=pins), "plane_stress" if flat else "3d")
+    model.fix("PIN 0", "xy")
+    model.fix("PIN 1", "y")
+    if not flat:
+        model.fix("BOX", "z")
+    for end, sign in zip(ends, (-1.0, 1.0)):
+        model.add_traction(end, x=sign * stress)
+    (step,) = fc.solve(model, 1)
+    bending = height**2 / 12 * np.pi**2
+    at_rest, loaded = (fc.modes(model, own, 1).frequencies[0] for own in (None, step))
+    assert loaded / at_rest == pytest.approx(np.sqrt(1.0 + stress / bending), rel=1e-3)
+    assert loaded == pytest.approx(0.5 * np.sqrt(stress + bending), rel=1.5e-3)
+    assert fc.modes(model, step, 1, stress_stiffening=False).frequencies[0] == pytest.approx(at_rest, rel=1e-12)
+
+
+FORMULATIONS = [
+    {"formulation": "mortar"}, {"formulation": "mortar", "multipliers": "standard"}, {"formulation": "continuous"},
+    {"formulation": "node_to_segment", "normals": "averaged"},
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("options", FORMULATIONS, ids=lambda own: "-".join(own.values()))
+@pytest.mark.parametrize(
+    ("kinematics", "element"), [("plane_strain", "quad8"), ("axisymmetric", "tri6"), ("3d", "hex8")]
+)
+def test_what_is_tied_or_sticks_vibrates_as_the_whole_body(kinematics, element, options):
+    """To 1e-4 also on meshes that do not match; without friction the upper half is free along the joint."""
+    n, linear = (4, 3) if kinematics == "3d" else (8, 6), element == "hex8"
+
+    def halves(**more):
+        low = bar(element, kinematics, (n[0 if linear else 1], 4 if linear else 8), "LOW", height=0.1)
+        mesh = union(low, bar(element, kinematics, (n[0], 4 if linear else 8), "UP", 0.1, 0.1))
+        model = model_of(mesh, kinematics)
+        model.fix("LOW BOTTOM", "xyz"[: mesh.dim])
+        model.add_contact("joint", secondary="UP BOTTOM", primary="LOW TOP", **options, **more)
+        model.add_pressure("UP TOP", 1e-3)
+        return model
+
+    whole = model_of(bar(element, kinematics, (n[0], 8 if linear else 16), height=0.2), kinematics)
+    whole.fix("BAR BOTTOM", "xyz"[: whole.mesh.dim])
+    exact = fc.modes(whole, n=3).frequencies
+    tied = halves(kind="tied")
+    close = {"rel": 1e-7 if linear else 2e-4}
+    assert fc.modes(tied, n=3).frequencies == pytest.approx(exact, **close)
+    rough = halves(friction=0.5)
+    (step,) = fc.solve(rough, 1)
+    assert fc.modes(rough, step, 3, stress_stiffening=False).frequencies == pytest.approx(exact, **close)
+    smooth = halves()
+    if kinematics != "axisymmetric":
+        smooth.prescribe("UP TOP", **dict.fromkeys("xyz"[: smooth.mesh.dim].replace("y", ""), 0.0))
+    (step,) = fc.solve(smooth, 1)
+    found = fc.modes(smooth, step, 8, stress_stiffening=False)
+    axial = int(np.argmax(found.effective_mass[:, 1]))
+    assert found.frequencies[axial] == pytest.approx(1.25, rel=2e-3)
+    up, low = (smooth.mesh.points_of(group) for group in ("UP BOTTOM", "LOW TOP"))
+    slips = [np.ptp(shape[np.concatenate([up, low]), 0]) for shape in found.shapes]
+    assert max(slips) > 0.1 * np.abs(found.shapes).max()
+
+
+@pytest.mark.filterwarnings("ignore:contact 'joint' penetrates")
+def test_what_is_open_is_free_and_penalties_are_springs():
+    """Two bars of length 1 joined by a spring k: ``w cos w sin w = k (cos^2 w - sin^2 w)`` with w the angular frequency."""
+    from scipy.optimize import brentq
+
+    mesh = union(bar("quad8", "plane_strain", (1, 8), "LOW"), bar("quad8", "plane_strain", (1, 8), "UP", 1.0))
+    for options in FORMULATIONS:
+        model = model_of(mesh, "plane_strain")
+        model.fix("LOW BOTTOM", "xy")
+        model.prescribe("LOW", x=0.0)
+        model.prescribe("UP", x=0.0)
+        model.add_contact("joint", secondary="UP BOTTOM", primary="LOW TOP", penalty=1.5, **options)
+        model.add_pressure("UP TOP", 1e-3)
+        (step,) = fc.solve(model, 1)
+        w = brentq(lambda w: w * np.cos(w) * np.sin(w) - 1.5 * np.cos(2 * w), 0.01, 1.0)
+        found = fc.modes(model, step, 1, stress_stiffening=False)
+        assert found.frequencies[0] == pytest.approx(w / (2 * np.pi), rel=1e-5)
+        open_now = fc.modes(model, n=2).frequencies  # at rest nothing is closed: one bar is free, the other alone
+        assert abs(open_now[0]) < 1e-6
+        assert open_now[1] == pytest.approx(0.25, rel=1e-5)
+
+
+def test_an_obstacle_holds_what_is_closed_and_moves_without_mass():
+    for force in (None, {"y": -0.01}):
+        model = model_of(bar("quad8", "plane_strain"), "plane_strain")
+        model.fix("BAR BOTTOM", "xy")
+        model.prescribe("BAR", x=0.0)
+        plate = fc.obstacles.HalfSpace((0.0, 1.0), (0.0, -1.0))
+        model.add_obstacle(
+            "plate", secondary="BAR TOP", obstacle=plate, motion=None if force else {"y": -0.01}, force=force
+        )
+        (step,) = fc.solve(model, 1)
+        found = fc.modes(model, step, 2, stress_stiffening=False).frequencies
+        assert found == pytest.approx([0.25, 0.75] if force else [0.5, 1.0], rel=1e-4)
+
+
+def test_a_tightened_bolt_is_one_piece():
+    """The sides of a pretension section keep their distance, as if the bar was whole."""
+    mesh = bar("quad8", "plane_strain").with_facet_group("CUT", lambda x: np.abs(x[:, 1] - 0.5) < 1e-9, between=True)
+    model = model_of(fc.generate.cut(mesh, "CUT"), "plane_strain")
+    model.fix("BAR BOTTOM", "xy")
+    model.fix("BAR TOP", "xy")
+    model.prescribe("BAR", x=0.0)
+    model.add_pretension("bolt", "CUT", force=0.001)
+    (step,) = fc.solve(model, 1)
+    assert fc.modes(model, step, 2, stress_stiffening=False).frequencies == pytest.approx([0.5, 1.0], rel=1e-4)
+
+
+def test_sides_that_repeat_each_other_at_a_corner_hold_once():
+    """A block tied to both walls of a corner, whose node is in both pairs."""
+    walls = [block((1.0, 1.0), (3, 3), origin=o, name=n) for n, o in (("FLOOR", (1.0, -1.0)), ("WALL", (0.0, 0.0)))]
+    parts = [*walls, block((1.0, 1.0), (3, 3), origin=(1.0, 0.0), name="BODY")]
+    named = [
+        fc.generate.renamed(part, lambda own, name=name: own if own == name else f"{name} {own}")
+        for part, name in zip(parts, ("FLOOR", "WALL", "BODY"))
+    ]
+    model = model_of(union(*named), "plane_strain")
+    model.fix("FLOOR", "xy")
+    model.fix("WALL", "xy")
+    found = model.add_contacts(kind="tied")
+    assert len(found) >= 2
+    alone = model_of(parts[2], "plane_strain")
+    for side in ("BOTTOM", "LEFT"):
+        alone.fix(side, "xy")
+    assert fc.modes(model, n=3).frequencies == pytest.approx(fc.modes(alone, n=3).frequencies, rel=1e-9)
+
+
+def test_modes_are_steps_for_pictures_and_files(tmp_path):
+    model = model_of(block((1.0, 0.1), (10, 1), "quad8"), "plane_stress")
+    model.fix("LEFT", "xy")
+    found = fc.modes(model, n=3)
+    assert len(found) == 3
+    assert "0.016" in repr(found)
+    with fc.ResultWriter(tmp_path / "modes.vtkhdf", model) as out:
+        for mode in found:
+            out.write(mode)
+    with fc.open_results(tmp_path / "modes.vtkhdf") as results:
+        assert [step.load_factor for step in results] == pytest.approx(found.frequencies)
+        np.testing.assert_array_equal(results[1].displacement, found.shapes[1])
+        assert fc.plot.deformed_shape(results.mesh, results[1], field="displacement").get_title()
+
+
+def test_a_case_file_asks_for_modes(tmp_path, capsys):
+    path, out = tmp_path / "bar.toml", tmp_path / "bar.vtkhdf"
+    path.write_text(
+        'kinematics = "plane_strain"\n[mesh]\ngenerator = "block"\n[[material]]\nE = 1.0\nnu = 0.0\ndensity = 1.0\n'
+        '[[support]]\ngroup = "BOTTOM"\ny = 0.0\n[[support]]\ngroup = "BLOCK"\nx = 0.0\n[ramp]\nsteps = 1\n[modes]\nn = 2\n'
+    )
+    assert main(["run", str(path), "-o", str(out), "--modes", str(tmp_path / "modes.vtkhdf")]) == 0
+    assert "frequencies about the last step: 0.25" in capsys.readouterr().out
+    with fc.open_results(tmp_path / "modes.vtkhdf") as results:
+        assert len(results) == 2
+    path.write_text(path.read_text().replace("n = 2", "m = 2"))
+    assert main(["run", str(path), "-o", str(out)]) == 1
+    assert "modes.m" in capsys.readouterr().err
+
+
+def test_what_is_refused():
+    model = model_of(block((1.0, 0.1), (10, 1)), "plane_stress")
+    for call, said in (
+        (lambda: fc.modes(model, n=0), "ask for one or more"),
+        (lambda: fc.modes(model, n=44), "modes of 44 free displacements"),
+        (lambda: fc.modes(model, n=2, linear_solver="nothing"), "nothing"),
+    ):
+        with pytest.raises(fc.ModelError, match=said):
+            call()
+    bare = fc.Model(model.mesh, "plane_stress")
+    bare.add_material(fc.LinearElastic(E=1.0, nu=0.0))
+    with pytest.raises(fc.ModelError, match="10 solid cells have none: give them density"):
+        fc.modes(bare)
+    # A column under more than Euler's load.
+    model.fix("LEFT", "xy")
+    model.add_pressure("RIGHT", 0.01)
+    (step,) = fc.solve(model, 1)
+    with pytest.raises(fc.ModelError, match="the settled step is not stable"):
+        fc.modes(model, step)
+    assert fc.modes(model, step, 1, stress_stiffening=False).frequencies[0] > 0.0

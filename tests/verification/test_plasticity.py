@@ -1,0 +1,158 @@
+"""Plastic bodies against closed forms: bars, cycles, simple shear, Hill's tube; contact past yield."""
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+
+E, NU, Y = 200.0, 0.3, 1.0
+
+
+def bar(kinematics: str, element: str, law, ramp, strain: str = "small"):
+    """Pull a unit bar; return steps, stress of each [pressure] and the mesh."""
+    if kinematics == "3d":
+        mesh, side, axis = fc.generate.box((1.0, 1.0, 1.0), (2, 1, 2), element=element), "ZMAX", 2
+    else:
+        mesh, side, axis = fc.generate.block((1.0, 1.0), (2, 2), element=element), "TOP", 1
+    model = fc.Model(mesh, kinematics, strain=strain)
+    model.add_material(law)
+    for group, component in (("XMIN", "x"), ("YMIN", "y"), ("ZMIN", "z"), ("LEFT", "x"), ("BOTTOM", "y")):
+        if group in mesh.cell_groups:
+            model.fix(group, component)
+    model.prescribe(side, **{"xyz"[axis]: 1.0}, ramp=ramp)
+    steps = fc.solve(model, [instant for instant, _ in ramp[1:]])
+    area = np.pi if kinematics == "axisymmetric" else 1.0
+    return steps, np.array([step.reaction[mesh.points_of(side), axis].sum() for step in steps]) / area, mesh
+
+
+def along_a_bar(strains, isotropic: float, kinematic: float):
+    """Return the stress of a bar with linear hardening after each strain, and the plastic strain that it has gone through."""
+    plastic = through = 0.0
+    found = []
+    for strain in strains:
+        relative = E * (strain - plastic) - kinematic * plastic
+        beyond = abs(relative) - (Y + isotropic * through)
+        if beyond > 0.0:
+            flow = beyond / (E + kinematic + isotropic)
+            plastic, through = plastic + flow * np.sign(relative), through + flow
+        found.append(E * (strain - plastic))
+    return np.array(found), through
+
+
+@pytest.mark.parametrize(("isotropic", "kinematic"), [(10.0, 0.0), (0.0, 5.0), (10.0, 5.0)])
+@pytest.mark.parametrize(
+    ("kinematics", "element"),
+    [("plane_stress", "quad4"), ("plane_stress", "tri6"), ("axisymmetric", "quad8"), ("3d", "hex8"), ("3d", "tet10")],
+)
+def test_a_bar_through_cycles(kinematics: str, element: str, isotropic: float, kinematic: float) -> None:
+    hardening = [(0.0, Y), (10.0, Y + 10.0 * isotropic)]
+    law = fc.ElasticPlastic(E=E, nu=NU, yield_stress=Y, hardening=hardening, kinematic=kinematic)
+    ramp = [(0.0, 0.0), (1.0, 0.01), (2.0, 0.02), (3.0, 0.0), (4.0, -0.02), (5.0, 0.02)]
+    steps, stress, _ = bar(kinematics, element, law, ramp)
+    exact, through = along_a_bar([strain for _, strain in ramp[1:]], isotropic, kinematic)
+    assert stress == pytest.approx(exact, rel=1e-9)
+    assert steps[-1].cell_fields["plastic_strain"] == pytest.approx(through, rel=1e-9)
+    assert steps[-1].cell_fields["yield_ratio"] == pytest.approx(1.0, rel=1e-9)
+    assert max(len(step.iterations["history"]) for step in steps) <= 6
+
+
+def test_a_table_of_hardening_is_followed_through_its_corners() -> None:
+    table = [(0.0, 1.0), (0.002, 1.5), (0.004, 1.6), (0.02, 1.9)]
+    law = fc.ElasticPlastic(E=E, nu=NU, yield_stress=1.0, hardening=table[1:])
+    assert law == fc.ElasticPlastic(E=E, nu=NU, yield_stress=1.0, hardening=table)
+    strains = [0.006, 0.009, 0.012, 0.04]
+    _, stress, _ = bar("axisymmetric", "quad4", law, [(0.0, 0.0), *zip(range(1, 5), strains, strict=True)])
+    for strain, found in zip(strains, stress, strict=True):
+        assert found == pytest.approx(law.yield_at(strain - found / E), rel=1e-9)
+
+
+def test_plastic_work_is_the_area_under_the_curve() -> None:
+    law = fc.ElasticPlastic(E=E, nu=NU, yield_stress=1.0, hardening=[(0.0, 1.0), (1.0, 11.0)], kinematic=5.0)
+    steps, stress, _ = bar("plane_stress", "quad4", law, [(0.0, 0.0), (1.0, 0.03)])
+    plastic = 0.03 - stress[0] / E
+    work = steps[-1].work
+    assert work["plastic_work"] == pytest.approx(0.5 * (1.0 + stress[0]) * plastic, rel=1e-9)
+    assert work["strain_energy"] == pytest.approx(0.5 * stress[0] ** 2 / E, rel=1e-9)
+
+
+@pytest.mark.parametrize(("element", "count", "bound"), [("quad8", 20, 2e-3), ("tri6", 20, 4e-3), ("quad4", 60, 0.012)])
+def test_a_tube_yields_from_inside(element: str, count: int, bound: float) -> None:
+    """Hill (1950, chapter 5): the plastic radius and the stresses of a tube in plane strain, without hardening."""
+    inner, outer, radius, k = 1.0, 2.0, 1.5, Y / np.sqrt(3.0)
+    at_front = k * (1.0 - (radius / outer) ** 2)
+    mesh = fc.generate.block((outer - inner, 0.05), (count, 1), element=element, origin=(inner, 0.0))
+    model = fc.Model(mesh, "axisymmetric")
+    # Elastically incompressible: then sigma_zz is the mean of the others, as Hill's solution takes it.
+    model.add_material(fc.ElasticPlastic(E=1000.0, nu=0.4999, yield_stress=Y))
+    model.fix("BOTTOM", "y")
+    model.fix("TOP", "y")
+    model.add_pressure("LEFT", 2.0 * k * np.log(radius / inner) + at_front)
+    steps = fc.solve(model, [0.5, 0.8, 0.9, 1.0])
+    r, stress = mesh.points[:, 0], steps[-1].stress
+    plastic = 2.0 * k * np.log(np.minimum(r, radius) / radius) - at_front
+    exact = np.where(r < radius, plastic, k * radius**2 / outer**2 - k * radius**2 / r**2)
+    assert np.abs(stress[:, 0] - exact).max() <= bound * Y
+    away = np.abs(r - radius) > 0.06
+    hoop = np.where(r < radius, plastic + 2.0 * k, k * radius**2 / outer**2 + k * radius**2 / r**2)
+    assert np.abs(stress[:, 2] - hoop)[away].max() <= 3.0 * bound * Y
+    middle = np.concatenate([mesh.points[block].mean(axis=1)[:, 0] for block in mesh.solids.values()])
+    yielded = steps[-1].cell_fields["plastic_strain"] > 1e-6
+    assert middle[yielded].max() == pytest.approx(radius, abs=1.5 / count)
+    assert middle[~yielded].min() == pytest.approx(radius, abs=1.5 / count)
+
+
+def indented(element: str, formulation: str, **options):
+    """Press a ball into a plastic block; return the last step and the model."""
+    mesh = fc.generate.block((2.0, 2.0), (12, 12), element=element)
+    model = fc.Model(mesh, "axisymmetric")
+    model.add_material(fc.ElasticPlastic(E=200.0, nu=0.3, yield_stress=1.0))
+    model.fix("BOTTOM", "y")
+    model.add_obstacle(
+        "ball", secondary="TOP", obstacle=fc.obstacles.Sphere((0.0, 3.0), 1.0), motion={"y": -0.05},
+        formulation=formulation, **options,
+    )  # fmt: skip
+    return fc.solve(model, 5), model
+
+
+@pytest.mark.parametrize(
+    ("formulation", "friction"), [("node_to_segment", None), ("continuous", None), ("continuous", 0.3)]
+)
+def test_an_indentation_past_yield(formulation: str, friction: float | None) -> None:
+    steps, model = indented("quad8", formulation, friction=friction)
+    last = steps[-1]
+    support = last.reaction[model.mesh.points_of("BOTTOM"), 1].sum()
+    assert support == pytest.approx(-last.contact["ball"].force[1], rel=1e-9)
+    # Perfect plasticity: the mean pressure under a ball comes near 3 Y (Tabor, 1951).
+    contact = last.contact["ball"]
+    mean = -contact.force[1] / (np.pi * np.mean(contact.radius) ** 2)
+    assert 2.0 < mean < 3.3
+    assert last.work["plastic_work"] > 3.0 * last.work["strain_energy"]
+
+
+def test_unloading_is_elastic_and_leaves_a_dent() -> None:
+    mesh = fc.generate.block((2.0, 2.0), (12, 12))
+    model = fc.Model(mesh, "axisymmetric")
+    model.add_material(fc.ElasticPlastic(E=200.0, nu=0.3, yield_stress=1.0, hardening=[(0.0, 1.0), (1.0, 2.0)]))
+    model.fix("BOTTOM", "y")
+    model.add_obstacle(
+        "ball", secondary="TOP", obstacle=fc.obstacles.Sphere((0.0, 3.0), 1.0), motion={"y": -0.05},
+        ramp=[(0.0, 0.0), (1.0, 1.0), (2.0, 0.0)],
+    )  # fmt: skip
+    steps = fc.solve(model, [0.5, 1.0, 1.2, 2.0])
+    assert not steps[-1].contact["ball"].active.any()
+    assert steps[-1].displacement[:, 1].min() < -0.02
+    assert abs(steps[-1].reaction[:, 1].sum()) <= 1e-9 * steps[1].reaction[:, 1].sum()
+    assert steps[-1].work["plastic_work"] == pytest.approx(steps[1].work["plastic_work"], rel=0.02)
+
+
+def test_a_restart_repeats_every_bit(tmp_path) -> None:
+    steps, model = indented("quad8", "continuous")
+    with fc.ResultWriter(tmp_path / "dent.vtkhdf", model) as out:
+        for step in fc.solve(model, [0.2, 0.4, 0.6]):
+            out.write(step)
+    stopped = fc.open_results(tmp_path / "dent.vtkhdf")
+    again = fc.solve(model, 5, resume=stopped)
+    for one, other in zip(steps, again, strict=True):
+        assert np.array_equal(one.displacement, other.displacement)
+        assert np.array_equal(one.stress, other.stress)
+    assert np.array_equal(stopped[-1].cell_fields["plastic_strain"], steps[2].cell_fields["plastic_strain"])
