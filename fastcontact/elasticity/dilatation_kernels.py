@@ -14,67 +14,57 @@ matrix and g = sum w p d^T. L^-1 p are orthonormal polynomials, the projection i
 import numpy as np
 
 from fastcontact._jit.decorators import kernel
-
-TWO_PI = 2.0 * np.pi
+from fastcontact.elasticity.element_2d_kernels import TWO_PI, owned
+from fastcontact.elasticity.element_3d_kernels import map_3d
+from fastcontact.mesh.jacobian_kernels import transposed
 
 
 @kernel
 def _plane(x, N, dN, q, axisymmetric, d):
-    """Fill `d` (n_nodes * 2,) with the dilatation of unit displacements of the nodes `x` (n_nodes, 2); return the measure."""
+    """Fill `d` (n_nodes * 2,) with the dilatation of unit displacements of the nodes `x` (2, n_nodes); return the measure."""
     j00 = j01 = j10 = j11 = radius = 0.0
-    for a in range(x.shape[0]):
-        j00 += dN[q, a, 0] * x[a, 0]
-        j01 += dN[q, a, 0] * x[a, 1]
-        j10 += dN[q, a, 1] * x[a, 0]
-        j11 += dN[q, a, 1] * x[a, 1]
-        radius += N[q, a] * x[a, 0]
+    for a in range(x.shape[1]):
+        j00 += dN[q, a, 0] * x[0, a]
+        j01 += dN[q, a, 0] * x[1, a]
+        j10 += dN[q, a, 1] * x[0, a]
+        j11 += dN[q, a, 1] * x[1, a]
+        radius += N[q, a] * x[0, a]
     det = j00 * j11 - j01 * j10
-    for a in range(x.shape[0]):
+    for a in range(x.shape[1]):
         d[2 * a] = (j11 * dN[q, a, 0] - j01 * dN[q, a, 1]) / det
         d[2 * a + 1] = (j00 * dN[q, a, 1] - j10 * dN[q, a, 0]) / det
     if not axisymmetric:
         return det
-    for a in range(x.shape[0]):
+    for a in range(x.shape[1]):
         d[2 * a] += N[q, a] / radius
     return det * TWO_PI * radius
 
 
 @kernel
-def _solid(x, dN, q, d):
-    """Fill `d` (n_nodes * 3,) with the dilatation of unit displacements of the nodes `x` (n_nodes, 3); return det J."""
-    j00 = j01 = j02 = j10 = j11 = j12 = j20 = j21 = j22 = 0.0
-    for a in range(x.shape[0]):
-        r, s, t = dN[q, a, 0], dN[q, a, 1], dN[q, a, 2]
-        j00 += r * x[a, 0]
-        j01 += r * x[a, 1]
-        j02 += r * x[a, 2]
-        j10 += s * x[a, 0]
-        j11 += s * x[a, 1]
-        j12 += s * x[a, 2]
-        j20 += t * x[a, 0]
-        j21 += t * x[a, 1]
-        j22 += t * x[a, 2]
-    c00, c01, c02 = j11 * j22 - j12 * j21, j12 * j20 - j10 * j22, j10 * j21 - j11 * j20
-    c10, c11, c12 = j02 * j21 - j01 * j22, j00 * j22 - j02 * j20, j01 * j20 - j00 * j21
-    c20, c21, c22 = j01 * j12 - j02 * j11, j02 * j10 - j00 * j12, j00 * j11 - j01 * j10
-    det = j00 * c00 + j01 * c01 + j02 * c02
-    inverse = 1.0 / det
-    for a in range(x.shape[0]):
-        r, s, t = dN[q, a, 0] * inverse, dN[q, a, 1] * inverse, dN[q, a, 2] * inverse
-        d[3 * a] = c00 * r + c10 * s + c20 * t
-        d[3 * a + 1] = c01 * r + c11 * s + c21 * t
-        d[3 * a + 2] = c02 * r + c12 * s + c22 * t
+def _solid(x, slopes, q, gradient, d):
+    """Fill `d` (n_nodes * 3,) with the dilatation of unit displacements of the nodes `x` (3, n_nodes); return det J."""
+    det = map_3d(x, slopes, q, gradient)
+    for a in range(x.shape[1]):
+        for i in range(3):
+            d[3 * a + i] = gradient[i, a]
     return det
 
 
 @kernel
-def _integrate(x, N, dN, weights, basis, axisymmetric, d, mass, g):
-    """Fill `mass` (m, m) and `g` (m, n_nodes * dim) for the cell with the nodes `x` (n_nodes, dim)."""
+def _measure(x, N, dN, slopes, q, axisymmetric, gradient, d):
+    """Fill `d` (n_nodes * dim,) as above in the dimension of `x` (dim, n_nodes); return the measure."""
+    if x.shape[0] == 2:
+        return _plane(x, N, dN, q, axisymmetric, d)
+    return _solid(x, slopes, q, gradient, d)
+
+
+@kernel
+def _integrate(x, N, dN, slopes, weights, basis, axisymmetric, gradient, d, mass, g):
+    """Fill `mass` (m, m) and `g` (m, n_nodes * dim) for the cell with the nodes `x` (dim, n_nodes)."""
     mass[:] = 0.0
     g[:] = 0.0
     for q in range(weights.shape[0]):
-        measure = _plane(x, N, dN, q, axisymmetric, d) if x.shape[1] == 2 else _solid(x, dN, q, d)
-        measure *= weights[q]
+        measure = weights[q] * _measure(x, N, dN, slopes, q, axisymmetric, gradient, d)
         for m in range(basis.shape[1]):
             factor = measure * basis[q, m]
             for n in range(m + 1):
@@ -84,7 +74,7 @@ def _integrate(x, N, dN, weights, basis, axisymmetric, d, mass, g):
 
 
 @kernel
-def _reduce(mass, g):
+def reduce(mass, g):
     """Replace the lower half of `mass` (m, m) by its Cholesky factor L, and `g` (m, n) by L^-1 g."""
     for m in range(mass.shape[0]):
         for n in range(m + 1):
@@ -107,23 +97,21 @@ def add_stiffness(points, cells, N, dN, weights, basis, bulk, material, axisymme
     """
     n_cells, n_nodes = cells.shape
     dim, size = points.shape[1], basis.shape[1]
-    x, d = np.empty((n_nodes, dim)), np.empty(n_nodes * dim)
+    slopes, x, gradient = transposed(dN), np.empty((dim, n_nodes)), np.empty((dim, n_nodes))
+    d = np.empty(n_nodes * dim)
     mass, g = np.empty((size, size)), np.empty((size, n_nodes * dim))
-    row = np.empty(n_nodes * dim)
+    row, mine = np.empty(n_nodes * dim), np.empty(n_nodes, np.bool_)
     for c in range(n_cells):
         mean, rest = bulk[material[c], 0], bulk[material[c], 1]
-        mine = False
-        for a in range(n_nodes):
-            mine = mine or owner[cells[c, a]] == part
-        if mean == 0.0 or not mine:
+        if mean == 0.0 or not owned(cells, c, owner, part, mine):
             continue
         for a in range(n_nodes):
             for i in range(dim):
-                x[a, i] = points[cells[c, a], i]
-        _integrate(x, N, dN, weights, basis, axisymmetric, d, mass, g)
-        _reduce(mass, g)
+                x[i, a] = points[cells[c, a], i]
+        _integrate(x, N, dN, slopes, weights, basis, axisymmetric, gradient, d, mass, g)
+        reduce(mass, g)
         for a in range(n_nodes):
-            if owner[cells[c, a]] != part:
+            if not mine[a]:
                 continue
             for i in range(dim):
                 for k in range(n_nodes * dim):
@@ -144,7 +132,8 @@ def add_pressure(points, cells, N, dN, weights, basis, bulk, material, axisymmet
     """
     n_cells, n_nodes = cells.shape
     dim, size = points.shape[1], basis.shape[1]
-    x, d = np.empty((n_nodes, dim)), np.empty(n_nodes * dim)
+    slopes, x, gradient = transposed(dN), np.empty((dim, n_nodes)), np.empty((dim, n_nodes))
+    d = np.empty(n_nodes * dim)
     mass, g = np.empty((size, size)), np.empty((size, 1))
     value, u = np.empty(size), np.empty(n_nodes * dim)
     for c in range(n_cells):
@@ -153,13 +142,12 @@ def add_pressure(points, cells, N, dN, weights, basis, bulk, material, axisymmet
             continue
         for a in range(n_nodes):
             for i in range(dim):
-                x[a, i] = points[cells[c, a], i]
+                x[i, a] = points[cells[c, a], i]
                 u[dim * a + i] = displacement[cells[c, a], i]
         mass[:] = 0.0
         g[:] = 0.0
         for q in range(weights.shape[0]):
-            measure = _plane(x, N, dN, q, axisymmetric, d) if dim == 2 else _solid(x, dN, q, d)
-            measure *= weights[q]
+            measure = weights[q] * _measure(x, N, dN, slopes, q, axisymmetric, gradient, d)
             dilatation = 0.0
             for k in range(d.shape[0]):
                 dilatation += d[k] * u[k]
@@ -168,7 +156,7 @@ def add_pressure(points, cells, N, dN, weights, basis, bulk, material, axisymmet
                 for n in range(m + 1):
                     mass[m, n] += factor * basis[q, n]
                 g[m, 0] += factor * dilatation
-        _reduce(mass, g)
+        reduce(mass, g)
         for m in range(size):
             value[m] = g[m, 0] * (mean if m == 0 else rest)
         for m in range(size - 1, -1, -1):  # the transposed factor

@@ -33,7 +33,7 @@ def _map(points, cell, N, dN, q, gradient):
 
 
 @kernel
-def _owned(cells, c, owner, part, mine):
+def owned(cells, c, owner, part, mine):
     """Fill `mine` (n_nodes,) with which nodes of a cell have the owner `part`; return whether any has."""
     found = False
     for a in range(cells.shape[1]):
@@ -84,7 +84,7 @@ def add_stiffness(points, cells, N, dN, weights, moduli, special, material, axis
     local = np.empty((n_nodes, n_nodes, 2, 2))
     mine = np.empty(n_nodes, np.bool_)
     for c in range(n_cells):
-        if not _owned(cells, c, owner, part, mine):
+        if not owned(cells, c, owner, part, mine):
             continue
         D = moduli[material[c]]
         shear = D[3, 3]

@@ -4,24 +4,14 @@
 Shared arguments: ``points`` (n_points, 3) [length]; ``cells`` (n_cells, n_nodes); ``N`` (n_q, n_nodes), ``dN`` (n_q,
 n_nodes, 3), ``weights`` (n_q,) of the reference element; ``moduli`` (n_materials, 6, 6) [pressure], symmetric, for strains
 (xx, yy, zz, 2xy, 2yz, 2xz); ``material`` (n_cells,). `N` and `axisymmetric` have no effect here: the loops of both dimensions
-have the same arguments. What they share is written in both files, since Numba's cache does not see changes in other files.
+have the same arguments.
 """
 
 import numpy as np
 
 from fastcontact._jit.decorators import inlined_kernel, kernel
-
-
-@kernel
-def _transposed(dN):
-    """Return the derivatives as (n_q, 3, n_nodes), so that loops over nodes run along memory."""
-    n_q, n_nodes, _ = dN.shape
-    out = np.empty((n_q, 3, n_nodes))
-    for q in range(n_q):
-        for a in range(n_nodes):
-            for i in range(3):
-                out[q, i, a] = dN[q, a, i]
-    return out
+from fastcontact.elasticity.element_2d_kernels import owned
+from fastcontact.mesh.jacobian_kernels import jacobian_3d, transposed
 
 
 @kernel
@@ -34,27 +24,15 @@ def _gather(values, cells, c, x):
 
 
 @kernel
-def _map(x, slopes, q, gradient):
+def map_3d(x, slopes, q, gradient):
     """Fill `gradient` (3, n_nodes) with shape derivatives in x, y, z; return det J."""
-    n_nodes = x.shape[1]
-    j00 = j01 = j02 = j10 = j11 = j12 = j20 = j21 = j22 = 0.0
-    for a in range(n_nodes):
-        r, s, t = slopes[q, 0, a], slopes[q, 1, a], slopes[q, 2, a]
-        j00 += r * x[0, a]
-        j01 += r * x[1, a]
-        j02 += r * x[2, a]
-        j10 += s * x[0, a]
-        j11 += s * x[1, a]
-        j12 += s * x[2, a]
-        j20 += t * x[0, a]
-        j21 += t * x[1, a]
-        j22 += t * x[2, a]
+    j00, j01, j02, j10, j11, j12, j20, j21, j22 = jacobian_3d(x, slopes, q)
     c00, c01, c02 = j11 * j22 - j12 * j21, j12 * j20 - j10 * j22, j10 * j21 - j11 * j20
     c10, c11, c12 = j02 * j21 - j01 * j22, j00 * j22 - j02 * j20, j01 * j20 - j00 * j21
     c20, c21, c22 = j01 * j12 - j02 * j11, j02 * j10 - j00 * j12, j00 * j11 - j01 * j10
     det = j00 * c00 + j01 * c01 + j02 * c02
     inverse = 1.0 / det
-    for a in range(n_nodes):
+    for a in range(x.shape[1]):
         r, s, t = slopes[q, 0, a] * inverse, slopes[q, 1, a] * inverse, slopes[q, 2, a] * inverse
         gradient[0, a] = c00 * r + c10 * s + c20 * t
         gradient[1, a] = c01 * r + c11 * s + c21 * t
@@ -90,7 +68,7 @@ def _integrate_products(x, slopes, weights, gradient, g):
     n_nodes = x.shape[1]
     g[:] = 0.0
     for q in range(weights.shape[0]):
-        det = _map(x, slopes, q, gradient)
+        det = map_3d(x, slopes, q, gradient)
         if not det > 0.0:
             return False
         weight = weights[q] * det
@@ -103,16 +81,6 @@ def _integrate_products(x, slopes, weights, gradient, g):
                         g[ij, a, b] += factor * gradient[j, b]
                 ij += 1
     return True
-
-
-@kernel
-def _owned(cells, c, owner, part, mine):
-    """Fill `mine` (n_nodes,) with which nodes of a cell have the owner `part`; return whether any has."""
-    found = False
-    for a in range(cells.shape[1]):
-        mine[a] = owner[cells[c, a]] == part
-        found = found or mine[a]
-    return found
 
 
 @kernel
@@ -236,7 +204,7 @@ def add_stiffness(points, cells, N, dN, weights, moduli, special, material, axis
     constants, ``D[0, 1]`` and ``D[3, 3]``.
     """
     n_cells, n_nodes = cells.shape
-    slopes, x, gradient = _transposed(dN), np.empty((3, n_nodes)), np.empty((3, n_nodes))
+    slopes, x, gradient = transposed(dN), np.empty((3, n_nodes)), np.empty((3, n_nodes))
     g, mine, corners = np.empty((6, n_nodes, n_nodes)), np.empty(n_nodes, np.bool_), np.empty((4, 3))
     tensor, products, block = np.empty((9, 9)), np.empty(9), np.empty(9)
     volume = 0.0
@@ -244,7 +212,7 @@ def add_stiffness(points, cells, N, dN, weights, moduli, special, material, axis
         volume += weight
     flat = data.reshape(-1)
     for c in range(n_cells):
-        if not _owned(cells, c, owner, part, mine):
+        if not owned(cells, c, owner, part, mine):
             continue
         coupling, shear = moduli[material[c], 0, 1], moduli[material[c], 3, 3]
         isotropic = special[material[c]]
@@ -270,7 +238,7 @@ def stress(points, cells, N, dN, moduli, material, axisymmetric, displacement, o
     Position and displacement are differentiated along the cell together, and no gradients of shape functions are formed.
     """
     n_cells, n_nodes = cells.shape
-    slopes, local = _transposed(dN), np.empty((n_nodes, 6))
+    slopes, local = transposed(dN), np.empty((n_nodes, 6))
     for c in range(n_cells):
         for a in range(n_nodes):
             p = cells[c, a]
@@ -324,11 +292,11 @@ def largest_rotation(points, cells, N, dN, displacement):
     Half the curl of the displacement (n_points, 3); the number is -1 where no cell rotates.
     """
     n_cells, n_nodes = cells.shape
-    slopes, x, gradient = _transposed(dN), np.empty((3, n_nodes)), np.empty((3, n_nodes))
+    slopes, x, gradient = transposed(dN), np.empty((3, n_nodes)), np.empty((3, n_nodes))
     largest, number = 0.0, -1
     for c in range(n_cells):
         _gather(points, cells, c, x)
-        _map(x, slopes, 0, gradient)
+        map_3d(x, slopes, 0, gradient)
         around_x = around_y = around_z = 0.0
         for a in range(n_nodes):
             p = cells[c, a]
@@ -346,12 +314,12 @@ def largest_rotation(points, cells, N, dN, displacement):
 def add_internal_force(points, cells, N, dN, weights, axisymmetric, stresses, force):
     """Add the nodal forces of `stresses` (n_cells, n_q, 6) to `force` (n_points, 3), in place."""
     n_cells, n_nodes = cells.shape
-    slopes = _transposed(dN)
+    slopes = transposed(dN)
     x, gradient = np.empty((3, n_nodes)), np.empty((3, n_nodes))
     for c in range(n_cells):
         _gather(points, cells, c, x)
         for q in range(weights.shape[0]):
-            weight = weights[q] * _map(x, slopes, q, gradient)
+            weight = weights[q] * map_3d(x, slopes, q, gradient)
             xx, yy, zz = weight * stresses[c, q, 0], weight * stresses[c, q, 1], weight * stresses[c, q, 2]
             xy, yz, xz = weight * stresses[c, q, 3], weight * stresses[c, q, 4], weight * stresses[c, q, 5]
             for a in range(n_nodes):

@@ -14,6 +14,8 @@ B: modes give way by a = -own^-1 mixed u, and take (L^-1 mixed)^T (L^-1 mixed) f
 import numpy as np
 
 from fastcontact._jit.decorators import kernel
+from fastcontact.elasticity.dilatation_kernels import reduce
+from fastcontact.elasticity.element_2d_kernels import owned
 
 
 @kernel
@@ -99,22 +101,6 @@ def _integrate(x, dN, xi, weights, middle, pairs, moduli, numbers, own, mixed):
 
 
 @kernel
-def _reduce(own, mixed):
-    """Replace the lower half of `own` (m, m) by its Cholesky factor L, and `mixed` (m, n) by L^-1 mixed."""
-    for m in range(own.shape[0]):
-        for n in range(m + 1):
-            value = own[m, n]
-            for k in range(n):
-                value -= own[m, k] * own[n, k]
-            own[m, n] = np.sqrt(value) if m == n else value / own[n, n]
-        for n in range(m):
-            for k in range(mixed.shape[1]):
-                mixed[m, k] -= own[m, n] * mixed[n, k]
-        for k in range(mixed.shape[1]):
-            mixed[m, k] /= own[m, m]
-
-
-@kernel
 def subtract_stiffness(
     points, cells, dN, xi, weights, middle, pairs, moduli, bends, material, slots, owner, part, data
 ):
@@ -125,21 +111,18 @@ def subtract_stiffness(
     n_cells, n_nodes = cells.shape
     dim = points.shape[1]
     n_modes = 4 if dim == 2 else 13
-    x, row = np.empty((n_nodes, dim)), np.empty(n_nodes * dim)
+    x, row, mine = np.empty((n_nodes, dim)), np.empty(n_nodes * dim), np.empty(n_nodes, np.bool_)
     own, mixed = np.empty((n_modes, n_modes)), np.empty((n_modes, n_nodes * dim))
     for c in range(n_cells):
-        mine = False
-        for a in range(n_nodes):
-            mine = mine or owner[cells[c, a]] == part
-        if not mine or not bends[material[c, 0]]:
+        if not bends[material[c, 0]] or not owned(cells, c, owner, part, mine):
             continue
         for a in range(n_nodes):
             for i in range(dim):
                 x[a, i] = points[cells[c, a], i]
         _integrate(x, dN, xi, weights, middle, pairs, moduli, material[c], own, mixed)
-        _reduce(own, mixed)
+        reduce(own, mixed)
         for a in range(n_nodes):
-            if owner[cells[c, a]] != part:
+            if not mine[a]:
                 continue
             for i in range(dim):
                 row[:] = 0.0
@@ -188,7 +171,7 @@ def add_stress(
                 for e in range(size):
                     for m in range(n_modes):
                         force[m, 0] += det * weights[q] * M[e, m] * lost[c, q, e]
-        _reduce(own, force)
+        reduce(own, force)
         for m in range(n_modes - 1, -1, -1):  # the transposed factor
             for k in range(m + 1, n_modes):
                 force[m, 0] -= own[k, m] * force[k, 0]

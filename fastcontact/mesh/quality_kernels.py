@@ -4,6 +4,7 @@
 import numpy as np
 
 from fastcontact._jit.decorators import kernel
+from fastcontact.mesh.jacobian_kernels import jacobian_3d, transposed
 
 
 @kernel
@@ -22,18 +23,7 @@ def _determinant_2d(x, slopes, q):
 @kernel
 def _determinant_3d(x, slopes, q):
     """Return det J of the cell with nodes x (3, n_nodes) at point q of the slopes (n_q, 3, n_nodes)."""
-    j00 = j01 = j02 = j10 = j11 = j12 = j20 = j21 = j22 = 0.0
-    for a in range(x.shape[1]):
-        r, s, t = slopes[q, 0, a], slopes[q, 1, a], slopes[q, 2, a]
-        j00 += r * x[0, a]
-        j01 += r * x[1, a]
-        j02 += r * x[2, a]
-        j10 += s * x[0, a]
-        j11 += s * x[1, a]
-        j12 += s * x[2, a]
-        j20 += t * x[0, a]
-        j21 += t * x[1, a]
-        j22 += t * x[2, a]
+    j00, j01, j02, j10, j11, j12, j20, j21, j22 = jacobian_3d(x, slopes, q)
     return j00 * (j11 * j22 - j12 * j21) + j01 * (j12 * j20 - j10 * j22) + j02 * (j10 * j21 - j11 * j20)
 
 
@@ -50,12 +40,7 @@ def extremes(points, cells, dN, weights, edges, low, high, measure, longest):
         Local nodes at the ends of the edges, which count as straight.
     """
     n_q, n_nodes, dim = dN.shape
-    slopes = np.empty((n_q, dim, n_nodes))
-    for q in range(n_q):
-        for a in range(n_nodes):
-            for i in range(dim):
-                slopes[q, i, a] = dN[q, a, i]
-    x = np.empty((dim, n_nodes))
+    slopes, x = transposed(dN), np.empty((dim, n_nodes))
     for c in range(cells.shape[0]):
         for a in range(n_nodes):
             for i in range(dim):

@@ -36,41 +36,19 @@ def pipe(patch, folder):
     os.mkfifo(folder / "pipe.vtkhdf")
 
 
+# fmt: off
 ACCIDENTS = [
-    (
-        "the disk is full",
-        full_disk,
-        ["run", "case.toml"],
-        r"'.*case\.vtkhdf' cannot be written \(No space left on device\): see whether the disk is full",
-    ),
-    (
-        "the folder is write-protected",
-        protected_folder,
-        ["run", "case.toml"],
-        r"folder '.*' is write-protected: name a file in another folder",
-    ),
-    (
-        "the result file is write-protected",
-        protected_file,
-        ["run", "case.toml", "-o", "old.vtkhdf"],
-        r"'.*old\.vtkhdf' is write-protected: remove the protection or name another file",
-    ),
-    (
-        "another run writes the result file",
-        other_writer,
-        ["run", "case.toml", "-o", "busy.vtkhdf"],
-        r"'.*busy\.vtkhdf' is being written by process \d+: let it end or name another file",
-    ),
-    (
-        "the result file exists and is something else",
-        other_results,
-        ["run", "case.toml", "-o", "text.vtkhdf"],
-        r"'.*text\.vtkhdf' exists and is no result file: name another file or remove it first",
-    ),
-    (
-        "the result file is a pipe",
-        pipe,
-        ["run", "case.toml", "-o", "pipe.vtkhdf"],
-        r"'.*pipe\.vtkhdf' is a device or a pipe: name a plain file",
-    ),
+    ("the disk is full", full_disk, ["run", "case.toml"],
+     r"'.*case\.vtkhdf' cannot be written \(No space left on device\): see whether the disk is full"),
+    ("the folder is write-protected", protected_folder, ["run", "case.toml"],
+     r"folder '.*' is write-protected: name a file in another folder"),
+    ("the result file is write-protected", protected_file, ["run", "case.toml", "-o", "old.vtkhdf"],
+     r"'.*old\.vtkhdf' is write-protected: remove the protection or name another file"),
+    ("another run writes the result file", other_writer, ["run", "case.toml", "-o", "busy.vtkhdf"],
+     r"'.*busy\.vtkhdf' is being written by process \d+: let it end or name another file"),
+    ("the result file exists and is something else", other_results, ["run", "case.toml", "-o", "text.vtkhdf"],
+     r"'.*text\.vtkhdf' exists and is no result file: name another file or remove it first"),
+    ("the result file is a pipe", pipe, ["run", "case.toml", "-o", "pipe.vtkhdf"],
+     r"'.*pipe\.vtkhdf' is a device or a pipe: name a plain file"),
 ]
+# fmt: on

@@ -99,6 +99,7 @@ def turned(angle):
     return "".join(held(name, x=float(-angle * y), y=float(angle * x)) for name, (x, y) in corners.items())
 
 
+# fmt: off
 DOUBTS = [
     Doubt(
         "too few geometry updates were asked for",
@@ -116,12 +117,8 @@ DOUBTS = [
         ),
         (r"contact 'pair' is lost at the end, after it was closed: the smallest gap is 0\.01",),
     ),
-    Doubt(
-        "contact is never reached",
-        lambda: raised(1.0),
-        of(STEEL, BLOCKS, PAIR),
-        (r"contact 'pair' never closed: the smallest gap is 0\.99\. Check its sides and which way the loads push",),
-    ),
+    Doubt("contact is never reached", lambda: raised(1.0), of(STEEL, BLOCKS, PAIR),
+          (r"contact 'pair' never closed: the smallest gap is 0\.99\. Check its sides and which way the loads push",)),
     Doubt(
         "bodies interpenetrate where no contact is defined",
         lambda: raised(0.001),
@@ -130,12 +127,8 @@ DOUBTS = [
             r"bodies '\w+' and '\w+' interpenetrate by 0\.009 near \[.*\], and no contact is defined between them: add_contact for the groups that meet",
         ),
     ),
-    Doubt(
-        "strains are large",
-        lambda: block((1.0, 1.0), (2, 2)),
-        of(STEEL, held("BOTTOM", x=0.0, y=0.0), held("TOP", y=0.3)),
-        (r"the largest equivalent strain is 0\.\d+, beyond the 0\.1 where linear kinematics hold well",),
-    ),
+    Doubt("strains are large", lambda: block((1.0, 1.0), (2, 2)), of(STEEL, held("BOTTOM", x=0.0, y=0.0), held("TOP", y=0.3)),
+          (r"the largest equivalent strain is 0\.\d+, beyond the 0\.1 where linear kinematics hold well",)),
     Doubt(
         "rotations are large",
         lambda: block((1.0, 1.0), (1, 1)),
@@ -159,18 +152,11 @@ DOUBTS = [
             r"the springs that regularise body 'UPPER': translation along y still carry \d\.\de-\d\d of the load: rigid motions are so much larger than deformations that round-off leaves no more",
         ),
     ),
-    Doubt(
-        "a cell is poor",
-        library.uneven,
-        of(STEEL, held("BOTTOM", x=0.0, y=0.0)),
-        (r"cell \d+ \(tri6 .*\) is poor: its smallest Jacobian is 0\.0\d+ of its largest; move its nodes or remesh",),
-    ),
-    Doubt(
-        "the mesh does not resolve the contact",
-        lambda: generate.half_spheres("tri3", size=5.0),
-        of(STEEL, SPHERES, kinematics="axisymmetric"),
-        (r"contact 'pair' has only \d elements? across its radius: its pressure needs 4 or more; refine 'CONT1'",),
-    ),
+    Doubt("a cell is poor", library.uneven, of(STEEL, held("BOTTOM", x=0.0, y=0.0)),
+          (r"cell \d+ \(tri6 .*\) is poor: its smallest Jacobian is 0\.0\d+ of its largest; move its nodes or remesh",)),
+    Doubt("the mesh does not resolve the contact", lambda: generate.half_spheres("tri3", size=5.0),
+          of(STEEL, SPHERES, kinematics="axisymmetric"),
+          (r"contact 'pair' has only \d elements? across its radius: its pressure needs 4 or more; refine 'CONT1'",)),
     Doubt(
         "the quadrature of the stiffness is not exact",
         bent,
@@ -320,3 +306,4 @@ DOUBTS = [
         ),
     ),
 ]
+# fmt: on

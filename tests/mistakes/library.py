@@ -153,141 +153,58 @@ def empty_group(name):
     return mesh.with_groups(cells={name: []})
 
 
+# fmt: off
 MESH = [
-    Mistake(
-        "a coordinate is NaN",
-        lambda: fc.Mesh(moved(4, (np.nan, 0.5)), {}),
-        fc.MeshError,
-        r"point 4 has coordinates \[nan 0\.5\]: 1 points are not finite numbers",
-    ),
-    Mistake(
-        "a coordinate is infinite",
-        lambda: fc.Mesh(moved(4, (np.inf, 0.5)), {}),
-        fc.MeshError,
-        r"point 4 has coordinates \[inf 0\.5\]",
-    ),
-    Mistake(
-        "coordinates in one dimension",
-        lambda: fc.Mesh([[0.0], [1.0]], {}),
-        fc.MeshError,
-        r"points must have shape \(n_points, 2\) or \(n_points, 3\), not \(2, 1\)",
-    ),
-    Mistake(
-        "a cell names a point that is not there",
-        lambda: fc.Mesh([[0, 0], [1, 0], [0, 1]], {"tri3": [[0, 1, 3]]}),
-        fc.MeshError,
-        r"a cell of tri3 names point 3, but there are 3 points \(0-based\)",
-    ),
-    Mistake(
-        "cells with a node too few",
-        lambda: fc.Mesh([[0, 0], [1, 0], [0, 1]], {"tri3": [[0, 1]]}),
-        fc.MeshError,
-        r"cells of tri3 must have shape \(n_cells, 3\), not \(1, 2\)",
-    ),
-    Mistake(
-        "a group names a cell that is not there",
-        lambda: fc.Mesh([[0, 0], [1, 0], [0, 1]], {"tri3": [[0, 1, 2]]}, {"A": [1]}),
-        fc.MeshError,
-        r"cell group 'A' names cell 1, but there are 1",
-    ),
-    Mistake(
-        "an inverted cell",
-        lambda: of_square(cells=turned),
-        fc.MeshError,
-        r"cell 2 \(quad4 at \(0\.75, 0\.25\), area -0\.25\) is inverted, one of 1 such cells: turn it with mesh, count = fastcontact\.topology\.oriented\(mesh\), or refine if it is curved",
-    ),
+    Mistake("a coordinate is NaN", lambda: fc.Mesh(moved(4, (np.nan, 0.5)), {}), fc.MeshError,
+            r"point 4 has coordinates \[nan 0\.5\]: 1 points are not finite numbers"),
+    Mistake("a coordinate is infinite", lambda: fc.Mesh(moved(4, (np.inf, 0.5)), {}), fc.MeshError,
+            r"point 4 has coordinates \[inf 0\.5\]"),
+    Mistake("coordinates in one dimension", lambda: fc.Mesh([[0.0], [1.0]], {}), fc.MeshError,
+            r"points must have shape \(n_points, 2\) or \(n_points, 3\), not \(2, 1\)"),
+    Mistake("a cell names a point that is not there", lambda: fc.Mesh([[0, 0], [1, 0], [0, 1]], {"tri3": [[0, 1, 3]]}),
+            fc.MeshError, r"a cell of tri3 names point 3, but there are 3 points \(0-based\)"),
+    Mistake("cells with a node too few", lambda: fc.Mesh([[0, 0], [1, 0], [0, 1]], {"tri3": [[0, 1]]}), fc.MeshError,
+            r"cells of tri3 must have shape \(n_cells, 3\), not \(1, 2\)"),
+    Mistake("a group names a cell that is not there",
+            lambda: fc.Mesh([[0, 0], [1, 0], [0, 1]], {"tri3": [[0, 1, 2]]}, {"A": [1]}), fc.MeshError,
+            r"cell group 'A' names cell 1, but there are 1"),
+    Mistake("an inverted cell", lambda: of_square(cells=turned), fc.MeshError,
+            r"cell 2 \(quad4 at \(0\.75, 0\.25\), area -0\.25\) is inverted, one of 1 such cells: turn it with mesh, count = fastcontact\.topology\.oriented\(mesh\), or refine if it is curved"),
     Mistake("a folded cell", lambda: of_square(moved(4, (0.9, 0.9))), fc.MeshError, r"cell 3 .* is inverted"),
-    Mistake(
-        "a folded mesh in space whose cells were turned",
-        lambda: topology.oriented(folded_box()),
-        fc.MeshError,
-        r"cells \d+ and \d+ lie on the same side of the facet between them, near \(.*\), one of \d+ such pairs: the mesh is folded there; move its nodes or remesh",
-    ),
-    Mistake(
-        "a degenerate cell",
-        lambda: fc.Model(fc.Mesh([[0, 0], [1, 0], [2, 0]], {"tri3": [[0, 1, 2]]}), "plane_strain"),
-        fc.MeshError,
-        r"cell 0 \(tri3 at \(1, 0\), area 0\) is degenerate, one of 1 such cells: remove it or merge its points differently",
-    ),
-    Mistake(
-        "a cell stands there twice",
-        lambda: of_square(cells=lambda c: np.vstack([c, c[1]])),
-        fc.MeshError,
-        r"cell 1 \(quad4 at \(0\.25, 0\.75\)\) stands in the mesh 2 times, one of 1 such cells: remove the copies",
-    ),
-    Mistake(
-        "a mesh without groups",
-        lambda: blocks(changed(cell_groups={}, point_groups={})),
-        fc.MeshError,
-        r"the mesh has no groups at all, so none is 'LOWER_BOTTOM': name groups in the mesher, or with Mesh\.with_groups",
-    ),
-    Mistake(
-        "a mesh of facets only",
-        lambda: fc.Model(fc.Mesh([[0, 0], [1, 0]], {"line2": [[0, 1]]}), "plane_strain"),
-        fc.ModelError,
-        r"the mesh has no solid cells, only line2",
-    ),
-    Mistake(
-        "faces in space for a solid",
-        lambda: fc.Model(fc.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 1]], {"tri3": [[0, 1, 2]]}), "3d"),
-        fc.ModelError,
-        r"the mesh has no solid cells, only tri3",
-    ),
-    Mistake(
-        "3D mesh for an axisymmetric model",
-        lambda: fc.Model(generate.box(), "axisymmetric"),
-        fc.ModelError,
-        r"kinematics 'axisymmetric' do not fit a mesh in 3 dimensions: use '3d'",
-    ),
-    Mistake(
-        "nodes at r < 0",
-        lambda: fc.Model(block(origin=(-0.25, 0.0)), "axisymmetric"),
-        fc.ModelError,
-        r"point \d+ has the radius x = -0\.25 < 0: an axisymmetric model lies at x >= 0, with y along the axis",
-    ),
-    Mistake(
-        "nodes that were not merged",
-        lambda: solved(cracked()),
-        fc.FastcontactWarning,
-        r"3 nodes lie where another one is, and no contact joins them \(first: points \d+ and \d+ at \(0\.5, 0\)\): merge them in the mesher or with generate\.transform\.merge_points, or define the contact",
-    ),
-    Mistake(
-        "nodes not merged, one part not held",
-        lambda: solved(square_in_two()),
-        fc.ModelError,
-        r"3 rigid-body motions are not supported: body 'B': translation along x, .*rotation",
-    ),
-    Mistake(
-        "a fine mesh merged with a coarse one",
-        lambda: solved(torn()),
-        fc.FastcontactWarning,
-        r"2 nodes lie on facets of their own body that they do not belong to \(first: point \d+ at \(0\.25, 1\), on the facet around \(0\.25, 1\)\): the body is torn there\. Let cells share whole facets, or leave the two meshes apart and tie them by a contact of kind 'tied'; if a slit is meant, define its contact",
-    ),
-    Mistake(
-        "bodies that hang together at one node",
-        lambda: solved(hanging_together()),
-        fc.ModelError,
-        r"1 rigid-body motion is not supported: body number 1 \(around \[.*\]\), the part 'B_BLOCK' that hangs at point \d+ at \(1, 1\): .*rotation\. Fix or prescribe a displacement component that stops each, or let a load press the body against a contact\. Parts of bodies hang together at 1 nodes only \(first: point \d+ at \(1, 1\)\): merge whole facets there, or leave the parts separate and define the contact",
-    ),
-    Mistake(
-        "a support on a node of no cell",
-        lambda: solved(with_orphan()),
-        fc.ModelError,
-        r"the displacement x prescribed on 'LONE' holds 1 points that belong to no solid cell \(first: point 73\): name a group of the body",
-    ),
-    Mistake(
-        "a cell with an angle near 180 degrees",
-        lambda: solved(flat_cell()),
-        fc.FastcontactWarning,
-        r"cell \d+ \(tri3 .*\) is poor: it has an angle of 17\d\.\d degrees; move its nodes or remesh",
-    ),
-    Mistake(
-        "a cell with a Jacobian near zero",
-        lambda: solved(nearly_folded()),
-        fc.FastcontactWarning,
-        r"cell \d+ \(tri6 .*\) is poor: its smallest Jacobian is 0\.0\d+ of its largest; move its nodes or remesh",
-    ),
+    Mistake("a folded mesh in space whose cells were turned", lambda: topology.oriented(folded_box()), fc.MeshError,
+            r"cells \d+ and \d+ lie on the same side of the facet between them, near \(.*\), one of \d+ such pairs: the mesh is folded there; move its nodes or remesh"),
+    Mistake("a degenerate cell", lambda: fc.Model(fc.Mesh([[0, 0], [1, 0], [2, 0]], {"tri3": [[0, 1, 2]]}), "plane_strain"),
+            fc.MeshError,
+            r"cell 0 \(tri3 at \(1, 0\), area 0\) is degenerate, one of 1 such cells: remove it or merge its points differently"),
+    Mistake("a cell stands there twice", lambda: of_square(cells=lambda c: np.vstack([c, c[1]])), fc.MeshError,
+            r"cell 1 \(quad4 at \(0\.25, 0\.75\)\) stands in the mesh 2 times, one of 1 such cells: remove the copies"),
+    Mistake("a mesh without groups", lambda: blocks(changed(cell_groups={}, point_groups={})), fc.MeshError,
+            r"the mesh has no groups at all, so none is 'LOWER_BOTTOM': name groups in the mesher, or with Mesh\.with_groups"),
+    Mistake("a mesh of facets only", lambda: fc.Model(fc.Mesh([[0, 0], [1, 0]], {"line2": [[0, 1]]}), "plane_strain"),
+            fc.ModelError, r"the mesh has no solid cells, only line2"),
+    Mistake("faces in space for a solid",
+            lambda: fc.Model(fc.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 1]], {"tri3": [[0, 1, 2]]}), "3d"), fc.ModelError,
+            r"the mesh has no solid cells, only tri3"),
+    Mistake("3D mesh for an axisymmetric model", lambda: fc.Model(generate.box(), "axisymmetric"), fc.ModelError,
+            r"kinematics 'axisymmetric' do not fit a mesh in 3 dimensions: use '3d'"),
+    Mistake("nodes at r < 0", lambda: fc.Model(block(origin=(-0.25, 0.0)), "axisymmetric"), fc.ModelError,
+            r"point \d+ has the radius x = -0\.25 < 0: an axisymmetric model lies at x >= 0, with y along the axis"),
+    Mistake("nodes that were not merged", lambda: solved(cracked()), fc.FastcontactWarning,
+            r"3 nodes lie where another one is, and no contact joins them \(first: points \d+ and \d+ at \(0\.5, 0\)\): merge them in the mesher or with generate\.transform\.merge_points, or define the contact"),
+    Mistake("nodes not merged, one part not held", lambda: solved(square_in_two()), fc.ModelError,
+            r"3 rigid-body motions are not supported: body 'B': translation along x, .*rotation"),
+    Mistake("a fine mesh merged with a coarse one", lambda: solved(torn()), fc.FastcontactWarning,
+            r"2 nodes lie on facets of their own body that they do not belong to \(first: point \d+ at \(0\.25, 1\), on the facet around \(0\.25, 1\)\): the body is torn there\. Let cells share whole facets, or leave the two meshes apart and tie them by a contact of kind 'tied'; if a slit is meant, define its contact"),
+    Mistake("bodies that hang together at one node", lambda: solved(hanging_together()), fc.ModelError,
+            r"1 rigid-body motion is not supported: body number 1 \(around \[.*\]\), the part 'B_BLOCK' that hangs at point \d+ at \(1, 1\): .*rotation\. Fix or prescribe a displacement component that stops each, or let a load press the body against a contact\. Parts of bodies hang together at 1 nodes only \(first: point \d+ at \(1, 1\)\): merge whole facets there, or leave the parts separate and define the contact"),
+    Mistake("a support on a node of no cell", lambda: solved(with_orphan()), fc.ModelError,
+            r"the displacement x prescribed on 'LONE' holds 1 points that belong to no solid cell \(first: point 73\): name a group of the body"),
+    Mistake("a cell with an angle near 180 degrees", lambda: solved(flat_cell()), fc.FastcontactWarning,
+            r"cell \d+ \(tri3 .*\) is poor: it has an angle of 17\d\.\d degrees; move its nodes or remesh"),
+    Mistake("a cell with a Jacobian near zero", lambda: solved(nearly_folded()), fc.FastcontactWarning,
+            r"cell \d+ \(tri6 .*\) is poor: its smallest Jacobian is 0\.0\d+ of its largest; move its nodes or remesh"),
 ]
+# fmt: on
 
 
 def folded_box():
@@ -342,86 +259,40 @@ def nearly_folded():
     return model
 
 
+# fmt: off
 MATERIALS = [
-    Mistake(
-        "no material at all",
-        lambda: solved(blocks(materials=False)),
-        fc.ModelError,
-        r"no material: call add_material\(LinearElastic\(E=\.\.\., nu=\.\.\.\)\) for the solid cells",
-    ),
-    Mistake(
-        "one body without a material",
-        lambda: solved(with_materials((1000.0, 0.3, "LOWER"))),
-        fc.ModelError,
-        r"18 solid cells have no material, in 'UPPER': add_material for their groups",
-    ),
-    Mistake(
-        "two materials for one group",
-        lambda: solved(with_materials((1000.0, 0.3, ["LOWER", "UPPER"]), (2000.0, 0.3, "UPPER"))),
-        fc.ModelError,
-        r"18 cells of 'UPPER' have two materials, E = 1000, nu = 0\.3 and E = 2000, nu = 0\.3: give each group one; one for all other cells comes first, without groups",
-    ),
-    Mistake(
-        "a material for all hides one of a group",
-        lambda: solved(with_materials((2000.0, 0.3, "UPPER"), (1000.0, 0.3, None))),
-        fc.ModelError,
-        r"18 cells of the mesh have two materials",
-    ),
-    Mistake(
-        "nu of 0.5 in a call",
-        lambda: fc.LinearElastic(E=1.0, nu=0.5),
-        fc.ModelError,
-        r"Poisson's ratio nu = 0\.5 must lie between -1 and 0\.5, both excluded",
-    ),
-    Mistake(
-        "E of zero in a call",
-        lambda: fc.LinearElastic(E=0.0, nu=0.3),
-        fc.ModelError,
-        r"Young's modulus E = 0\.0 must be a positive number",
-    ),
-    Mistake(
-        "E of one body in Pa, of the other in MPa",
-        lambda: solved(with_materials((2.1e11, 0.3, "LOWER"), (2.1e5, 0.3, "UPPER"))),
-        fc.FastcontactWarning,
-        r"Young's moduli differ by a factor of 1e\+06 \(E = 210000 and 2\.1e\+11\): are both in the same unit\?",
-    ),
-    Mistake(
-        "E in Pa where MPa is named",
-        lambda: solved(with_units(2.1e11, length="mm", pressure="MPa")),
-        fc.FastcontactWarning,
-        r"Young's modulus E = 2\.1e\+11 MPa of all cells is 1\.05e\+05 times that of diamond: is it in another unit\?",
-    ),
-    Mistake(
-        "E in GPa where Pa is named",
-        lambda: solved(with_units(2.1, length="m", pressure="Pa")),
-        fc.FastcontactWarning,
-        r"Young's modulus E = 2\.1 Pa of all cells is 0\.021 times that of aerogel: is it in another unit\?",
-    ),
-    Mistake(
-        "units that do not fit each other",
-        lambda: solved(with_units(2.1e5, length="m", force="N", pressure="MPa")),
-        fc.FastcontactWarning,
-        r"the units do not fit each other: 1 N/m\^2 is 1e-06 MPa; change one of the three",
-    ),
-    Mistake(
-        "E in Pa with a force and mm",
-        lambda: solved(pushed(2.1e11, 1e-2)),
-        fc.FastcontactWarning,
-        r"the loads strain the model by about .*e-1\d \(all forces over E times its size squared\): are loads, lengths and E in one set of units\?",
-    ),
-    Mistake(
-        "a pressure in Pa with E in MPa",
-        lambda: solved(pushed(210.0, 1e5)),
-        fc.FastcontactWarning,
-        r"the loads strain the model by about .*: are loads, lengths and E in one set of units\?",
-    ),
-    Mistake(
-        "a displacement in mm of a model in m",
-        lambda: solved(stretched(4.0)),
-        fc.FastcontactWarning,
-        r"a displacement of 4 is prescribed, 4 times the size of the model \(1\): are mesh and displacement in the same unit\?",
-    ),
+    Mistake("no material at all", lambda: solved(blocks(materials=False)), fc.ModelError,
+            r"no material: call add_material\(LinearElastic\(E=\.\.\., nu=\.\.\.\)\) for the solid cells"),
+    Mistake("one body without a material", lambda: solved(with_materials((1000.0, 0.3, "LOWER"))), fc.ModelError,
+            r"18 solid cells have no material, in 'UPPER': add_material for their groups"),
+    Mistake("two materials for one group",
+            lambda: solved(with_materials((1000.0, 0.3, ["LOWER", "UPPER"]), (2000.0, 0.3, "UPPER"))), fc.ModelError,
+            r"18 cells of 'UPPER' have two materials, E = 1000, nu = 0\.3 and E = 2000, nu = 0\.3: give each group one; one for all other cells comes first, without groups"),
+    Mistake("a material for all hides one of a group",
+            lambda: solved(with_materials((2000.0, 0.3, "UPPER"), (1000.0, 0.3, None))), fc.ModelError,
+            r"18 cells of the mesh have two materials"),
+    Mistake("nu of 0.5 in a call", lambda: fc.LinearElastic(E=1.0, nu=0.5), fc.ModelError,
+            r"Poisson's ratio nu = 0\.5 must lie between -1 and 0\.5, both excluded"),
+    Mistake("E of zero in a call", lambda: fc.LinearElastic(E=0.0, nu=0.3), fc.ModelError,
+            r"Young's modulus E = 0\.0 must be a positive number"),
+    Mistake("E of one body in Pa, of the other in MPa",
+            lambda: solved(with_materials((2.1e11, 0.3, "LOWER"), (2.1e5, 0.3, "UPPER"))), fc.FastcontactWarning,
+            r"Young's moduli differ by a factor of 1e\+06 \(E = 210000 and 2\.1e\+11\): are both in the same unit\?"),
+    Mistake("E in Pa where MPa is named", lambda: solved(with_units(2.1e11, length="mm", pressure="MPa")),
+            fc.FastcontactWarning,
+            r"Young's modulus E = 2\.1e\+11 MPa of all cells is 1\.05e\+05 times that of diamond: is it in another unit\?"),
+    Mistake("E in GPa where Pa is named", lambda: solved(with_units(2.1, length="m", pressure="Pa")), fc.FastcontactWarning,
+            r"Young's modulus E = 2\.1 Pa of all cells is 0\.021 times that of aerogel: is it in another unit\?"),
+    Mistake("units that do not fit each other", lambda: solved(with_units(2.1e5, length="m", force="N", pressure="MPa")),
+            fc.FastcontactWarning, r"the units do not fit each other: 1 N/m\^2 is 1e-06 MPa; change one of the three"),
+    Mistake("E in Pa with a force and mm", lambda: solved(pushed(2.1e11, 1e-2)), fc.FastcontactWarning,
+            r"the loads strain the model by about .*e-1\d \(all forces over E times its size squared\): are loads, lengths and E in one set of units\?"),
+    Mistake("a pressure in Pa with E in MPa", lambda: solved(pushed(210.0, 1e5)), fc.FastcontactWarning,
+            r"the loads strain the model by about .*: are loads, lengths and E in one set of units\?"),
+    Mistake("a displacement in mm of a model in m", lambda: solved(stretched(4.0)), fc.FastcontactWarning,
+            r"a displacement of 4 is prescribed, 4 times the size of the model \(1\): are mesh and displacement in the same unit\?"),
 ]
+# fmt: on
 
 
 def pushed(E, pressure):
@@ -438,62 +309,30 @@ def stretched(length):
     return model
 
 
+# fmt: off
 SUPPORTS = [
-    Mistake(
-        "no support at all",
-        lambda: solved(blocks(supports=False)),
-        fc.ModelError,
-        r"4 rigid-body motions are not supported: body 'LOWER': translation along y with rotation, translation along x; body 'UPPER': ",
-    ),
-    Mistake(
-        "one body free to slide",
-        lambda: solved(sliding()),
-        fc.ModelError,
-        r"1 rigid-body motion is not supported: body 'UPPER': translation along x\. Fix or prescribe a displacement component that stops each",
-    ),
-    Mistake(
-        "a plate held at one point",
-        lambda: solved(square(BOTTOM_LEFT="xy")),
-        fc.ModelError,
-        r"1 rigid-body motion is not supported: body 'BLOCK': .*rotation",
-    ),
-    Mistake(
-        "supports that contradict each other",
-        lambda: solved(contradicting()),
-        fc.ModelError,
-        r"'UPPER_TOP' prescribes y = 0\.5 at point \d+, but 'UPPER_TOP' prescribes -0\.01 there: remove one of the two",
-    ),
-    Mistake(
-        "a support without a component",
-        lambda: blocks().fix("LOWER_LEFT", ""),
-        fc.ModelError,
-        r"fix\('LOWER_LEFT', \.\.\.\) names no component: give for example 'x' or 'xy'",
-    ),
-    Mistake(
-        "a support on an empty group",
-        lambda: blocks(empty_group("NONE")).fix("NONE", "x"),
-        fc.ModelError,
-        r"group 'NONE' is empty: no displacement can be prescribed on it",
-    ),
-    Mistake(
-        "a support in z of a plane model",
-        lambda: blocks().fix("LOWER_LEFT", "z"),
-        fc.ModelError,
-        r"prescribe\('LOWER_LEFT'\): unknown component 'z': known are x, y",
-    ),
-    Mistake(
-        "a support that moves the axis of symmetry",
-        lambda: solved(on_axis(lambda model: model.prescribe("TOP", x=0.1))),
-        fc.ModelError,
-        r"x = 0\.1 is prescribed at point \d+ on the axis of symmetry, where the radial displacement is zero: leave the points at x = 0 out of the group",
-    ),
-    Mistake(
-        "a radial force on the axis of symmetry",
-        lambda: on_axis(lambda model: model.add_force("TOP_LEFT", x=1.0)),
-        fc.ModelError,
-        r"the nodal force on 'TOP_LEFT' has a radial component x at 1 points on the axis of symmetry \(first: point \d+\), where the circle that it acts along has no length: leave the points at x = 0 out",
-    ),
+    Mistake("no support at all", lambda: solved(blocks(supports=False)), fc.ModelError,
+            r"4 rigid-body motions are not supported: body 'LOWER': translation along y with rotation, translation along x; body 'UPPER': "),
+    Mistake("one body free to slide", lambda: solved(sliding()), fc.ModelError,
+            r"1 rigid-body motion is not supported: body 'UPPER': translation along x\. Fix or prescribe a displacement component that stops each"),
+    Mistake("a plate held at one point", lambda: solved(square(BOTTOM_LEFT="xy")), fc.ModelError,
+            r"1 rigid-body motion is not supported: body 'BLOCK': .*rotation"),
+    Mistake("supports that contradict each other", lambda: solved(contradicting()), fc.ModelError,
+            r"'UPPER_TOP' prescribes y = 0\.5 at point \d+, but 'UPPER_TOP' prescribes -0\.01 there: remove one of the two"),
+    Mistake("a support without a component", lambda: blocks().fix("LOWER_LEFT", ""), fc.ModelError,
+            r"fix\('LOWER_LEFT', \.\.\.\) names no component: give for example 'x' or 'xy'"),
+    Mistake("a support on an empty group", lambda: blocks(empty_group("NONE")).fix("NONE", "x"), fc.ModelError,
+            r"group 'NONE' is empty: no displacement can be prescribed on it"),
+    Mistake("a support in z of a plane model", lambda: blocks().fix("LOWER_LEFT", "z"), fc.ModelError,
+            r"prescribe\('LOWER_LEFT'\): unknown component 'z': known are x, y"),
+    Mistake("a support that moves the axis of symmetry", lambda: solved(on_axis(lambda model: model.prescribe("TOP", x=0.1))),
+            fc.ModelError,
+            r"x = 0\.1 is prescribed at point \d+ on the axis of symmetry, where the radial displacement is zero: leave the points at x = 0 out of the group"),
+    Mistake("a radial force on the axis of symmetry", lambda: on_axis(lambda model: model.add_force("TOP_LEFT", x=1.0)),
+            fc.ModelError,
+            r"the nodal force on 'TOP_LEFT' has a radial component x at 1 points on the axis of symmetry \(first: point \d+\), where the circle that it acts along has no length: leave the points at x = 0 out"),
 ]
+# fmt: on
 
 
 def on_axis(add):
@@ -547,148 +386,61 @@ def corner_pushed():
     return model
 
 
+# fmt: off
 CONTACT = [
-    Mistake(
-        "contact on the wrong face",
-        lambda: pair_of("UPPER_TOP", "CONT_LOWER"),
-        fc.ContactError,
-        r"no facet of 'UPPER_TOP' faces 'CONT_LOWER': the outer sides of the two groups look away from each other; is one of them the wrong face of its body\?",
-    ),
-    Mistake(
-        "contact of an empty group",
-        lambda: blocks(empty_group("NONE"), contact=False).add_contact("pair", secondary="NONE", primary="CONT_LOWER"),
-        fc.ContactError,
-        r"group 'NONE' holds no facets \(cells of dimension 1\): name a boundary group",
-    ),
-    Mistake(
-        "contact inside a body",
-        lambda: inner_contact(),
-        fc.ContactError,
-        r"1 of 1 facets of 'INNER' do not lie on the outside of a solid \(first near \[.*\]\): contact needs boundary facets that share their nodes with solid cells",
-    ),
-    Mistake(
-        "one group on both sides",
-        lambda: pair_of("CONT_UPPER", "CONT_UPPER"),
-        fc.ContactError,
-        r"contact 'pair' has 'CONT_UPPER' on both sides: name the group of the other body as one of them",
-    ),
-    Mistake(
-        "sides that overlap",
-        lambda: pair_of("UPPER_LEFT", "CONT_UPPER"),
-        fc.ContactError,
-        r"the two sides of contact 'pair' share 1 nodes \(first: point \d+\): duplicate the nodes of the interface, one set for each side",
-    ),
-    Mistake(
-        "the same pair twice",
-        lambda: blocks().add_contact("again", secondary="CONT_LOWER", primary="CONT_UPPER"),
-        fc.ContactError,
-        r"contact 'again' joins 'CONT_LOWER' and 'CONT_UPPER', which contact 'pair' joins already: leave out one of the two",
-    ),
-    Mistake(
-        "two pairs over the same facets",
-        lambda: pairs_overlap(),
-        fc.ContactError,
-        r"contact 'some' joins facets of 'SOME' and 'CONT_LOWER' that contact 'pair' joins already: 'SOME' and 'CONT_UPPER' share facets with 2 nodes \(first: point \d+\), 'CONT_LOWER' and 'CONT_LOWER' share facets, too\. Leave out one of the two contacts, or make their groups apart",
-    ),
-    Mistake(
-        "one surface in two groups with a contact each",
-        lambda: solved(split_in_two()),
-        fc.FastcontactWarning,
-        r"contacts 'left' and 'right' go on in each other at 1 common nodes of their sides \(first: point \d+\): the pressure near these is not unique; make one contact of both, with one group for each side",
-    ),
-    Mistake(
-        "the same obstacle twice",
-        lambda: with_obstacle(1.0).add_obstacle(
-            "again", secondary="TOP", obstacle=fc.obstacles.HalfSpace((2.0, 1.0), (0.0, -2.0)), motion={"y": -0.01}
-        ),
-        fc.ContactError,
-        r"contact 'again' presses facets of 'TOP' on the rigid obstacle on which contact 'plane' presses them already, with 3 nodes \(first: point \d+\): leave out one of the two",
-    ),
-    Mistake(
-        "two pairs of one name",
-        lambda: blocks().add_contact("pair", secondary="UPPER_LEFT", primary="LOWER_RIGHT"),
-        fc.ContactError,
-        r"there is already a contact pair 'pair': names must differ",
-    ),
-    Mistake(
-        "supports that push one side into the other",
-        lambda: solved(pushed_into_each_other()),
-        fc.ModelError,
-        r"supports push 7 of the 7 nodes of 'CONT_UPPER' into 'CONT_LOWER', contact 'pair', by up to 0\.02 \(point \d+ at \(0, 0\), instant 1\): contact forces cannot change what supports prescribe; prescribe other values, or the displacement of nodes that are not in contact",
-    ),
-    Mistake(
-        "a support that pushes a corner into an obstacle",
-        lambda: solved(corner_pushed()),
-        fc.FastcontactWarning,
-        r"supports push 1 of the 3 nodes of 'TOP' into the rigid obstacle, contact 'plane', by up to 0\.01 \(point \d+ at \(0, 1\), instant 1\): contact forces cannot change what supports prescribe; leave these nodes out of the support, or out of the contact \('excluded'\)",
-    ),
-    Mistake(
-        "a penetration larger than an element",
-        lambda: solved(blocks(changed(shift=-2.0))),
-        fc.ContactError,
-        r"no facet of 'CONT_UPPER' faces 'CONT_LOWER': the outer sides of the two groups look away from each other; is one of them the wrong face of its body, or do the bodies lie inside each other, by 2 or more\?",
-    ),
-    Mistake(
-        "an obstacle that is inside out",
-        lambda: solved(with_obstacle(1.0, (0.0, 1.0))),
-        fc.ContactError,
-        r"the rigid obstacle of contact 'plane' looks the same way as 'TOP', so that they cannot touch: turn its normal or its facets round, or name another face of the body",
-    ),
-    Mistake(
-        "an obstacle deep in the body",
-        lambda: solved(with_obstacle(0.2)),
-        fc.ContactError,
-        r"contact 'plane' begins with a penetration of 0\.8 at point \d+ \[.*\], more than the element there is long \(0\.5\): move a body apart, turn a surface that is inside out, or give an interference that is meant as clearance",
-    ),
-    Mistake(
-        "a contact that is never reached",
-        lambda: solved(blocks(changed(shift=1.0))),
-        fc.FastcontactWarning,
-        r"contact 'pair' never closed: the smallest gap is 0\.99\. Check its sides and which way the loads push",
-    ),
-    Mistake(
-        "a pair was forgotten",
-        lambda: solved(blocks(changed(shift=0.001), contact=False)),
-        fc.FastcontactWarning,
-        r"bodies '(UPPER|LOWER)' and '(UPPER|LOWER)' interpenetrate by 0\.009 near \[.*\], and no contact is defined between them: add_contact for the groups that meet",
-    ),
-    Mistake(
-        "bodies overlap and no pair joins them",
-        lambda: solved(blocks(changed(shift=-2.0), contact=False)),
-        fc.ModelError,
-        r"body '\w+' overlaps body '\w+' by .* before any load, and no contact pair joins them: add the contact or move one of them",
-    ),
-    Mistake(
-        "friction that is negative",
-        lambda: pair_of("CONT_UPPER", "CONT_LOWER", friction=-0.1),
-        fc.ContactError,
-        r"the coefficient of friction -0\.1 must be a number >= 0",
-    ),
-    Mistake(
-        "tied with a penalty",
-        lambda: pair_of("CONT_UPPER", "CONT_LOWER", kind="tied", penalty=1.0),
-        fc.ContactError,
-        r"contact 'pair' is tied, which keeps the sides as they lie, exactly: leave out 'penalty'",
-    ),
-    Mistake(
-        "a penalty of zero",
-        lambda: pair_of("CONT_UPPER", "CONT_LOWER", penalty=0.0),
-        fc.ContactError,
-        r"penalty = 0\.0 of contact 'pair' must be positive; leave it out for no penetration",
-    ),
-    Mistake(
-        "all nodes excluded",
-        lambda: pair_of("CONT_UPPER", "CONT_LOWER", excluded="CONT_UPPER"),
-        fc.ContactError,
-        r"contact 'pair' excludes all nodes of 'CONT_UPPER': nothing is left to touch",
-    ),
-    Mistake(
-        "bodies pulled apart by a force",
-        lambda: solved(lifted()),
-        fc.ConvergenceError,
-        r"the loads pull bodies away, no contact stops them \(.*; resultant up to 10\): reverse the loads or add supports \(step 1 from 0 to 1\)",
-    ),
+    Mistake("contact on the wrong face", lambda: pair_of("UPPER_TOP", "CONT_LOWER"), fc.ContactError,
+            r"no facet of 'UPPER_TOP' faces 'CONT_LOWER': the outer sides of the two groups look away from each other; is one of them the wrong face of its body\?"),
+    Mistake("contact of an empty group",
+            lambda: blocks(empty_group("NONE"), contact=False).add_contact("pair", secondary="NONE", primary="CONT_LOWER"),
+            fc.ContactError, r"group 'NONE' holds no facets \(cells of dimension 1\): name a boundary group"),
+    Mistake("contact inside a body", lambda: inner_contact(), fc.ContactError,
+            r"1 of 1 facets of 'INNER' do not lie on the outside of a solid \(first near \[.*\]\): contact needs boundary facets that share their nodes with solid cells"),
+    Mistake("one group on both sides", lambda: pair_of("CONT_UPPER", "CONT_UPPER"), fc.ContactError,
+            r"contact 'pair' has 'CONT_UPPER' on both sides: name the group of the other body as one of them"),
+    Mistake("sides that overlap", lambda: pair_of("UPPER_LEFT", "CONT_UPPER"), fc.ContactError,
+            r"the two sides of contact 'pair' share 1 nodes \(first: point \d+\): duplicate the nodes of the interface, one set for each side"),
+    Mistake("the same pair twice", lambda: blocks().add_contact("again", secondary="CONT_LOWER", primary="CONT_UPPER"),
+            fc.ContactError,
+            r"contact 'again' joins 'CONT_LOWER' and 'CONT_UPPER', which contact 'pair' joins already: leave out one of the two"),
+    Mistake("two pairs over the same facets", lambda: pairs_overlap(), fc.ContactError,
+            r"contact 'some' joins facets of 'SOME' and 'CONT_LOWER' that contact 'pair' joins already: 'SOME' and 'CONT_UPPER' share facets with 2 nodes \(first: point \d+\), 'CONT_LOWER' and 'CONT_LOWER' share facets, too\. Leave out one of the two contacts, or make their groups apart"),
+    Mistake("one surface in two groups with a contact each", lambda: solved(split_in_two()), fc.FastcontactWarning,
+            r"contacts 'left' and 'right' go on in each other at 1 common nodes of their sides \(first: point \d+\): the pressure near these is not unique; make one contact of both, with one group for each side"),
+    Mistake("the same obstacle twice",
+            lambda: with_obstacle(1.0).add_obstacle("again", secondary="TOP", obstacle=fc.obstacles.HalfSpace((2.0, 1.0), (0.0, -2.0)), motion={"y": -0.01} ),
+            fc.ContactError,
+            r"contact 'again' presses facets of 'TOP' on the rigid obstacle on which contact 'plane' presses them already, with 3 nodes \(first: point \d+\): leave out one of the two"),
+    Mistake("two pairs of one name", lambda: blocks().add_contact("pair", secondary="UPPER_LEFT", primary="LOWER_RIGHT"),
+            fc.ContactError, r"there is already a contact pair 'pair': names must differ"),
+    Mistake("supports that push one side into the other", lambda: solved(pushed_into_each_other()), fc.ModelError,
+            r"supports push 7 of the 7 nodes of 'CONT_UPPER' into 'CONT_LOWER', contact 'pair', by up to 0\.02 \(point \d+ at \(0, 0\), instant 1\): contact forces cannot change what supports prescribe; prescribe other values, or the displacement of nodes that are not in contact"),
+    Mistake("a support that pushes a corner into an obstacle", lambda: solved(corner_pushed()), fc.FastcontactWarning,
+            r"supports push 1 of the 3 nodes of 'TOP' into the rigid obstacle, contact 'plane', by up to 0\.01 \(point \d+ at \(0, 1\), instant 1\): contact forces cannot change what supports prescribe; leave these nodes out of the support, or out of the contact \('excluded'\)"),
+    Mistake("a penetration larger than an element", lambda: solved(blocks(changed(shift=-2.0))), fc.ContactError,
+            r"no facet of 'CONT_UPPER' faces 'CONT_LOWER': the outer sides of the two groups look away from each other; is one of them the wrong face of its body, or do the bodies lie inside each other, by 2 or more\?"),
+    Mistake("an obstacle that is inside out", lambda: solved(with_obstacle(1.0, (0.0, 1.0))), fc.ContactError,
+            r"the rigid obstacle of contact 'plane' looks the same way as 'TOP', so that they cannot touch: turn its normal or its facets round, or name another face of the body"),
+    Mistake("an obstacle deep in the body", lambda: solved(with_obstacle(0.2)), fc.ContactError,
+            r"contact 'plane' begins with a penetration of 0\.8 at point \d+ \[.*\], more than the element there is long \(0\.5\): move a body apart, turn a surface that is inside out, or give an interference that is meant as clearance"),
+    Mistake("a contact that is never reached", lambda: solved(blocks(changed(shift=1.0))), fc.FastcontactWarning,
+            r"contact 'pair' never closed: the smallest gap is 0\.99\. Check its sides and which way the loads push"),
+    Mistake("a pair was forgotten", lambda: solved(blocks(changed(shift=0.001), contact=False)), fc.FastcontactWarning,
+            r"bodies '(UPPER|LOWER)' and '(UPPER|LOWER)' interpenetrate by 0\.009 near \[.*\], and no contact is defined between them: add_contact for the groups that meet"),
+    Mistake("bodies overlap and no pair joins them", lambda: solved(blocks(changed(shift=-2.0), contact=False)),
+            fc.ModelError,
+            r"body '\w+' overlaps body '\w+' by .* before any load, and no contact pair joins them: add the contact or move one of them"),
+    Mistake("friction that is negative", lambda: pair_of("CONT_UPPER", "CONT_LOWER", friction=-0.1), fc.ContactError,
+            r"the coefficient of friction -0\.1 must be a number >= 0"),
+    Mistake("tied with a penalty", lambda: pair_of("CONT_UPPER", "CONT_LOWER", kind="tied", penalty=1.0), fc.ContactError,
+            r"contact 'pair' is tied, which keeps the sides as they lie, exactly: leave out 'penalty'"),
+    Mistake("a penalty of zero", lambda: pair_of("CONT_UPPER", "CONT_LOWER", penalty=0.0), fc.ContactError,
+            r"penalty = 0\.0 of contact 'pair' must be positive; leave it out for no penetration"),
+    Mistake("all nodes excluded", lambda: pair_of("CONT_UPPER", "CONT_LOWER", excluded="CONT_UPPER"), fc.ContactError,
+            r"contact 'pair' excludes all nodes of 'CONT_UPPER': nothing is left to touch"),
+    Mistake("bodies pulled apart by a force", lambda: solved(lifted()), fc.ConvergenceError,
+            r"the loads pull bodies away, no contact stops them \(.*; resultant up to 10\): reverse the loads or add supports \(step 1 from 0 to 1\)"),
 ]
+# fmt: on
 
 
 def pair_of(secondary, primary, **options):
@@ -715,68 +467,36 @@ def lifted():
     return model
 
 
+# fmt: off
 LOADS = [
-    Mistake(
-        "a pressure on points",
-        lambda: with_load("add_pressure", group="UPPER_TOP_LEFT", value=1.0),
-        fc.ModelError,
-        r"group 'UPPER_TOP_LEFT' holds points only: this load needs a group of facets",
-    ),
-    Mistake(
-        "a pressure that is NaN",
-        lambda: with_load("add_pressure", group="UPPER_LEFT", value=np.nan),
-        fc.ModelError,
-        r"the pressure on 'UPPER_LEFT' is nan, which is not a finite number",
-    ),
-    Mistake(
-        "a function that returns the wrong shape",
-        lambda: solved(with_load("add_pressure", group="UPPER_LEFT", value=lambda x: x)),
-        fc.ModelError,
-        r"the pressure on 'UPPER_LEFT' is a function that returned float64 numbers of shape \(\d+, 2\) for \d+ points: it must return one real number a point",
-    ),
-    Mistake(
-        "a load that varies within an element",
-        lambda: solved(with_load("add_traction", group="UPPER_RIGHT", x=lambda x: np.sin(40.0 * x[:, 1]))),
-        fc.FastcontactWarning,
-        r"the traction on 'UPPER_RIGHT' varies within single elements, so that its quadrature is not exact: it is off by \d+\.\d+% of the whole; refine the mesh there",
-    ),
-    Mistake(
-        "a force where the displacement is prescribed",
-        lambda: solved(with_load("add_force", group="UPPER_TOP", y=-10.0)),
-        fc.FastcontactWarning,
-        r"the total force on 'UPPER_TOP' acts on \d+ points whose displacement is prescribed in its direction: all of it goes into the supports\. Load other points, or leave out the support",
-    ),
-    Mistake(
-        "a force on an empty group",
-        lambda: blocks(empty_group("NONE")).add_force("NONE", x=1.0),
-        fc.ModelError,
-        r"group 'NONE' is empty: no force can act on it",
-    ),
-    Mistake(
-        "a body force on facets",
-        lambda: with_load("add_body_force", groups="UPPER_TOP", y=-1.0),
-        fc.ModelError,
-        r"group 'UPPER_TOP' holds no solid cells: no body force can act on it",
-    ),
-    Mistake(
-        "a radial force in axisymmetry",
-        lambda: radial(),
-        fc.ModelError,
-        r"the total force on 'RIGHT' has a radial component x, but radial forces cancel over the full circle: use add_pressure or add_traction for a radial load",
-    ),
-    Mistake(
-        "a spring that pulls backwards",
-        lambda: with_load("add_spring", group="UPPER_TOP_LEFT", x=-1.0),
-        fc.ModelError,
-        r"stiffness",
-    ),
-    Mistake(
-        "a spring as a rigid link",
-        lambda: fc.solve(with_load("add_spring", group="UPPER_TOP_LEFT", to="LOWER_BOTTOM_LEFT", y=1e30), 1),
-        fc.ModelError,
-        r"the spring between 'UPPER_TOP_LEFT' and 'LOWER_BOTTOM_LEFT' is 1\.\de\+27 times as stiff as the body at one of its ends \(\d+\): no digit would be left of results; take \de\+06 or less, or a relation \(relate, relate_groups\), which is rigid and exact",
-    ),
+    Mistake("a pressure on points", lambda: with_load("add_pressure", group="UPPER_TOP_LEFT", value=1.0), fc.ModelError,
+            r"group 'UPPER_TOP_LEFT' holds points only: this load needs a group of facets"),
+    Mistake("a pressure that is NaN", lambda: with_load("add_pressure", group="UPPER_LEFT", value=np.nan), fc.ModelError,
+            r"the pressure on 'UPPER_LEFT' is nan, which is not a finite number"),
+    Mistake("a function that returns the wrong shape",
+            lambda: solved(with_load("add_pressure", group="UPPER_LEFT", value=lambda x: x)), fc.ModelError,
+            r"the pressure on 'UPPER_LEFT' is a function that returned float64 numbers of shape \(\d+, 2\) for \d+ points: it must return one real number a point"),
+    Mistake("a load that varies within an element",
+            lambda: solved(with_load("add_traction", group="UPPER_RIGHT", x=lambda x: np.sin(40.0 * x[:, 1]))),
+            fc.FastcontactWarning,
+            r"the traction on 'UPPER_RIGHT' varies within single elements, so that its quadrature is not exact: it is off by \d+\.\d+% of the whole; refine the mesh there"),
+    Mistake("a force where the displacement is prescribed",
+            lambda: solved(with_load("add_force", group="UPPER_TOP", y=-10.0)), fc.FastcontactWarning,
+            r"the total force on 'UPPER_TOP' acts on \d+ points whose displacement is prescribed in its direction: all of it goes into the supports\. Load other points, or leave out the support"),
+    Mistake("a force on an empty group", lambda: blocks(empty_group("NONE")).add_force("NONE", x=1.0), fc.ModelError,
+            r"group 'NONE' is empty: no force can act on it"),
+    Mistake("a body force on facets", lambda: with_load("add_body_force", groups="UPPER_TOP", y=-1.0), fc.ModelError,
+            r"group 'UPPER_TOP' holds no solid cells: no body force can act on it"),
+    Mistake("a radial force in axisymmetry", lambda: radial(), fc.ModelError,
+            r"the total force on 'RIGHT' has a radial component x, but radial forces cancel over the full circle: use add_pressure or add_traction for a radial load"),
+    Mistake("a spring that pulls backwards", lambda: with_load("add_spring", group="UPPER_TOP_LEFT", x=-1.0), fc.ModelError,
+            r"stiffness"),
+    Mistake("a spring as a rigid link",
+            lambda: fc.solve(with_load("add_spring", group="UPPER_TOP_LEFT", to="LOWER_BOTTOM_LEFT", y=1e30), 1),
+            fc.ModelError,
+            r"the spring between 'UPPER_TOP_LEFT' and 'LOWER_BOTTOM_LEFT' is 1\.\de\+27 times as stiff as the body at one of its ends \(\d+\): no digit would be left of results; take \de\+06 or less, or a relation \(relate, relate_groups\), which is rigid and exact"),
 ]
+# fmt: on
 
 
 def radial():
@@ -784,50 +504,24 @@ def radial():
     model.add_force("RIGHT", x=1.0)
 
 
+# fmt: off
 RAMP = [
-    Mistake(
-        "no load step asked for",
-        lambda: fc.linear_ramp(0),
-        fc.ModelError,
-        r"the number of load steps must be a positive whole number, not 0",
-    ),
-    Mistake(
-        "a ramp that ends at zero",
-        lambda: fc.linear_ramp(2, end=0.0),
-        fc.ModelError,
-        r"the ramp must end at a positive load factor, not 0\.0",
-    ),
-    Mistake(
-        "instants that do not ascend",
-        lambda: fc.Ramp((0.5, 0.2)),
-        fc.ModelError,
-        r"the instants of the ramp must ascend, not \(0\.5, 0\.2\)",
-    ),
-    Mistake(
-        "a ramp without instants",
-        lambda: fc.Ramp(()),
-        fc.ModelError,
-        r"the ramp has no instants: give at least one load factor to solve at",
-    ),
-    Mistake(
-        "an instant beyond the table",
-        lambda: fc.Ramp((0.5, 2.0)),
-        fc.ModelError,
-        r"instant 2 lies outside the table of the ramp, which covers 0 to 1",
-    ),
-    Mistake(
-        "a table with NaN",
-        lambda: fc.Ramp((1.0,), ((0.0, 0.0), (1.0, np.nan))),
-        fc.ModelError,
-        r"the table of the ramp holds a number that is not finite",
-    ),
-    Mistake(
-        "a history shorter than the analysis",
-        lambda: solved(short_history()),
-        fc.ModelError,
-        r"the ramp of the displacement x prescribed on 'LOWER_LEFT' covers 0 to 0\.5, but the analysis has the instant 1: extend the table",
-    ),
+    Mistake("no load step asked for", lambda: fc.linear_ramp(0), fc.ModelError,
+            r"the number of load steps must be a positive whole number, not 0"),
+    Mistake("a ramp that ends at zero", lambda: fc.linear_ramp(2, end=0.0), fc.ModelError,
+            r"the ramp must end at a positive load factor, not 0\.0"),
+    Mistake("instants that do not ascend", lambda: fc.Ramp((0.5, 0.2)), fc.ModelError,
+            r"the instants of the ramp must ascend, not \(0\.5, 0\.2\)"),
+    Mistake("a ramp without instants", lambda: fc.Ramp(()), fc.ModelError,
+            r"the ramp has no instants: give at least one load factor to solve at"),
+    Mistake("an instant beyond the table", lambda: fc.Ramp((0.5, 2.0)), fc.ModelError,
+            r"instant 2 lies outside the table of the ramp, which covers 0 to 1"),
+    Mistake("a table with NaN", lambda: fc.Ramp((1.0,), ((0.0, 0.0), (1.0, np.nan))), fc.ModelError,
+            r"the table of the ramp holds a number that is not finite"),
+    Mistake("a history shorter than the analysis", lambda: solved(short_history()), fc.ModelError,
+            r"the ramp of the displacement x prescribed on 'LOWER_LEFT' covers 0 to 0\.5, but the analysis has the instant 1: extend the table"),
 ]
+# fmt: on
 
 
 def short_history():
@@ -836,50 +530,24 @@ def short_history():
     return model
 
 
+# fmt: off
 OPTIONS = [
-    Mistake(
-        "a linear solver that is not there",
-        lambda: solved(blocks(), linear_solver="direkt"),
-        fc.ModelError,
-        r"unknown linear solver 'direkt': did you mean 'direct'",
-    ),
-    Mistake(
-        "a tolerance that lets anything pass",
-        lambda: solved(blocks(), linear_tolerance=10.0),
-        fc.ModelError,
-        r"the tolerance 10\.0 of the linear solver must be positive and at most 0\.001, such as 1e-10",
-    ),
-    Mistake(
-        "a criterion of zero",
-        lambda: fc.Criteria(relative=0.0),
-        fc.ModelError,
-        r"the convergence criterion relative = 0\.0 must be positive and at most 0\.01: beyond that nothing has converged",
-    ),
-    Mistake(
-        "a criterion that lets anything pass",
-        lambda: fc.Criteria(geometry=1e3),
-        fc.ModelError,
-        r"the convergence criterion geometry = 1000\.0 must be positive and at most 0\.01: beyond that nothing has converged",
-    ),
-    Mistake(
-        "a negative limit of updates",
-        lambda: fc.Criteria(max_geometry_updates=-1),
-        fc.ModelError,
-        r"max_geometry_updates = -1 must be a whole number >= 0",
-    ),
-    Mistake(
-        "a negative number of halvings",
-        lambda: fc.Criteria(max_halvings=-1),
-        fc.ModelError,
-        r"max_halvings = -1 must be a whole number >= 0",
-    ),
-    Mistake(
-        "a negative number of updates",
-        lambda: fc.Criteria(geometry_updates=-2),
-        fc.ModelError,
-        r"geometry_updates = -2 must be None or a whole number >= 0",
-    ),
+    Mistake("a linear solver that is not there", lambda: solved(blocks(), linear_solver="direkt"), fc.ModelError,
+            r"unknown linear solver 'direkt': did you mean 'direct'"),
+    Mistake("a tolerance that lets anything pass", lambda: solved(blocks(), linear_tolerance=10.0), fc.ModelError,
+            r"the tolerance 10\.0 of the linear solver must be positive and at most 0\.001, such as 1e-10"),
+    Mistake("a criterion of zero", lambda: fc.Criteria(relative=0.0), fc.ModelError,
+            r"the convergence criterion relative = 0\.0 must be positive and at most 0\.01: beyond that nothing has converged"),
+    Mistake("a criterion that lets anything pass", lambda: fc.Criteria(geometry=1e3), fc.ModelError,
+            r"the convergence criterion geometry = 1000\.0 must be positive and at most 0\.01: beyond that nothing has converged"),
+    Mistake("a negative limit of updates", lambda: fc.Criteria(max_geometry_updates=-1), fc.ModelError,
+            r"max_geometry_updates = -1 must be a whole number >= 0"),
+    Mistake("a negative number of halvings", lambda: fc.Criteria(max_halvings=-1), fc.ModelError,
+            r"max_halvings = -1 must be a whole number >= 0"),
+    Mistake("a negative number of updates", lambda: fc.Criteria(geometry_updates=-2), fc.ModelError,
+            r"geometry_updates = -2 must be None or a whole number >= 0"),
 ]
+# fmt: on
 
 MISTAKES = [*MESH, *MATERIALS, *SUPPORTS, *CONTACT, *LOADS, *RAMP, *OPTIONS]
 # Warnings that only the solution can tell; all others come before any numerics.
