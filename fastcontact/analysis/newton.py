@@ -30,6 +30,8 @@ log = logging.getLogger("fastcontact")
 Array = NDArray[np.float64]
 # Newton iterations of a load step, and how often one is halved where it turns cells inside out.
 MOST, HALVINGS = 40, 6
+# Trials of a line search, what it takes for an overshot of the slope at the beginning, and the least part of the way to go.
+SEARCHES, OVERSHOT, LEAST = 3, 0.8, 0.1
 # Iterations after which the change of the displacement must have fallen at least once by the factor.
 PATIENCE, FALL = 12, 0.5
 # Contact geometry of the linearised bodies settles to this part of the last relative change of the displacement.
@@ -100,12 +102,16 @@ def _iterated(problem: Problem, start: State, load: StepLoad, expected: float, p
     u, bodies, changes = place, problem.deformed(place, start), [1.0]
     for _ in range(MOST):
         settled, target, force = _solve(problem, start, load, (bodies, u), iterate, (expected, changes[-1]))
-        before, (u, bodies, whole) = u, _reach(problem, start, u, target)
+        before, here = u, bodies
+        u, bodies, part = _reach(problem, start, u, target)
+        balanced = _balanced(problem, start, load, (u, bodies), force)
+        if history and part == 1.0 and balanced.excess > 1.0:
+            u, bodies, part = _searched(problem, start, load, (before, here), (u, bodies), force)
+            balanced = _balanced(problem, start, load, (u, bodies), force) if part < 1.0 else balanced
         moved, size = largest_difference(u, before), max(largest(u), largest(load.lift))
-        balanced = balance(problem, u, force, load.force, start.largest_force, problem.internal(bodies, u, load))
         changes.append(moved / size if size else 0.0)
-        history.append(_told(iterate, changes[-1], balanced, whole))
-        if whole and balanced.excess <= 1.0 and (_still(problem, changes) or moved <= start.gap_round_off):
+        history.append(_told(iterate, changes[-1], balanced, part))
+        if part == 1.0 and balanced.excess <= 1.0 and (_still(problem, changes) or moved <= start.gap_round_off):
             return NewtonSolution(settled, u, balanced, bodies, history)
         if len(changes) > PATIENCE and min(changes[-PATIENCE:]) > FALL * min(changes[:-PATIENCE]):
             break
@@ -114,6 +120,15 @@ def _iterated(problem: Problem, start: State, load: StepLoad, expected: float, p
         f"its largest component and forces are out of balance by {balanced.relative:.1e}; take smaller load steps",
         history,
     )
+
+
+def _balanced(
+    problem: Problem, start: State, load: StepLoad, at: tuple[Array, DeformedBodies], contact_force: Array
+) -> Balance:
+    """Return the balance of forces at displacements (n_dofs,) [length]."""
+    u, bodies = at
+    internal = problem.internal(bodies, u, load)
+    return balance(problem, u, contact_force, load.force, start.largest_force, internal)
 
 
 def _still(problem: Problem, changes: list[float]) -> bool:
@@ -163,8 +178,8 @@ def _linear_contact(
     return settled, *solve_displacements(tangent, start, linear, loaded, settled)
 
 
-def _reach(problem: Problem, start: State, u: Array, target: Array) -> tuple[Array, DeformedBodies, bool]:
-    """Return the displacements to go on from, the bodies there, and whether they are the `target` (n_dofs,) [length].
+def _reach(problem: Problem, start: State, u: Array, target: Array) -> tuple[Array, DeformedBodies, float]:
+    """Return the displacements to go on from, the bodies there, and the part of the way to the `target` (n_dofs,) [length].
 
     Half of the way, of that half, and so on, is gone where cells turn inside out farther on.
     """
@@ -172,19 +187,46 @@ def _reach(problem: Problem, start: State, u: Array, target: Array) -> tuple[Arr
     for _ in range(HALVINGS):
         there = target if part == 1.0 else u + part * (target - u)
         try:
-            return there, problem.deformed(there, start), part == 1.0
+            return there, problem.deformed(there, start), part
         except ConvergenceError as error:
             failed = error
         part *= 0.5
     raise failed
 
 
-def _told(iterate: Iterate, change: float, balanced: Balance, whole: bool) -> dict[str, Any]:
+def _searched(
+    problem: Problem, start: State, load: StepLoad, begin: tuple[Array, DeformedBodies], end: tuple[Array, DeformedBodies],
+    contact_force: Array,
+) -> tuple[Array, DeformedBodies, float]:  # fmt: skip
+    """Return what `_reach` does, after a line search between two displacements (Crisfield, 1991, section 9.2).
+
+    Under contact forces (n_dofs,) [force] as they are, the potential falls along the way at its beginning; where it rises at
+    the end by much of that, the end lies too far.
+    """
+
+    def slope(u: Array, bodies: DeformedBodies) -> float:
+        out = problem.internal(bodies, u, load)[0] - contact_force - load.force
+        return float(problem.system.reduced(out) @ along)
+
+    (u, here), (target, there) = begin, end
+    along = problem.system.unknowns(target - u)
+    first, last, part = slope(u, here), slope(target, there), 1.0
+    for _ in range(SEARCHES):
+        if not last > OVERSHOT * abs(first):
+            break
+        part *= max(abs(first) / (abs(first) + last), LEAST)
+        target = u + part * (end[0] - u)
+        there = problem.deformed(target, start)
+        last = slope(target, there)
+    return target, there, part
+
+
+def _told(iterate: Iterate, change: float, balanced: Balance, part: float) -> dict[str, Any]:
     """Return the entry of an iteration in the history."""
     inner = iterate.history
     return {
         "displacement_change": change, "residual": balanced.relative, "pairings": len(inner),
         "active": inner[-1]["active"] if inner else 0,
         "active_set_iterations": sum(entry["active_set_iterations"] for entry in inner),
-        **({} if whole else {"damped": True}),
+        **({} if part == 1.0 else {"damped": part}),
     }  # fmt: skip

@@ -58,6 +58,7 @@ def summarise(
         },
         "probes": {name: _probe(last, point) for name, point in case.probes.items()},
         "von_mises_max": {"value": float(last.von_mises[top]), "at": mesh.points[top].tolist()},
+        **({"cell_fields": _extremes(last)} if last.cell_fields else {}),
         "theory": {
             pair: _against_theory(last.contact[pair], case.approach.get(pair), **theories)
             for pair, theories in case.theories.items()
@@ -141,6 +142,11 @@ def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
+def _extremes(step: StepResult) -> dict[str, list[float]]:
+    """Return the smallest and the largest number of the fields of cells."""
+    return {name: [float(values.min()), float(values.max())] for name, values in step.cell_fields.items()}
+
+
 def _probe(step: StepResult, point: int) -> dict[str, Any]:
     contact, row = at_point(step, point) or (None, 0)
     return {
@@ -201,6 +207,8 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
     where = ", ".join(f"{x:.4g}" for x in top["at"])
     largest = valued(top["value"], unit, "pressure", 6)
     found.append(f"  largest von Mises stress {largest} at {with_unit(f'({where})', unit, 'length')}")
+    for name, (low, high) in summary.get("cell_fields", {}).items():
+        found.append(f"  {name.replace('_', ' ')} of cells from {low:.4g} to {high:.4g}")
     if summary["regularised"]:
         found.append(_regularised_line(summary["regularised"], unit))
     for name, theory in summary["theory"].items():

@@ -83,6 +83,7 @@ def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
     >>> fc.estimate_error(model, step).relative < 1e-9  # the stress is uniform
     True
     """
+    model.refuse_nonlinear("error estimates are")
     offset = model.stress_offset(*(step.iterations.get(key, ()) for key in ("temperature_factors", "initial_factors")))
     smooth = smoothed_stress(model.mesh, model.kinematics, model.material_field(), step.displacement, offset)
     squares, energy = [], 0.0

@@ -80,11 +80,14 @@ def field_of(mesh: Mesh, step: StepResult, name: str) -> Field:
     if name in SLIPS:
         slip = np.linalg.norm(contact_slip(mesh, step, name.removeprefix("contact_")), axis=1)
         return Field(mesh, np.arange(mesh.n_points, dtype=np.int32), slip, SLIPS[name], "length")
+    if name in step.cell_fields:
+        kept, values = np.arange(mesh.n_points, dtype=np.int32), _of_cells(mesh, step.cell_fields[name])
+        return Field(mesh, kept, values, CELLS.get(name, name), "")
     apart, node, stress = separated(mesh, step)
     if name == "von_mises" and apart is mesh:
         return Field(mesh, node, step.von_mises, CAPTIONS[name], "pressure")
     if name not in names(mesh):
-        raise FastcontactError(unknown("field", name, names(mesh)))
+        raise FastcontactError(unknown("field", name, [*names(mesh), *step.cell_fields]))
     if name in CAPTIONS:
         return Field(apart, node, OF_STRESS[name](stress), CAPTIONS[name], "pressure")
     component = name.removeprefix("stress.")
@@ -97,6 +100,17 @@ def names(mesh: Mesh) -> list[str]:
     components = STRESS_COMPONENTS[: 4 if mesh.dim == 2 else 6]
     displacements = [name for name in DISPLACEMENTS if "." not in name or name[-1] in AXES[: mesh.dim]]
     return [*CAPTIONS, *(f"stress.{name}" for name in components), *displacements, *SLIPS]
+
+
+def _of_cells(mesh: Mesh, values: Array) -> Array:
+    """Return numbers of solid cells (n_solids,) at the points (n_points,): the mean of the cells around each."""
+    total, count, first = np.zeros(mesh.n_points), np.zeros(mesh.n_points), 0
+    for block in mesh.solids.values():
+        own = values[first : first + len(block)]
+        np.add.at(total, block, own[:, None])
+        np.add.at(count, block, 1.0)
+        first += len(block)
+    return total / np.maximum(count, 1.0)
 
 
 def principal_stresses(stress: Array) -> Array:
@@ -128,6 +142,12 @@ OF_STRESS: dict[str, Callable[[Array], Array]] = {
     "stress.principal_max": lambda stress: principal_stresses(stress)[:, 2],
     "stress.principal_mid": lambda stress: principal_stresses(stress)[:, 1],
     "stress.principal_min": lambda stress: principal_stresses(stress)[:, 0],
+}
+CELLS = {
+    "plastic_strain": "equivalent plastic strain",
+    "yield_ratio": "equivalent stress over yield stress",
+    "J": "volume over reference volume",
+    "logarithmic_strain": "principal logarithmic strain",
 }
 SLIPS = {"contact_slip": "slip of the step", "contact_slip_total": "slip so far"}
 DISPLACEMENTS = ("displacement", "displacement.x", "displacement.y", "displacement.z")

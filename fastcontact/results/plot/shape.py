@@ -68,7 +68,7 @@ def deformed_shape(
         Mesh and results of a step.
     field : str
         ``"von_mises"``, ``"von_mises_signed"``, ``"tresca"``; ``"stress.xx"`` and so on, ``"stress.principal_max"``,
-        ``_mid``, ``_min``; ``"displacement"`` (its length), ``"displacement.x"`` and so on.
+        ``_mid``, ``_min``; ``"displacement"`` (its length), ``"displacement.x"`` and so on; names of `StepResult.cell_fields`
     scale : float
         Factor on the displacements.
     edges : bool, optional
