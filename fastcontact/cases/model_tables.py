@@ -43,9 +43,6 @@ def _add_material(model: Model, groups: Any = None, **constants: Any) -> None:
         if isinstance(constants.get("expansion"), list):  # no array over cells: case files have tables for that
             check_expansion(constants["expansion"], 1)
         constants = {key: float(value) if type(value) is int else value for key, value in constants.items()}
-    for key in constants:
-        if key not in inspect.signature(kind).parameters:
-            raise CaseError(f"the key 'material.{key}' is none of a material that is {_LAWS[kind]}")
     model.add_material(kind(**constants), groups)
 
 
@@ -82,6 +79,14 @@ def _material_law(entry: dict[str, Any]) -> type[Material]:
     return (
         Orthotropic if "G" in entry or any(isinstance(entry.get(key), list) for key in ("E", "nu")) else LinearElastic
     )
+
+
+def _check_material(where: str, entry: dict[str, Any]) -> None:
+    """Raise CaseError for a key that the law of a material does not take."""
+    law = _material_law(entry)
+    for key in entry:
+        if key not in ("groups", "law") and key not in inspect.signature(law).parameters:
+            raise CaseError(f"the key '{where}.{key}' is none of a material that is {_LAWS[law]}")
 
 
 # Nonlinear laws by their names in case files.
@@ -201,6 +206,8 @@ def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Mo
         for i, entry in enumerate(tables(kind, data.get(kind, []))):
             where = f"{kind}[{i}]"
             check_keys(where, entry, known)
+            if kind == "material":
+                _check_material(where, entry)
             for key in _NEEDED[_material_law(entry)] if kind == "material" else needed:
                 if key not in entry:
                     raise CaseError(f"{where} needs '{key}'")

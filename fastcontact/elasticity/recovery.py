@@ -95,6 +95,7 @@ def nodal_stress(
     return average.result()
 
 
+@typed(ModelError)
 def averaged_stress(at_points: dict[str, Array], sides: MaterialSides) -> Array:
     """Return the stress (n_places, n_components) [pressure] at the nodes of each material: the average over its cells.
 

@@ -273,3 +273,27 @@ def test_following_pressure_is_the_derivative_of_a_volume(kinematics: str, eleme
     K = sum(pressure.at(u)[1] for pressure in pressures)
     change = (forces(u + 1e-6 * along) - forces(u - 1e-6 * along)) / 2e-6
     assert -K @ along.ravel() == pytest.approx(change.ravel(), abs=1e-8 * np.abs(change).max())
+
+
+@pytest.mark.parametrize(
+    ("element", "n", "nu", "error"),
+    [
+        ("quad4", 16, 0.3, 0.03),
+        ("quad8", 8, 0.3, 0.01),
+        ("quad4", 16, 0.4999, 0.02),
+        ("quad8", 16, 0.4999, 0.01),
+        ("tri6", 16, 0.4999, 0.01),
+    ],
+)
+def test_cooks_membrane(element: str, n: int, nu: float, error: float) -> None:
+    """Cook's membrane, neo-Hookean, against 32 x 32 cells of quad8: 7.8270, and 6.9078 nearly incompressible."""
+    block = fc.generate.block((1.0, 1.0), (n, n), element)
+    x, y = block.points.T
+    mesh = block.replace(points=np.column_stack([48.0 * x, 44.0 * x + y * (44.0 - 28.0 * x)]))
+    model = fc.Model(mesh, "plane_strain", strain="finite")
+    model.add_material(fc.NeoHookean(E=240.565, nu=nu))
+    model.fix("LEFT", "xy")
+    model.add_force("RIGHT", y=100.0)
+    corner = np.linalg.norm(mesh.points - [48.0, 60.0], axis=1).argmin()
+    found = fc.solve(model, 4)[-1].displacement[corner, 1]
+    assert found == pytest.approx(7.8270 if nu == 0.3 else 6.9078, rel=error)

@@ -156,3 +156,35 @@ def test_a_restart_repeats_every_bit(tmp_path) -> None:
         assert np.array_equal(one.displacement, other.displacement)
         assert np.array_equal(one.stress, other.stress)
     assert np.array_equal(stopped[-1].cell_fields["plastic_strain"], steps[2].cell_fields["plastic_strain"])
+
+
+def flattened(instants: list[float], size: float):
+    """Press a ball on a rigid flat; return forces over that at yield at multiples of the interference at yield."""
+    R, modulus, ratio, limit = 1.0, 1000.0, 0.3, 1.0
+    hardness = (0.454 + 0.41 * ratio) * 2.8 * limit
+    at_yield = (0.5 * np.pi * hardness * (1.0 - ratio**2) / modulus) ** 2 * R
+    mesh = fc.generate.quarter_disc("tri6", R=R, contact_size=size, contact_radius=0.05)
+    model = fc.Model(mesh, "axisymmetric")
+    model.add_material(fc.ElasticPlastic(E=modulus, nu=ratio, yield_stress=limit))
+    model.fix("A1B1", "y")
+    model.fix("A1A2", "x")
+    flat = fc.obstacles.HalfSpace(point=(0.0, mesh.points[:, 1].max()), normal=(0.0, -1.0))
+    model.add_obstacle("flat", secondary="CONT1", obstacle=flat, motion={"y": -at_yield})
+    unit = 2.0 / 3.0 * hardness * np.pi * at_yield * R
+    return [-step.contact["flat"].force[1] / unit for step in fc.solve(model, instants)]
+
+
+@pytest.mark.filterwarnings("ignore:contact 'flat'")
+def test_a_ball_on_a_flat_past_yield() -> None:
+    """Kogut and Etsion (2002): the force is 1.03 x^1.425 times that at yield up to x = 6 times its interference."""
+    force = flattened([1.0, 2.0, 3.0, 4.0, 5.0, 6.0], 0.0015)
+    assert force[0] == pytest.approx(1.0, rel=0.01)
+    assert force[-1] == pytest.approx(1.03 * 6.0**1.425, rel=0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:contact 'flat'")
+def test_a_ball_on_a_flat_far_past_yield() -> None:
+    """Kogut and Etsion (2002): 1.40 x^1.263 up to x = 110; contact grows along the way, so steps are small."""
+    force = flattened([1.0, 3.0, 6.0, 10.0, 15.0, *np.arange(20.0, 111.0, 5.0)], 0.003)
+    assert force[-1] == pytest.approx(1.40 * 110.0**1.263, rel=0.05)
