@@ -98,7 +98,8 @@ def newton(problem: Problem, start: State, load: StepLoad, expected: float) -> N
 
 def _iterated(problem: Problem, start: State, load: StepLoad, expected: float, place: Array) -> NewtonSolution:
     """Return the equilibrium of a load step by iterations that begin at displacements `place` (n_dofs,) [length]."""
-    iterate, history = Iterate.of(start), []
+    iterate = Iterate.of(start)
+    history: list[dict[str, Any]] = []
     u, bodies, changes = place, problem.deformed(place, start), [1.0]
     for _ in range(MOST):
         settled, target, force = _solve(problem, start, load, (bodies, u), iterate, (expected, changes[-1]))

@@ -22,6 +22,7 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.held_motions import HeldMotions
 from fastcontact.contact.obstacles.rigid_side import RigidSide
+from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.elasticity.constrained_system import System
 from fastcontact.elasticity.following_pressure import FollowingPressure
 from fastcontact.elasticity.initial_states import InitialState
@@ -32,6 +33,7 @@ from fastcontact.elasticity.relations import stacked_rows
 from fastcontact.elasticity.springs import spring_force, stiffened, too_stiff
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 from fastcontact.elasticity.temperature import Temperature
+from fastcontact.errors import ContactError
 from fastcontact.linear import choice
 from fastcontact.linear.protocol import LinearSolver
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
@@ -265,6 +267,12 @@ def prepare(
     supported, prescribed = model.prescribed_by_ramp()
     held = HeldMotions.of(supported, stacked_rows(model.relations, model.n_dofs))
     pairs = {pair.name: model.bind(pair, held) for pair in model.contact}
+    for name, pair in pairs.items():
+        if criteria.keep_pairing and isinstance(pair.options.penalty, OverclosureLaw):
+            raise ContactError(
+                f"the penalty of contact '{name}' is a table, which updates of the geometry follow: leave "
+                "keep_pairing out"
+            )
     solver = choice.make(
         linear_solver, dim=mesh.dim, n_dofs=model.n_dofs, precision=linear_precision,
         tolerance=choice.tight_enough(linear_tolerance, criteria.relative),

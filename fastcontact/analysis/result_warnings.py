@@ -70,7 +70,7 @@ def _deep(pair: Formulation, contact: ContactResult, displacement: Array) -> lis
     """Return a warning where a penalty lets the sides penetrate by much of the largest displacement."""
     size = float(np.abs(displacement).max(initial=0.0))
     penalty, depth = pair.options.penalty, contact.penetration
-    if penalty is None or depth <= DEEP * size:
+    if not isinstance(penalty, float) or depth <= DEEP * size:
         return []
     return [
         f"contact '{contact.name}' penetrates by {depth:.4g}, which is {depth / size:.1%} of the largest displacement: "

@@ -199,6 +199,9 @@ def _forces(
     facing = np.where(np.isfinite(contact.normal), contact.normal, 0.0)
     share = 1.0 / np.where(_areas(part) > 0.0, _areas(part), np.inf)
     give = np.zeros(len(part)) if part.normal_compliance is None else part.normal_compliance.apply(normal)
+    if part.law is not None:  # what the energy of a spring would take
+        energy = 2.0 * _areas(part) * part.law.energy(normal * share)
+        give = np.divide(energy, normal, out=np.zeros_like(normal), where=normal != 0.0)
     return ContactForces(
         part.positions, normal * share, force * share[:, None], give * normal, (rows.data, rows.indices, rows.indptr),
         along.reshape(-1, dim), np.einsum("nd,nd->n", ours, facing), added, _stored(part, normal, tangents, give),

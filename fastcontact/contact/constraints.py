@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array, vstack
 
+from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.linear.field_compliance import FieldCompliance
 
 Array = NDArray[np.float64]
@@ -130,6 +131,8 @@ class Constraints:
         Z of a compliance ``Z Z.T`` beside C, of normal forces and then of tangential ones; None stands for zero.
     driven : ndarray of bool (m,), optional
         Constraints that supports and obstacles move past the other side by themselves; None stands for none.
+    law : OverclosureLaw, optional
+        Of which `gap0` and `softness` are a line.
     areas : ndarray (m,), optional
         Area that each constraint stands for [area]; infinite where it does nothing.
     nodes : ndarray of int (m,), optional
@@ -158,6 +161,7 @@ class Constraints:
     nodal: NodalField | None = None
     tied: Tied | None = None
     driven: Mask | None = None
+    law: OverclosureLaw | None = None
 
     def __len__(self) -> int:
         return len(self.gap0)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, diags_array, eye_array
 
+from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.contact.pairing import Candidates, Pairing, normals
 from fastcontact.contact.projection import places
 from fastcontact.contact.surface import Surface
@@ -37,8 +38,8 @@ class PairOptions:
         What has no friction, all without `frictionless`, has none along this vector alone [-].
     kind : str
         One of `KINDS`.
-    penalty : float, optional
-        Pressure by penetration [pressure / length]; None: no penetration.
+    penalty : float or OverclosureLaw, optional
+        Pressure by penetration [pressure / length], or its law; None: no penetration.
     tangential_penalty : callable, optional
         Shear by slip of what sticks, a function from reference positions (n, dim) on the secondary side to positive numbers
         (n,) [pressure / length]; None: none slips.
@@ -57,7 +58,7 @@ class PairOptions:
     frictionless: Mask | None = None
     frictionless_along: Array | None = None
     kind: str = "unilateral"
-    penalty: float | None = None
+    penalty: float | OverclosureLaw | None = None
     tangential_penalty: Field | None = None
     search_distance: float | None = None
     wear: float | None = None

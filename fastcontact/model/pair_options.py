@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.contact.pair_options import KINDS, Array, Field, Mask, PairOptions
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity.loads import check_number, check_value, evaluated
@@ -43,7 +44,9 @@ def pair_options(
         frictionless=_nodes(name, "frictionless", options, mesh, side),
         frictionless_along=_vector(name, "frictionless_along", options, mesh.dim),
         kind=_kind(name, options, against_obstacle),
-        penalty=_positive(name, "penalty", options, "no penetration"),
+        penalty=OverclosureLaw(name, options["penalty"])
+        if isinstance(options.get("penalty"), (Sequence, np.ndarray)) and not isinstance(options["penalty"], str)
+        else _positive(name, "penalty", options, "no penetration"),
         tangential_penalty=_tangential_penalty(name, options.get("tangential_penalty")),
         search_distance=_positive(name, "search_distance", options, "any distance"),
         wear=_positive(name, "wear", options, "none"),

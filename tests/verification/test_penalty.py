@@ -98,3 +98,57 @@ def test_a_penalty_against_an_obstacle(formulation):
 def test_a_penalty_is_a_positive_number(penalty):
     with pytest.raises(fc.FastcontactError, match=r"penalty.* of contact 'pair'|the penalty of contact 'pair'"):
         touching(held(blocks()), "mortar", penalty=penalty)
+
+
+TABLE = [(-0.002, 0.0), (0.0, 1.0), (0.002, 4.0), (0.004, 12.0)]
+
+
+def layered(formulation, element, approach, matching=True):
+    """Press two blocks with a soft layer between them; return the last step."""
+    low = fc.generate.block((1.0, 1.0), (4, 4), element=element)
+    up = fc.generate.block((1.0, 1.0), (4 if matching else 3, 3), element=element, origin=(0.0, 1.0), name="UP")
+    up = fc.generate.renamed(up, {name: "U" + name for name in ("BOTTOM", "TOP", "LEFT", "RIGHT")})
+    model = fc.Model(fc.generate.union(low, up), "plane_strain")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    model.fix("BOTTOM", "xy")
+    model.fix("UTOP", "x")
+    model.prescribe("UTOP", y=-approach)
+    model.add_contact("pair", secondary="UBOTTOM", primary="TOP", formulation=formulation, penalty=TABLE)
+    return fc.solve(model, 3)[-1]
+
+
+@pytest.mark.filterwarnings("ignore:contact 'pair' penetrates", "ignore:the works of these load steps")
+@pytest.mark.parametrize(("element", "matching"), [("quad4", True), ("quad4", False), ("quad8", False)])
+@pytest.mark.parametrize("approach", [0.001, 0.006, 0.02, 0.03])
+def test_a_table_of_pressures(element, matching, approach):
+    """Of a pressure p the blocks take p (1 + 1) / E, the layer the rest of the approach, by its table."""
+    step = layered("mortar", element, approach, matching)
+    overclosures, pressures = np.transpose([*TABLE, (0.014, 52.0)])
+    shortenings = overclosures + pressures * 2.0 / 1000.0
+    assert step.contact["pair"].pressure == pytest.approx(np.interp(approach, shortenings, pressures), rel=1e-9)
+    p = step.contact["pair"].pressure[0]
+    parts = np.append(overclosures[pressures < p], np.interp(p, pressures, overclosures))
+    layer = np.trapezoid(np.interp(parts, overclosures, pressures), parts)
+    assert step.work["penalty_energy"] == pytest.approx(layer, rel=1e-9)
+
+
+@pytest.mark.filterwarnings("ignore:contact 'pair' penetrates", "ignore:the works of these load steps")
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
+def test_a_table_of_pressures_in_every_formulation(formulation):
+    found, mortar = (layered(name, "quad4", 0.02).contact["pair"].pressure for name in (formulation, "mortar"))
+    assert found == pytest.approx(mortar, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "table", [[(0.0, 1.0), (1.0, 2.0)], [(0.0, 0.0)], [(0.0, 0.0), (1.0, 0.0)], [(0.0, 0.0), (0.0, 1.0)], [1.0, 2.0]]
+)
+def test_a_wrong_table_is_refused(table):
+    model = fc.Model(fc.generate.block(), "plane_strain")
+    model.add_material(fc.LinearElastic(E=1.0, nu=0.3))
+    with pytest.raises(
+        fc.ContactError, match="must be a number, or a table of overclosures and pressures that both ascend"
+    ):
+        model.add_obstacle(
+            "wall", secondary="TOP", obstacle=fc.obstacles.HalfSpace((0.0, 1.0), (0.0, -1.0)), penalty=table
+        )
+        model.check()

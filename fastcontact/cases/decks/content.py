@@ -110,7 +110,7 @@ class Interaction:
 
     name: str
     place: Place
-    penalty: float | None = None
+    penalty: float | list[tuple[float, float]] | None = None
     friction: float = 0.0
     stick: float | None = None
     kind: str = "unilateral"

@@ -10,10 +10,13 @@ from numpy.typing import NDArray
 
 from fastcontact.cases.decks.blocks import Block, Row, folded
 from fastcontact.cases.decks.content import Amplitude, Axes, Content, Interaction, Material, Part, Section
+from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
 from fastcontact.elasticity.materials import LinearElastic
-from fastcontact.errors import ModelError
+from fastcontact.errors import ContactError, ModelError
 
+# Points of the table that stands for an exponential law.
+EXPONENTIAL = 129
 # Numbers of the constants of elastic materials.
 CONSTANTS = {"ISOTROPIC": 2, "ENGINEERING CONSTANTS": 9, "ORTHOTROPIC": 9, "ANISOTROPIC": 21}
 
@@ -130,30 +133,38 @@ def interaction(content: Content, block: Block) -> Interaction:
 
 
 def behaviour(content: Content, current: Interaction, block: Block) -> None:
-    """*SURFACE BEHAVIOR: hard, or soft with a slope."""
+    """*SURFACE BEHAVIOR: hard, or soft with a slope, a table or an exponential law."""
     law = block.choice("PRESSURE-OVERCLOSURE", ("HARD", "LINEAR", "EXPONENTIAL", "TABULAR", "TIED"))
     if law == "LINEAR":
         current.penalty = _positive(_only(block), 0, "slope")
     elif law == "EXPONENTIAL":
-        row = _only(block)
-        row.number(0), row.number(1)
-        content.note(block.place, "EXPONENTIAL: solved as hard contact, exactly; the softness of this law is left out")
+        current.penalty = _exponential(_positive(_only(block), 0, "clearance"), _positive(_only(block), 1, "pressure"))
     elif law == "TABULAR":
-        current.penalty = _slope(block)
+        current.penalty = _table(block)
     elif law == "TIED":
         current.kind = "tied"
     if "NO SEPARATION" in block.parameters:
         current.kind = "bilateral_once_closed"
 
 
-def _slope(block: Block) -> float:
-    """Return the slope of a table of pressure and overclosure; only one straight line through no pressure at zero is one."""
-    points = [(row.number(0), row.number(1)) for row in block.rows]
-    if len(points) != 2 or points[0] != (0.0, 0.0) or min(points[1]) <= 0:
+def _table(block: Block) -> float | list[tuple[float, float]]:
+    """Return a table of overclosures and pressures; the slope of one straight line through no pressure at zero."""
+    points = [(row.number(1), row.number(0)) for row in block.rows]
+    try:
+        OverclosureLaw("", points)
+    except ContactError:
         raise block.place.refuse(
-            "TABULAR is supported with two points only, 0, 0 and a pressure with its overclosure: a penalty has one slope"
-        )
-    return points[1][0] / points[1][1]
+            "TABULAR needs pressures and overclosures that both ascend, the first pressure zero"
+        ) from None
+    return points[1][1] / points[1][0] if len(points) == 2 and points[0][0] == 0.0 else points
+
+
+def _exponential(clearance: float, pressure: float) -> list[tuple[float, float]]:
+    """Return a table of ``p0 exp(h ln(100) / c0)``, as in CalculiX, from the clearance at which it is a hundredth of p0."""
+    overclosures = clearance * np.linspace(-1.0, 3.0, EXPONENTIAL)
+    pressures = pressure * np.exp(np.log(100.0) * overclosures / clearance)
+    pressures[0] = 0.0
+    return list(zip(overclosures.tolist(), pressures.tolist(), strict=True))
 
 
 def friction(content: Content, current: Interaction, block: Block) -> None:

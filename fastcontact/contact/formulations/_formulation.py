@@ -16,6 +16,7 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Compliance, Constraints
 from fastcontact.contact.held_motions import TOGETHER, HeldMotions, distinct_directions
 from fastcontact.contact.obstacles.rigid_side import RigidSide
+from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.contact.pair_options import PairOptions
 from fastcontact.contact.pairing import Candidates, Pairing, gap_rows, pair, rows_along, tangents
 from fastcontact.contact.prescribed_normals import Normals, checked_normals, opposed
@@ -169,7 +170,10 @@ class Formulation(ABC):
             return part
         if areas is None:
             raise ContactError(f"formulation '{self.name}' knows no penalty: leave out the option")
-        if normal is not None:
+        if isinstance(normal, OverclosureLaw):
+            slope, without = normal.line(-part.gaps(at.displacement))
+            part = replace(part, gap0=part.gap0 + without, softness=1.0 / (slope * areas), law=normal)
+        elif normal is not None:
             part = replace(part, softness=np.asarray(1.0 / (normal * areas)))
         if tangential is None or not part.tangents:
             return part

@@ -75,9 +75,10 @@ class ModelContact(ModelConnections):
               points those nearer to such a node than to any other. The two sides may share such nodes. ``frictionless``:
               groups whose nodes carry no friction, likewise. ``frictionless_along``: a vector (dim,) along which these, or
               without ``frictionless`` all, have no friction, nor slip that counts; across it they keep it [-].
-            - ``penalty``: pressure by penetration [pressure / length], instead of none at all; results tell the
-              penetration. It does not soften friction; ``tangential_penalty`` does: shear by slip of what sticks, a number
-              or a function of the secondary position [pressure / length].
+            - ``penalty``: pressure by penetration [pressure / length], instead of none at all; or a table of pairs
+              (overclosure, pressure) that ascend from no pressure [length, pressure]; results tell the penetration. It does
+              not soften friction; ``tangential_penalty`` does: shear by slip of what sticks, a number or a function of the
+              secondary position [pressure / length].
             - ``slip``: ``"symmetric"`` (default): closing a gap along the mean of both sides' normals is no slip;
               ``"primary"``: all relative motion along the tangents to the primary side is, as in code_aster.
             - ``wear``: Archard's coefficient by hardness: ``coefficient * pressure * slip`` is worn off the secondary side in
