@@ -53,8 +53,8 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
         If the step does not converge.
     """
     load = problem.load_at(instant)
-    solved_before = problem.solver.counters.iterations
     problem.solver.put_back(state.solver)
+    solved_before = problem.solver.counters.iterations
     loaded = with_loads(problem, load)
     start, expected = prepare_start(problem, state, load, loaded)
     if problem.bodies is not None:

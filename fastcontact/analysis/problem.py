@@ -103,6 +103,8 @@ class Problem:
         Rigid obstacles that forces move.
     prescribed, forces : dict of ramp table to ndarray (n_points + n_driven, dim)
         By history, displacements [length] and nodal forces [force] at multiplier 1.
+    solver_at_rest : dict
+        The snapshot of the solver before the first step.
     doubtful : tuple of str
         Warnings about the stiffness.
     bodies : NonlinearBodies, optional
@@ -125,6 +127,7 @@ class Problem:
     force_driven: ForceDrivenObstacles
     prescribed: ByRamp
     forces: ByRamp
+    solver_at_rest: Mapping[str, Any]
     doubtful: tuple[str, ...] = ()
     bodies: NonlinearBodies | None = None
     following: Sequence[tuple[FollowingPressure, Table | None]] = ()
@@ -249,7 +252,7 @@ class Problem:
         """Return the state before the first load step."""
         # Gaps are differences of coordinates and no more accurate than those.
         round_off = 8 * np.finfo(float).eps * float(np.abs(self.model.mesh.points).max())
-        return State(np.zeros(self.force_driven.n_dofs), round_off, solver=self.solver.snapshot(), work=Work())
+        return State(np.zeros(self.force_driven.n_dofs), round_off, solver=self.solver_at_rest, work=Work())
 
 
 @parallel.on_one_blas_thread
@@ -300,7 +303,7 @@ def prepare(
         model, ramp, criteria, solver, pairs, field, sides, system, bodies,
         active_dofs(system, contact_dofs, involved, pairs, bodies, solver),
         contact_dofs, driven, driven.prescribed(prescribed), driven.forces(_forces(model)),
-        tuple(doubtful), model.nonlinear_bodies(field), model.following_pressures(),
+        solver.snapshot(), tuple(doubtful), model.nonlinear_bodies(field), model.following_pressures(),
     )  # fmt: skip
 
 

@@ -64,9 +64,9 @@ def _formulations(then: dict[str, str], now: dict[str, str], model: Model) -> st
 
 def taken(problem: Problem, state: State, case: dict[str, Any]) -> dict[str, Any]:
     """Return what a later process needs to continue after a step; `case` from `identity`."""
-    solver, kept = problem.solver, state.to_dict(problem.model.n_dofs)
-    extrapolation = kept.pop("extrapolation")
-    kept = {"format": FORMAT, "case": case, **kept, "solver": {"kind": _kind(solver), "memory": solver.memory()}}
+    kept = state.to_dict(problem.model.n_dofs)
+    extrapolation, memory = kept.pop("extrapolation"), kept.pop("solver")
+    kept = {"format": FORMAT, "case": case, **kept, "solver": {"kind": _kind(problem.solver), "memory": memory}}
     if _extrapolates(problem):
         kept["extrapolation"] = extrapolation
     return kept
@@ -81,7 +81,7 @@ def put_back(problem: Problem, step: StepResult, touched: frozenset[str]) -> Sta
     kept = step.restart
     assert kept is not None
     if kept["solver"]["kind"] == _kind(problem.solver):
-        problem.solver.remember(kept["solver"]["memory"])
+        problem.solver.put_back(kept["solver"]["memory"])
     state = State.from_dict(kept, step.displacement, touched)
     if not _extrapolates(problem):
         state = replace(state, extrapolation=Extrapolation())

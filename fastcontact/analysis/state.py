@@ -69,8 +69,8 @@ class State:
         Rigid position of unsupported bodies in the last step.
     history : dict of str to ndarray (n_cells, n_q, 9)
         By solid element of nonlinear bodies, see `constitutive_kernels`; none before the first step.
-    solver : object
-        What the linear solver keeps from step to step, see `LinearSolver.snapshot`.
+    solver : dict
+        All that later solutions owe to earlier ones, see `LinearSolver.snapshot`.
     """
 
     u: Array
@@ -94,7 +94,7 @@ class State:
     last_change: tuple[int, float] | None = None
     rigid: RigidPosition | None = None
     history: Mapping[str, Array] = field(default_factory=dict)
-    solver: Any = None
+    solver: Mapping[str, Any] = field(default_factory=dict)
 
     def after_touching(self, pairs: Iterable[str]) -> State:
         """Return the state when these contact pairs are closed; places of first contact count of pairs that have been."""
@@ -133,6 +133,7 @@ class State:
                 for name in self.active
             },
             "extrapolation": self.extrapolation.to_dict(),
+            "solver": self.solver,
         }
 
     @classmethod

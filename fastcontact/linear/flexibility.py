@@ -7,7 +7,7 @@ kept, so further active sets and pairings cost a small dense solution and one so
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,10 +97,20 @@ class FlexibilityColumns:
         rows = csr_array((R.data[used], place, starts), shape=(R.shape[0], len(self._dofs)))
         return symmetric(np.asarray(rows @ (rows @ self._values).T))
 
-    def ask_again(self, asked: Iterable[Indices]) -> None:
-        """Solve for what the columns of another solver were asked for, in its order; see `asked`."""
-        for dofs in asked:
+    def put_back(self, asked: Sequence[Indices]) -> None:
+        """Keep what was `asked` for, in that order, and nothing else; solve only for what is not kept now."""
+        pairs = zip(self.asked, asked, strict=False)
+        same = next((i for i, (mine, other) in enumerate(pairs) if not np.array_equal(mine, other)), len(asked))
+        self._forget(sum(len(dofs) for dofs in self.asked[same:]))
+        del self.asked[same:]
+        for dofs in asked[len(self.asked) :]:
             self._places(dofs)
+
+    def _forget(self, count: int) -> None:
+        """Forget the last `count` columns."""
+        if count:
+            self._place[self._dofs[-count:]] = -1
+            self._dofs, self._values = self._dofs[:-count], self._values[:-count, :-count].copy()
 
     def _places(self, dofs: NDArray[np.integer]) -> Indices:
         """Return where `dofs` (k,), which may repeat, stand among those kept; solve for those that are new."""

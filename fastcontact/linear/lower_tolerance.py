@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Mapping
+from typing import Any
 
 from fastcontact.linear.protocol import LinearSolver
 
@@ -23,3 +25,10 @@ def tighten(solver: LinearSolver, excess: float) -> bool:
     solver.asked = solver.tolerance if solver.asked is None else solver.asked
     solver.tolerance = tolerance
     return True
+
+
+def put_back_tolerance(solver: LinearSolver, snapshot: Mapping[str, Any]) -> None:
+    """Let `solver` have the tolerance of a snapshot, lowered or not."""
+    asked = solver.tolerance if solver.asked is None else solver.asked
+    solver.tolerance = snapshot.get("tolerance", asked)
+    solver.asked = None if solver.tolerance == asked else asked

@@ -8,7 +8,7 @@ has no more.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
@@ -203,22 +203,18 @@ class LinearSolver(Protocol):
         """Take the right-hand side f (n,) [force]."""
         ...
 
-    def snapshot(self) -> Any:
-        """Return what later solutions owe to the loads so far: part of the state of an analysis; None for nothing."""
-        return None
+    def snapshot(self) -> dict[str, Any]:
+        """Return all that later solutions owe to earlier ones: plain numbers, strings and arrays.
 
-    def put_back(self, snapshot: Any) -> None:
-        """Continue from a `snapshot` of this solver; None for the beginning."""
+        It is the part of the state of an analysis that the solver has, and is saved with it: arrays are replaced, never
+        written into.
+        """
+        ...
+
+    def put_back(self, snapshot: Mapping[str, Any]) -> None:
+        """Continue from a `snapshot` of this solver, or of one of the same kind that was prepared for the same matrix."""
         ...
 
     def improve(self, excess: float) -> bool:
         """Make later solutions more accurate, since they leave `excess` times what is allowed; False if there is no way."""
         return False
-
-    def memory(self) -> dict[str, Any]:
-        """Return what the last digits of later solutions owe to earlier ones: plain numbers, strings and arrays."""
-        ...
-
-    def remember(self, memory: dict[str, Any]) -> None:
-        """Take the `memory` of a solver of the same kind that was prepared for the same matrix."""
-        ...

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -111,25 +112,16 @@ class FactorSolver(LinearSolver):
         """Return the prepared matrix with right-hand side `f` (n,)."""
         return LoadedFactor(self, f, self.known_loads.solution(f, self.back_substitute))
 
-    def snapshot(self) -> Any:
-        """See `LinearSolver.snapshot`."""
-        return self.known_loads.snapshot()
-
-    def put_back(self, snapshot: Any) -> None:
-        """See `LinearSolver.put_back`."""
-        if snapshot is not None:
-            self.known_loads.put_back(snapshot)
-
-    def memory(self) -> dict[str, Any]:
-        """See `LinearSolver.memory`: columns of ``K^-1`` asked for, and right-hand sides that others are made of."""
-        kept = {"asked": list(self.columns.asked), "loads": self.known_loads.memory()}
+    def snapshot(self) -> dict[str, Any]:
+        """See `LinearSolver.snapshot`: columns of ``K^-1`` asked for, and right-hand sides that others are made of."""
+        kept = {"asked": list(self.columns.asked), "loads": self.known_loads.snapshot()}
         return {**kept, "refines": True} if self.refines else kept
 
-    def remember(self, memory: dict[str, Any]) -> None:
-        """See `LinearSolver.remember`."""
-        self.refines = memory.get("refines", False)
-        self.columns.ask_again(memory["asked"])
-        self.known_loads.remember(memory["loads"], self.n, self._solution)
+    def put_back(self, snapshot: Mapping[str, Any]) -> None:
+        """See `LinearSolver.put_back`."""
+        self.refines = snapshot.get("refines", False)
+        self.columns.put_back(snapshot["asked"])
+        self.known_loads.put_back(snapshot["loads"], self.n, self._solution)
 
     def improve(self, excess: float) -> bool:
         """See `LinearSolver.improve`: correct later solutions once by what they leave out of balance."""

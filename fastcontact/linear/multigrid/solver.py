@@ -160,11 +160,15 @@ class Multigrid:
             known = self._hierarchy_springs
             alike = known is None if springs is None else springs.alike(known)
             if not (alike and _alike(sparse, self._hierarchy_equations)):
-                self._constrained.constrain(sparse, None if springs is None else springs.scaled(self.K.unit))
-                self._hierarchy_equations, self._hierarchy_springs = sparse, springs
+                self._change_hierarchy(sparse, springs)
                 self._worked(CHANGE)
             gives = elimination is not None and elimination.compliance is not None
             self._reduced = Reduced(self.K, elimination, springs, self.diagonal() if gives else None)
+
+    def _change_hierarchy(self, sparse: Elimination | None, springs: Springs | None) -> None:
+        """Change the hierarchy to that under equations with sparse weights and springs."""
+        self._constrained.constrain(sparse, None if springs is None else springs.scaled(self.K.unit))
+        self._hierarchy_equations, self._hierarchy_springs = sparse, springs
 
     def solution(
         self, f: Array, elimination: Elimination | None, guess: Array | None, monitor: Monitor | None = None,

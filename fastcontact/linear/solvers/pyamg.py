@@ -7,6 +7,7 @@ of its own for the matrix ``T.T K T``.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from fastcontact.errors import ConvergenceError
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.elimination.loaded import LoadedIteration
 from fastcontact.linear.flexibility import FlexibilityColumns
-from fastcontact.linear.lower_tolerance import tighten
+from fastcontact.linear.lower_tolerance import put_back_tolerance, tighten
 from fastcontact.linear.protocol import Counters, LinearSolver, Monitor
 
 Array = NDArray[np.float64]
@@ -124,14 +125,14 @@ class Pyamg(LinearSolver):
         """See `LinearSolver.improve`."""
         return tighten(self, excess)
 
-    def memory(self) -> dict[str, Any]:
-        """See `LinearSolver.memory`: columns of ``K^-1`` asked for, and the tolerance."""
+    def snapshot(self) -> dict[str, Any]:
+        """See `LinearSolver.snapshot`: columns of ``K^-1`` asked for, and the tolerance."""
         return {"asked": list(self.columns.asked), "tolerance": self.tolerance}
 
-    def remember(self, memory: dict[str, Any]) -> None:
-        """See `LinearSolver.remember`."""
-        self.tolerance = memory.get("tolerance", self.tolerance)
-        self.columns.ask_again(memory["asked"])
+    def put_back(self, snapshot: Mapping[str, Any]) -> None:
+        """See `LinearSolver.put_back`."""
+        put_back_tolerance(self, snapshot)
+        self.columns.put_back(snapshot["asked"])
 
 
 SOLVER = Pyamg
