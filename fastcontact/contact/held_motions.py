@@ -79,7 +79,7 @@ def spanned(tensors: Array, least: float) -> Array:
 
 
 def without(projectors: Array, vectors: Array, least: Array | float) -> Array:
-    """Return projectors (n, dim, dim) less the directions of what they leave of `vectors` (n, dim), if that is long enough."""
+    """Return projectors (n, dim, dim) less the parts of `vectors` (n, dim) inside them, where longer than `least`."""
     inside = np.einsum("nde,ne->nd", projectors, vectors)
     length = np.linalg.norm(inside, axis=1, keepdims=True)
     inside = np.where(length > least, inside / np.where(length > 0.0, length, 1.0), 0.0)
@@ -114,8 +114,8 @@ def _from_nearest(directions: Array, origin: Array, places: Array) -> Array:
     first = directions[0]
     if (np.abs(directions @ first) > 1.0 - 1e-12).all():
         return np.tile(first, (len(places), 1))
-    weight = 1.0 / np.maximum(cdist(places, origin), 1e-300) ** NEAREST
-    weight /= weight.max(axis=1, keepdims=True)
+    away = np.maximum(cdist(places, origin), 1e-300)
+    weight = (away.min(axis=1, keepdims=True) / away) ** NEAREST
     return np.asarray(np.linalg.eigh(np.einsum("nk,kd,ke->nde", weight, directions, directions))[1][:, :, -1])
 
 

@@ -307,7 +307,9 @@ def _tangents(normal: Array, without_slip: list[tuple[Array, Mask]]) -> list[Arr
     found = tangents(normal)
     if len(found) == 1 or not without_slip:
         return found
-    held = sum(np.where(nodes[:, None, None], along[:, :, None] * along[:, None, :], 0.0) for along, nodes in without_slip)
+    held = sum(
+        np.where(nodes[:, None, None], along[:, :, None] * along[:, None, :], 0.0) for along, nodes in without_slip
+    )
     first, mixed, second = (np.einsum("md,mde,me->m", found[a], held, found[b]) for a, b in ((0, 0), (0, 1), (1, 1)))
     angle = 0.5 * np.arctan2(2 * mixed, first - second)[:, None]
     turned = np.cos(angle) * found[0] + np.sin(angle) * found[1]
