@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.contact.formulations import Formulation
-from fastcontact.contact.held_motions import HELD, HeldMotions
+from fastcontact.contact.held_motions import HeldMotions
 from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.surface import Surface
 from fastcontact.contact.unrolled_line import UnrolledLine, unrolled
@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 # A plane of symmetry cuts the surface: its normal and that of the surface are nearly perpendicular [cosine].
 ACROSS = 0.5
+# A direction is held where at least this part of it, squared, is prescribed.
+HELD = 0.99
 # Below this length of the mean of unit normals a surface closes on itself: it has no direction.
 DIRECTED = 0.3
 

@@ -250,19 +250,6 @@ def tangents(normal: Array) -> list[Array]:
     return [first, np.cross(normal, first)]
 
 
-def tangents_by_axes(normal: Array) -> list[Array]:
-    """Return tangents as `tangents` does, but in 3D for each point by itself, along coordinate axes where these allow it.
-
-    In planes and on lines of symmetry, one of them is what supports hold. From point to point they may jump.
-    """
-    if normal.shape[1] == 2:
-        return tangents(normal)
-    smallest = np.eye(3)[np.argmin(np.abs(normal), axis=1)]
-    first = np.cross(smallest, normal)
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    return [first, np.cross(normal, first)]
-
-
 def normals(directions: Sequence[Array]) -> Array:
     """Return the unit normals (n, dim) that `tangents` complete."""
     if len(directions) == 1:

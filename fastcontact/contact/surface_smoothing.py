@@ -205,10 +205,13 @@ class _Fit:
         (plane, height), (i, j) = self.in_planes(points), self.powers
         lower = LOWER ** (i + j) * np.sqrt(comb(i + j, i))  # no direction counts more than others (Bombieri's norm)
         columns = np.where(taken[..., None], lower * _terms(plane, i, j), 0.0)
-        rest = (height - _conic(self.curvature, plane))[..., None]
-        normal = columns.transpose(0, 2, 1) @ columns
-        normal += DAMPING * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(len(i))
-        return replace(self, polynomial=lower * np.linalg.solve(normal, columns.transpose(0, 2, 1) @ rest)[..., 0])
+        rest = np.where(taken, height - _conic(self.curvature, plane), 0.0)
+        damping = np.sqrt(DAMPING * (columns**2).sum(axis=(1, 2)))[:, None, None] * np.eye(len(i), len(i) + 1)
+        # By orthogonal factors: in normal equations what the damping determines would be known to 1e-3 only.
+        R = np.linalg.qr(
+            np.concatenate([np.concatenate([columns, rest[..., None]], axis=2), damping], axis=1), mode="r"
+        )
+        return replace(self, polynomial=lower * np.linalg.solve(R[:, : len(i), :-1], R[:, : len(i), -1:])[..., 0])
 
     def at(self, plane: Array) -> Array:
         """Return the heights (n, m) over points (n, m, d) of the planes."""

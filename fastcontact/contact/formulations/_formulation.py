@@ -14,7 +14,7 @@ from scipy.sparse import csr_array
 
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Compliance, Constraints
-from fastcontact.contact.held_motions import TOGETHER, HeldMotions, distinct_directions
+from fastcontact.contact.held_motions import TOGETHER, HeldMotions, alike, spanned, without
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.contact.pair_options import PairOptions
@@ -299,42 +299,36 @@ class Formulation(ABC):
         if not len(nodes) or self.held is None:
             return []
         points = self.secondary.points[nodes]
-        moved = (at.displacement - at.start)[points]
+        both, moved = self.held.at(points), (at.displacement - at.start)[points]
         candidates = Candidates(points[:, None], np.ones((len(nodes), 1)))
+        pairing = self.facing(candidates, at, max(self.projection_tolerance or 0.0, ON_SYMMETRY))
         if isinstance(self.primary, RigidSide):
-            theirs = np.broadcast_to(np.eye(moved.shape[1]), (len(nodes), *2 * moved.shape[1:]))
             moved = moved - (at.obstacle - at.obstacle_start)
             turning = self.turning(candidates, at)
             moved = moved if turning is None else moved - turning
         else:
-            pairing = self.facing(candidates, at, max(self.projection_tolerance or 0.0, ON_SYMMETRY))
-            nodes, moved = nodes[pairing.paired], moved[pairing.paired]
-            facing = places(self.primary, pairing.facet[pairing.paired], pairing.xi[pairing.paired])
-            theirs = np.einsum("nk,nkde->nde", facing.shape, self.held.at(facing.nodes))
-            moved = moved - np.einsum("nk,nkd->nd", facing.shape, (at.displacement - at.start)[facing.nodes])
-        ours = self.held.at(self.secondary.points[nodes])
-        round_off = ALIKE * max(np.abs(at.displacement).max(), np.abs(at.start).max())
-        found = []
-        for direction in distinct_directions(ours):
-            both = np.einsum("d,nde,e->n", direction, ours, direction) >= TOGETHER**2
-            both &= np.einsum("d,nde,e->n", direction, theirs, direction) >= 0.5
-            both &= np.abs(moved @ direction) <= round_off
-            mask = np.zeros(len(self.secondary.points), bool)
-            mask[nodes[both]] = True
-            mask = self.without_whole_facets(mask)
-            if mask.any():
-                along = np.tile(direction, (len(mask), 1))
-                along[nodes] = ours @ direction  # round a curved rim each node has its own
-                along[~mask] = direction
-                found.append((along / np.linalg.norm(along, axis=1, keepdims=True), mask))
-        return found
+            rows = np.flatnonzero(pairing.paired)
+            facing, theirs = places(self.primary, pairing.facet[rows], pairing.xi[rows]), np.zeros_like(both)
+            theirs[rows] = np.einsum("nk,nkde->nde", facing.shape, self.held.at(facing.nodes))
+            moved[rows] -= np.einsum("nk,nkd->nd", facing.shape, (at.displacement - at.start)[facing.nodes])
+            both = spanned(both @ theirs @ both, 0.5)
+        both = without(both, pairing.normal, np.sqrt(0.5))
+        moved -= np.einsum("nd,nd->n", moved, pairing.normal)[:, None] * pairing.normal
+        both = without(both, moved, ALIKE * max(np.abs(at.displacement).max(), np.abs(at.start).max()))
+        held = np.zeros((len(self.secondary.points), *both.shape[1:]))
+        held[nodes] = both
+        return alike(self._without_whole_facets(held), self.points[self.secondary.points])
 
-    def without_whole_facets(self, nodes: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Return secondary `nodes` (n_nodes,) without those of facets all of whose nodes are among them."""
-        found = nodes.copy()
-        whole = [block.local[nodes[block.local].all(axis=1)].ravel() for block in self.secondary.blocks]
-        found[np.concatenate(whole)] = False
-        return found
+    def _without_whole_facets(self, held: Array) -> Array:
+        """Return projectors (n_nodes, dim, dim) without the directions in which all nodes of a facet are held."""
+        whole = np.zeros_like(held)
+        for block in self.secondary.blocks:
+            around = held[block.local]
+            vectors = np.linalg.eigh(around.mean(axis=1))[1]
+            least = np.einsum("fdk,fnde,fek->fnk", vectors, around, vectors).min(axis=1) >= TOGETHER**2
+            vectors = np.where(least[:, None], vectors, 0.0)
+            np.add.at(whole, block.local, (vectors @ vectors.transpose(0, 2, 1))[:, None])
+        return spanned(held - held @ spanned(whole, 0.5) @ held, 0.5)
 
     def _closing_slip(
         self, candidates: Candidates, pairing: Pairing, directions: Sequence[Array], at: Configuration

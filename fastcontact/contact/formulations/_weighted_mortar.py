@@ -30,7 +30,7 @@ from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.formulations._overlap import Overlap
 from fastcontact.contact.formulations._rows import Entries, rows_of
 from fastcontact.contact.integration import facet_measure, fine_rule, nodal_areas
-from fastcontact.contact.pairing import Candidates, tangents_by_axes
+from fastcontact.contact.pairing import Candidates, tangents
 from fastcontact.contact.prescribed_normals import Normals
 from fastcontact.contact.projection import facet_normals, nodal_normals, smooth_normals
 from fastcontact.contact.surface import Surface
@@ -150,8 +150,9 @@ class WeightedMortar(Formulation):
         if not (self.friction or self.options.tied):
             return part
         candidates = Candidates(points[:, None], np.ones((len(part), 1)))
-        directions, rubbing = self.options.rubbing(tangents_by_axes(normal), candidates)
-        slips, apart = self._slips(rubbing, overlap, covered, kept, mean, weight, at)
+        held = self.without_slip(at)
+        directions, rubbing = self.options.rubbing(_tangents(normal, held), candidates)
+        slips, apart = self._slips(rubbing, held, overlap, covered, kept, mean, weight, at)
         return replace(
             part,
             tangents=slips,
@@ -196,8 +197,8 @@ class WeightedMortar(Formulation):
         return np.stack([closing * np.einsum("nd,nd->n", along, between) for along in directions])
 
     def _slips(
-        self, directions: Sequence[Array], overlap: Overlap, covered: list[Array], kept: Mask, mean: csr_array,
-        weight: Array, at: Configuration,
+        self, directions: Sequence[Array], without_slip: list[tuple[Array, Mask]], overlap: Overlap, covered: list[Array],
+        kept: Mask, mean: csr_array, weight: Array, at: Configuration,
     ) -> tuple[tuple[csr_array, ...], Array]:  # fmt: skip
         """Return rows (m, n_dofs) of the slips along tangents (m, dim), and how far apart nodes start (m, dim) [length].
 
@@ -209,7 +210,7 @@ class WeightedMortar(Formulation):
         start = self.points + at.start
         apart = mean @ start
         held = np.zeros((len(weight), *2 * self.points.shape[1:]))
-        for along, nodes in self.without_slip(at):
+        for along, nodes in without_slip:
             if not (nodes & kept).any():
                 continue
             own, across, _ = self._weighted(overlap, covered, kept & ~nodes)
@@ -299,6 +300,20 @@ class WeightedMortar(Formulation):
                 values[side.points] = clearance(self.points[side.points])
                 added += matrix @ values / weight
         return added
+
+
+def _tangents(normal: Array, without_slip: list[tuple[Array, Mask]]) -> list[Array]:
+    """Return `tangents`, turned where there is no slip in some direction so that one of them is along that."""
+    found = tangents(normal)
+    if len(found) == 1 or not without_slip:
+        return found
+    held = sum(
+        np.where(nodes[:, None, None], along[:, :, None] * along[:, None, :], 0.0) for along, nodes in without_slip
+    )
+    first, mixed, second = (np.einsum("md,mde,me->m", found[a], held, found[b]) for a, b in ((0, 0), (0, 1), (1, 1)))
+    angle = 0.5 * np.arctan2(2 * mixed, first - second)[:, None]
+    turned = np.cos(angle) * found[0] + np.sin(angle) * found[1]
+    return [turned, np.cross(normal, turned)]
 
 
 @dataclass(frozen=True, eq=False)
