@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -10,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.errors import FastcontactWarning, MeshError
+from fastcontact.errors import MeshError, warn
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
@@ -114,11 +113,9 @@ def _add_vertices(point_groups: Groups, block: Block, solid: list[Block]) -> lis
             continue
         lost = np.setdiff1d(points, np.concatenate(carried))
         if len(lost):
-            warnings.warn(
+            warn(
                 f"group '{name}' mixes cells with single points: {len(lost)} points that its cells do "
-                "not have are left out; give them a group of their own",
-                FastcontactWarning,
-                stacklevel=2,
+                "not have are left out; give them a group of their own"
             )
     return turned
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.errors import FastcontactWarning, FileError
+from fastcontact.errors import FileError, warn
 from fastcontact.mesh.files.hdf5 import attribute, values
 
 GROUP_NAME_SIZE = 80
@@ -71,11 +70,9 @@ def members(numbers: NDArray[Any], families: Families) -> dict[str, NDArray[np.i
     for rows in np.split(order, starts) if len(numbers) else []:
         number = int(numbers[rows[0]])
         if number and number not in families:
-            warnings.warn(
+            warn(
                 f"{len(rows)} cells or points belong to family {number}, which the MED file does not "
-                "describe: they are in no group",
-                FastcontactWarning,
-                stacklevel=2,
+                "describe: they are in no group"
             )
         for name in families.get(number, ()):
             found.setdefault(name, []).append(rows)

@@ -8,7 +8,6 @@ import io
 import logging
 import tempfile
 import threading
-import warnings
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.errors import FastcontactWarning, FileError, MeshError, unknown
+from fastcontact.errors import FileError, MeshError, unknown, warn
 from fastcontact.mesh import elements
 from fastcontact.mesh.files import abaqus, gmsh_versions, hdf5
 from fastcontact.mesh.files.blocks import VERTEX
@@ -233,7 +232,7 @@ def _parts(mesh: Mesh, file_format: str) -> dict[str, Any]:
         return {**parts, "point_sets": dict(mesh.point_groups)}
     lost = len(mesh.cell_groups) + len(mesh.point_groups)
     if lost:
-        _warn(f"{file_format} files have no named groups: {lost} groups are left out; {KEEPS_ALL}")
+        warn(f"{file_format} files have no named groups: {lost} groups are left out; {KEEPS_ALL}")
     return parts
 
 
@@ -242,10 +241,6 @@ def _meshio_cells(mesh: Mesh, order: Orders) -> list[tuple[str, NDArray[Any]]]:
         (elements.get(name).meshio, block[:, np.argsort(order[name])] if name in order else np.array(block))
         for name, block in mesh.cells.items()
     ]
-
-
-def _warn(message: str) -> None:
-    warnings.warn(message, FastcontactWarning, stacklevel=2)
 
 
 def _with_arrays(parts: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
@@ -278,7 +273,7 @@ def _with_tags(parts: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
     kept = {name: int((tags[mesh.cell_groups[name]] == tag).sum()) for name, (tag, _) in field_data.items()}
     cut = {name: len(rows) - kept[name] for name, rows in mesh.cell_groups.items() if len(rows) > kept.get(name, 0)}
     if cut:
-        _warn(
+        warn(
             f"Gmsh files of version 2.2 hold one group a cell: {sum(cut.values())} memberships of the groups "
             f"{', '.join(cut)} are left out; {KEEPS_ALL}"
         )
@@ -294,7 +289,7 @@ def _with_vertices(
     named = {name: members for name, members in point_groups.items() if len(members) and name not in field_data}
     twice = [name for name in point_groups if name in field_data]
     if twice:
-        _warn(
+        warn(
             f"{len(twice)} groups of points have the name of a group of cells ({', '.join(twice)}), which "
             f"Gmsh files cannot tell apart: they are left out; {KEEPS_ALL}"
         )
