@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.facet_sag import sag_warnings
 from fastcontact.analysis.interpenetration import interpenetration
@@ -16,6 +15,7 @@ from fastcontact.analysis.state import State
 from fastcontact.analysis.stress_scatter import scatter_warnings
 from fastcontact.analysis.volumetric_locking import locking_warning
 from fastcontact.analysis.wear import too_fast
+from fastcontact.arrays import Array, Mask
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity import element_kernels, recovery
@@ -24,7 +24,6 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.step import ContactResult, StepResult
 
-Array = NDArray[np.float64]
 # Penetration under a penalty that is worth a warning, relative to the largest displacement.
 DEEP = 0.01
 # Equivalent strain beyond which linear kinematics are worth a warning.
@@ -261,7 +260,7 @@ def _unresolved(name: str, pair: Formulation, contact: ContactResult) -> Iterato
         )
 
 
-def across(side: Surface, closed: NDArray[np.bool_], excluded: NDArray[np.bool_]) -> int | None:
+def across(side: Surface, closed: Mask, excluded: Mask) -> int | None:
     """Return how many facets lie between the innermost closed node and the edge of the contact; None without an edge.
 
     That is the radius in elements, whatever the shape of the contact, and also where symmetry cuts it. The edge lies

@@ -10,8 +10,8 @@ from urllib.parse import quote
 
 import numpy as np
 
+from fastcontact.arrays import REFUSAL, is_masked
 from fastcontact.errors import FileError, MeshError, warn
-from fastcontact.masks import REFUSAL, is_masked
 from fastcontact.mesh import elements, topology
 from fastcontact.mesh.files.blocks import VERTEX
 from fastcontact.mesh.files.mesh_files import read_mesh

@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from fastcontact.arrays import Array, Indices
+
 # Right-hand sides kept: loads and supports have seldom more ramps.
 KEPT = 4
 # What a combination may miss of a right-hand side, in 2-norms: its round-off.
@@ -56,7 +56,7 @@ class KnownLoads:
         """Keep again what was kept when the snapshot was taken."""
         self._loads, self._solutions = snapshot
 
-    def memory(self) -> list[dict[str, Array | NDArray[np.intp]]]:
+    def memory(self) -> list[dict[str, Array | Indices]]:
         """Return the right-hand sides kept, few of whose entries are not zero: ``places`` and ``values``."""
         places = [np.flatnonzero(f) for f in self._loads]
         return [{"places": at, "values": f[at]} for at, f in zip(places, self._loads, strict=True)]

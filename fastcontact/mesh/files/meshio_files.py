@@ -15,8 +15,8 @@ from urllib.parse import quote
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import AnyArray, Numbers
 from fastcontact.errors import FileError, MeshError, unknown, warn
 from fastcontact.mesh import elements
 from fastcontact.mesh.files import abaqus, gmsh_versions, hdf5
@@ -104,7 +104,7 @@ def _read_with_field(path: Path, field: str) -> dict[str, Any]:
     return found
 
 
-def read_point_data(path: Path, field: str) -> tuple[NDArray[Any], NDArray[Any]]:
+def read_point_data(path: Path, field: str) -> tuple[AnyArray, AnyArray]:
     """Return the numbers (n_points, ...) [unit of the field] of a field, and its points (n_points, 2 or 3) [length].
 
     FileError if meshio cannot read the file, or it has no such field.
@@ -117,7 +117,7 @@ def read_point_data(path: Path, field: str) -> tuple[NDArray[Any], NDArray[Any]]
     return found["field"], found["points"]
 
 
-def read_cell_data(path: Path, field: str) -> tuple[NDArray[Any], NDArray[Any]]:
+def read_cell_data(path: Path, field: str) -> tuple[AnyArray, AnyArray]:
     """Return the numbers (n_cells, ...) [unit of the field] of a field at cells, and their middles (n_cells, dim) [length].
 
     FileError if meshio cannot read the file, or it has no such field.
@@ -236,7 +236,7 @@ def _parts(mesh: Mesh, file_format: str) -> dict[str, Any]:
     return parts
 
 
-def _meshio_cells(mesh: Mesh, order: Orders) -> list[tuple[str, NDArray[Any]]]:
+def _meshio_cells(mesh: Mesh, order: Orders) -> list[tuple[str, AnyArray]]:
     return [
         (elements.get(name).meshio, block[:, np.argsort(order[name])] if name in order else np.array(block))
         for name, block in mesh.cells.items()
@@ -253,7 +253,7 @@ def _with_arrays(parts: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
     return {**parts, "cell_data": cell_data, "point_data": point_data}
 
 
-def _flags(members: NDArray[Any], count: int) -> NDArray[np.int32]:
+def _flags(members: AnyArray, count: int) -> Numbers:
     flags = np.zeros(count, np.int32)
     flags[members] = 1
     return flags
@@ -263,7 +263,7 @@ def _with_tags(parts: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
     """Return the parts with a physical tag for each cell, and a vertex cell for each point in a group."""
     dims = np.concatenate([np.full(len(block), elements.get(name).dim) for name, block in mesh.cells.items()])
     tags = np.zeros(mesh.n_cells, np.int32)
-    field_data: dict[str, NDArray[Any]] = {}
+    field_data: dict[str, AnyArray] = {}
     # Small groups overwrite large ones, so that a group of everything does not hide all others.
     for name, members in sorted(mesh.cell_groups.items(), key=lambda item: -len(item[1])):
         if len(members):
