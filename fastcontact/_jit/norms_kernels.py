@@ -3,12 +3,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from fastcontact._jit.decorators import kernel
-
-Array = NDArray[np.float64]
+from fastcontact.arrays import Array
 
 
 def largest(x: Array) -> float:

@@ -10,16 +10,13 @@ import copy
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from fastcontact._jit.norms_kernels import largest
+from fastcontact.arrays import Array, Indices
 from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.constrained_system import System
 from fastcontact.linear.protocol import Loaded
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 
 class ActiveDofs:

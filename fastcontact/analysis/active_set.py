@@ -18,14 +18,11 @@ once, and what follows is the method above from some start. A state counts as se
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.solution import Accuracy, Equilibrium
+from fastcontact.arrays import Array, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.linear.protocol import Loaded
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 def solve(

@@ -7,16 +7,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._jit.norms_kernels import largest
 from fastcontact.analysis.criteria import LOOSEST
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.unsupported_bodies import SLACK
+from fastcontact.arrays import Array
 from fastcontact.elasticity.springs import ground_force
 from fastcontact.errors import ConvergenceError
 
-Array = NDArray[np.float64]
 # Round-off of a sum of internal forces, in units of the sum of their sizes.
 ROUND_OFF = 16 * float(np.finfo(float).eps)
 # Forces are there beyond so much round-off from elsewhere.

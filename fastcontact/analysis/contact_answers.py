@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastcontact.analysis.wear import worn_in_step
+from fastcontact.arrays import Array
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.integration import facet_measure, fine_rule
@@ -18,8 +19,6 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.argument_types import typed
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
-
-Array = NDArray[np.float64]
 
 
 @typed(ContactError)

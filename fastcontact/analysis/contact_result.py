@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
+from fastcontact.arrays import Array, Mask, Numbers
 from fastcontact.contact.closed_nodes import carried
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
@@ -18,9 +18,6 @@ from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pairing import normals
 from fastcontact.contact.surface import Surface
 from fastcontact.results.step import ContactResult, half_width
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 def contact_result(
@@ -102,7 +99,7 @@ class _Forces:
 
     secondary: Array
     total: Array
-    primary_points: NDArray[np.int32]
+    primary_points: Numbers
     primary: Array
 
 

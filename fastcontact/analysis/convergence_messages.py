@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
 from fastcontact.analysis.unsupported_bodies import RigidPosition, UnsupportedBodies
+from fastcontact.arrays import Array, Indices
 from fastcontact.contact.constraints import StackedConstraints
 
-Array = NDArray[np.float64]
 Nodes = dict[str, list[int]]
 # So many updates whose changes are alike go round in circles.
 CIRCLE = 8
@@ -88,7 +87,7 @@ def not_balanced(bodies: UnsupportedBodies, found: RigidPosition, load: float, f
     )
 
 
-def nearest_nodes(problem: Problem, constraints: StackedConstraints, rows: NDArray[np.intp]) -> Nodes:
+def nearest_nodes(problem: Problem, constraints: StackedConstraints, rows: Indices) -> Nodes:
     """Return, by contact pair, the secondary nodes next to constraints, counted through the pairs."""
     found: Nodes = {}
     for name, own in constraints.rows().items():

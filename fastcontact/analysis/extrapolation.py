@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from fastcontact.arrays import Array, Mask
+
 # Gaps [length] and multipliers (m,) of a pair.
 GapsAndForces = tuple[Array, Array]
 # Loads that grow by more than so many last increments at once are not extrapolated to.

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.analysis.anderson import Anderson
@@ -20,12 +19,11 @@ from fastcontact.analysis.scatter import Scatter, Watch
 from fastcontact.analysis.shared_nodes import SharedNodes
 from fastcontact.analysis.solution import Accuracy, Solution
 from fastcontact.analysis.tolerances import PATIENT_UPDATES, Tolerances
+from fastcontact.arrays import Array, Mask
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.errors import ConvergenceError
 
 log = logging.getLogger("fastcontact")
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 # One active-set iteration per pairing is cheapest near the solution but may cycle; after so many, settle the set first.
 SEMISMOOTH_UPDATES = 8
 # Earlier geometries that are mixed into the next one.

@@ -7,18 +7,15 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
 from fastcontact.analysis.state import State
 from fastcontact.analysis.unsupported_bodies import RigidPosition
+from fastcontact.arrays import Array, Mask
 from fastcontact.contact.constraints import Constraints, StackedConstraints, stacked
 from fastcontact.contact.obstacles.rigid_side import RigidSide
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(eq=False)

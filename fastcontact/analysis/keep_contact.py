@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.iterate import gaps_and_forces
@@ -15,9 +14,8 @@ from fastcontact.analysis.solution import FrictionalEquilibrium
 from fastcontact.analysis.state import State
 from fastcontact.analysis.wear import Worn
 from fastcontact.analysis.work import contact_work
+from fastcontact.arrays import Array, Mask
 from fastcontact.results.step import ContactResult
-
-Array = NDArray[np.float64]
 
 
 def keep_contact(problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State) -> State:
@@ -86,9 +84,7 @@ def first_contacts(problem: Problem, start: State, load: StepLoad, u: Array) -> 
     }
 
 
-def never_opening(
-    problem: Problem, start: State, settled: SettledContact
-) -> dict[str, tuple[Array, NDArray[np.bool_]]]:
+def never_opening(problem: Problem, start: State, settled: SettledContact) -> dict[str, tuple[Array, Mask]]:
     """Return by contact pair that is bilateral once closed the places of its constraints, and which are closed for good."""
     found = dict(start.never_opening)
     for name, rows in settled.constraints.rows().items():

@@ -12,7 +12,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._jit import parallel
 from fastcontact._jit.norms_kernels import largest
@@ -25,12 +24,11 @@ from fastcontact.analysis.newton import newton
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
 from fastcontact.analysis.step_result import contact_results, counted, recover
+from fastcontact.arrays import Array
 from fastcontact.elasticity.nonlinear_bodies import DeformedBodies
 from fastcontact.linear.protocol import Loaded
 from fastcontact.model.rigid_motions import generalised
 from fastcontact.results.step import ContactResult, StepResult
-
-Array = NDArray[np.float64]
 
 
 @parallel.on_one_blas_thread

@@ -10,9 +10,6 @@ import logging
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.analysis.balance import Balance, balance
 from fastcontact.analysis.criteria import LOOSEST
@@ -23,11 +20,11 @@ from fastcontact.analysis.inequalities import StepContext
 from fastcontact.analysis.iterate import Iterate
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
+from fastcontact.arrays import Array
 from fastcontact.elasticity.nonlinear_bodies import DeformedBodies
 from fastcontact.errors import ConvergenceError, ModelError
 
 log = logging.getLogger("fastcontact")
-Array = NDArray[np.float64]
 # Newton iterations of a load step, and how often one is halved where it turns cells inside out.
 MOST, HALVINGS = 40, 6
 # Trials of a line search, what it takes for an overshot of the slope at the beginning, and the least part of the way to go.

@@ -9,7 +9,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array, eye_array, kron
 
 from fastcontact._jit import parallel
@@ -18,6 +17,7 @@ from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.state import State
 from fastcontact.analysis.unsupported_bodies import RigidPosition, UnsupportedBodies
 from fastcontact.analysis.work import Work
+from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.held_motions import HeldMotions
@@ -42,7 +42,6 @@ from fastcontact.model.obstacle_rotation import angle_at
 from fastcontact.model.ramp import Ramp, Table, combined, multiplier
 from fastcontact.model.rigid_motions import free_motions
 
-Array = NDArray[np.float64]
 ByRamp = Mapping[Table | None, Array]
 
 
@@ -123,7 +122,7 @@ class Problem:
     system: System
     unsupported_bodies: UnsupportedBodies | None
     dofs: ActiveDofs
-    contact_dofs: NDArray[np.intp]
+    contact_dofs: Indices
     force_driven: ForceDrivenObstacles
     prescribed: ByRamp
     forces: ByRamp
@@ -133,7 +132,7 @@ class Problem:
     following: Sequence[tuple[FollowingPressure, Table | None]] = ()
 
     @cached_property
-    def material_of_cells(self) -> NDArray[np.int32]:
+    def material_of_cells(self) -> Numbers:
         """Material of every solid cell (n_solids,), equal ones under one number."""
         return np.concatenate(list(self.field.distinct.values()))
 
@@ -308,7 +307,7 @@ def prepare(
 
 
 def active_dofs(
-    system: System, contact_dofs: NDArray[np.intp], involved: NDArray[np.intp], pairs: Mapping[str, Formulation],
+    system: System, contact_dofs: Indices, involved: Indices, pairs: Mapping[str, Formulation],
     bodies: UnsupportedBodies | None, solver: LinearSolver,
 ) -> ActiveDofs:  # fmt: skip
     """Return the displacement components that a pairing solves for."""
@@ -326,8 +325,8 @@ def _forces(model: Model) -> dict[Table | None, Array]:
 
 
 def _prepare_solver(
-    solver: LinearSolver, system: System, bodies: UnsupportedBodies | None, modes: Array, involved: NDArray[np.intp]
-) -> NDArray[np.intp]:
+    solver: LinearSolver, system: System, bodies: UnsupportedBodies | None, modes: Array, involved: Indices
+) -> Indices:
     """Give the linear solver the matrix, with the springs of unsupported bodies; return the unknowns of contact."""
     matrix = system.matrix if bodies is None else bodies.with_springs(system.matrix)
     if bodies is not None:
@@ -339,7 +338,7 @@ def _prepare_solver(
     return involved
 
 
-def _contact_dofs(mesh: Any, pairs: Mapping[str, Formulation], n_driven: int) -> NDArray[np.intp]:
+def _contact_dofs(mesh: Any, pairs: Mapping[str, Formulation], n_driven: int) -> Indices:
     """Return the displacement components of all points on contact surfaces, and of obstacles that forces drive."""
     sides = [side.points for pair in pairs.values() for side in (pair.secondary, pair.primary)]
     points = np.unique(np.concatenate(sides)) if sides else np.empty(0, np.intp)

@@ -11,11 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._jit.norms_kernels import largest, largest_difference
+from fastcontact.arrays import Array
 
-Array = NDArray[np.float64]
 # Updates to look at, and how far apart their displacements may lie in units of the typical change: WINDOW in one direction.
 WINDOW, APART = 8, 4.0
 # Where changes may be what linear solutions leave, fewer will do, closer together: 3 in one direction.

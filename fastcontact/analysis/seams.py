@@ -9,10 +9,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.contact_answers import lumped_areas
 from fastcontact.analysis.problem import Problem
+from fastcontact.arrays import Indices
 from fastcontact.model.periodicity import Seam
 from fastcontact.results.step import ContactResult, StepResult
 
@@ -38,7 +38,7 @@ def joined(problem: Problem, results: dict[str, ContactResult]) -> dict[str, Con
     return found
 
 
-def _rows(problem: Problem, contact: ContactResult, seam: Seam) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _rows(problem: Problem, contact: ContactResult, seam: Seam) -> tuple[Indices, Indices]:
     """Return the rows of the nodes of one place among those of a contact, where it has both."""
     row = np.full(problem.model.mesh.n_points, -1, np.intp)
     row[contact.points] = np.arange(len(contact.points))

@@ -21,12 +21,10 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints, StackedConstraints
 from fastcontact.model.periodicity import Seam
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-Indices = NDArray[np.intp]
 # Entries of rows [-] that differ by less are the same.
 SAME = 1e-9
 # Gaps that differ by less than this part of the coordinates are the same.

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.pairing import Candidates, tangents
 from fastcontact.results.step import ContactResult
 
-Array = NDArray[np.float64]
 # In facet lengths: nodes that stand out as far beyond the other side may still be pressed, by parts of their facets.
 STANDS_OUT = 3.0
 

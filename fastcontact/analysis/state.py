@@ -8,15 +8,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.unsupported_bodies import RigidPosition
 from fastcontact.analysis.wear import Worn
 from fastcontact.analysis.work import ContactForces, Work
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from fastcontact.arrays import Array, Mask
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,16 +17,15 @@ which lock with it or have none, the mean dilatation of the cells at each node (
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.problem import Problem
+from fastcontact.arrays import Array, Mask
 from fastcontact.elasticity import incompatible_modes, recovery
 from fastcontact.elasticity.energy import cell_volumes
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.mesh import elements
 from fastcontact.model.model import Model
 
-Array = NDArray[np.float64]
 # Poisson's ratio from which on plain elements may lock, the excess of stiffness that is worth a warning, and the number of
 # conjugate gradients.
 SUSPICIOUS, EXCESS, ITERATIONS = 0.45, 0.05, 5
@@ -63,7 +62,7 @@ class Comparison:
         self.elements = list(self._cells)
         self.nu = max((float(nu[self._material[name][rows]].max()) for name, rows in self._cells.items()), default=0.0)
 
-    def _may_lock(self, name: str) -> NDArray[np.bool_]:
+    def _may_lock(self, name: str) -> Mask:
         """Return which cells (n_cells,) of an element may lock."""
         numbers = self._material[name]
         bends = incompatible_modes.asked(name, self._treatment)

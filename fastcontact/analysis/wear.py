@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.slip import slip_of_nodes
+from fastcontact.arrays import Array
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.mesh import elements
 from fastcontact.results.step import ContactResult
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,21 +10,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 
 from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
+from fastcontact.arrays import AnyArray, Array
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pairing import Candidates
 from fastcontact.results.step import ContactResult
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +50,7 @@ class ContactForces:
     pressure: Array
     traction: Array
     energy: Array
-    rows: Sequence[NDArray[Any]]
+    rows: Sequence[AnyArray]
     tangential: Array
     pressing: Array
     added: Array

@@ -11,13 +11,12 @@ from dataclasses import dataclass
 from importlib import resources
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analytic._inputs import number, positive
 from fastcontact.analytic.hertz_point import HertzPoint, hertz_point
+from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 
-Array = NDArray[np.float64]
 NU = 0.3  # the table was computed for this Poisson ratio only
 
 

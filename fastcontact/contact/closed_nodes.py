@@ -10,12 +10,10 @@ and more are farther from where the error is. A tension at a closed node makes i
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Mask
 from fastcontact.contact.surface import Surface
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 # A node with less than this part of the mean area takes no share: its pressure would be anything.
 NO_AREA = 1e-3
 # Shares below this part of the largest are rounding errors.

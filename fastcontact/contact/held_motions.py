@@ -10,7 +10,8 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial.distance import cdist
 
-Array = NDArray[np.float64]
+from fastcontact.arrays import Array, Indices, Mask
+
 # Cosine of the angle within which directions at several nodes are taken together, as those of a curved rim are.
 TOGETHER = 0.94
 # Power of the inverse distance by which directions count elsewhere.
@@ -29,11 +30,11 @@ class HeldMotions:
         Orthogonal projectors on the prescribed directions [-].
     """
 
-    nodes: NDArray[np.intp]
+    nodes: Indices
     projectors: Array
 
     @classmethod
-    def of(cls, supported: NDArray[np.bool_], relations: csr_array) -> HeldMotions:
+    def of(cls, supported: Mask, relations: csr_array) -> HeldMotions:
         """Return what `supported` components (n_points, dim) and `relations` (m, n_dofs) of single nodes hold."""
         dim = supported.shape[1]
         owners, normals = _rows_of_single_nodes(relations, dim)
@@ -55,7 +56,7 @@ class HeldMotions:
         return np.asarray(np.where((self.nodes[place] == nodes)[..., None, None], self.projectors[place], 0.0))
 
 
-def _rows_of_single_nodes(relations: csr_array, dim: int) -> tuple[NDArray[np.intp], Array]:
+def _rows_of_single_nodes(relations: csr_array, dim: int) -> tuple[Indices, Array]:
     """Return the nodes (k,) of rows that relate components of one node alone, and the unit vectors (k, dim) of the rows."""
     counts = np.diff(relations.indptr)
     rows = np.flatnonzero(counts > 0)

@@ -8,14 +8,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import SuperLU
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ContactError
 from fastcontact.linear.field_compliance import FieldCompliance
 
-Array = NDArray[np.float64]
 # Closed integration points up to which the dense equations of the continuous formulation are solved, in about a minute.
 MOST_POINTS = 10_000
 
@@ -47,7 +46,7 @@ class Projection:
     eliminable: bool = True
     quadratic: bool = False
 
-    def block(self, rows: NDArray[np.intp]) -> Array:
+    def block(self, rows: Indices) -> Array:
         """Return rows and columns `rows` of C, a dense matrix; ContactError where it would be too large to be of use."""
         if len(rows) > MOST_POINTS:
             raise ContactError(
@@ -62,7 +61,7 @@ class Projection:
         own = np.divide(1.0, areas, out=np.zeros_like(areas), where=areas > 0)
         return (np.diag(own) - P @ self.mass.solve(np.ascontiguousarray(P.T))) / self.rho
 
-    def among(self, rows: NDArray[np.intp]) -> Array | FieldCompliance:
+    def among(self, rows: Indices) -> Array | FieldCompliance:
         """Return C among `rows`; see `Compliance`."""
         if not self.eliminable or self.mass is None or not (self.areas[rows] > 0).all():
             return self.block(rows)
@@ -83,7 +82,7 @@ class Projection:
         """Return the independent values (k,) of the multiplier field [pressure] for point forces (m,) [force]."""
         return np.zeros(self.P.shape[1]) if self.mass is None else self.mass.solve(self.P.T @ multiplier)
 
-    def compliant(self, columns: NDArray[np.intp]) -> Array:
+    def compliant(self, columns: Indices) -> Array:
         r"""Return a factor Z (m, h) of what dropping `columns` of the multiplier field adds to the compliance C.
 
         At supported nodes, as on an axis or in a plane of symmetry, the slip of a facet has one nodal value less than its

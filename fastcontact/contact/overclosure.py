@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.errors import ContactError
-
-Array = NDArray[np.float64]
 
 
 class OverclosureLaw:

@@ -6,17 +6,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, diags_array, eye_array
 
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.contact.pairing import Candidates, Pairing, normals
 from fastcontact.contact.projection import places
 from fastcontact.contact.surface import Surface
 from fastcontact.mesh import elements
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 KINDS = ("unilateral", "bilateral", "bilateral_once_closed", "tied", "gap_only")
 Field = Callable[[Array], Array]
 # A vector of which less than this lies in a tangent plane is normal to it.
@@ -62,7 +60,7 @@ class PairOptions:
     tangential_penalty: Field | None = None
     search_distance: float | None = None
     wear: float | None = None
-    same_place: NDArray[np.intp] | None = None
+    same_place: Indices | None = None
 
     @property
     def gap_only(self) -> bool:
@@ -85,7 +83,7 @@ class PairOptions:
             np.zeros(len(candidates.nodes), bool) if self.excluded is None else candidates.belonging_to(self.excluded)
         )
 
-    def borders(self, side: Surface) -> tuple[NDArray[np.intp], Array]:
+    def borders(self, side: Surface) -> tuple[Indices, Array]:
         """Return (facet, xi) of the points of lines where what belongs to excluded nodes ends."""
         mask = self.excluded
         if mask is None:
@@ -143,7 +141,7 @@ class PairOptions:
         return factor * added
 
 
-def spread(side: Surface, excluded: Mask, givers: NDArray[np.intp]) -> csr_array:
+def spread(side: Surface, excluded: Mask, givers: Indices) -> csr_array:
     """Return the nodal field (m, m) of a multiplier of which excluded nodes have no value of their own.
 
     They take the mean of their neighbours among the nodes `givers`, so that a uniform field remains one; zero where

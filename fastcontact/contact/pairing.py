@@ -7,12 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from fastcontact.arrays import AnyArray, Array, Indices, Mask, Numbers
 from fastcontact.contact.line_projection import along_line_normals, smooth_ends
 from fastcontact.contact.obstacles.rigid_side import RigidSide, Stance
 from fastcontact.contact.projection import (
@@ -27,7 +26,6 @@ from fastcontact.contact.search.closest import Closest, closest_of_kinds
 from fastcontact.contact.surface import Surface
 from fastcontact.mesh import elements
 
-Array = NDArray[np.float64]
 # In facet lengths: how far beyond both facets at a node a point may lie and still face it; what is rounding.
 FOLDED = 0.5
 ROUNDING = 1e-10
@@ -49,9 +47,9 @@ class Candidates:
         Their reference coordinates in it.
     """
 
-    nodes: NDArray[np.int32]
+    nodes: Numbers
     shape: Array
-    facet: NDArray[np.intp] | None = None
+    facet: Indices | None = None
     xi: Array | None = None
 
     @classmethod
@@ -82,7 +80,7 @@ class Candidates:
         """Return the positions (n, dim) for nodal `coordinates` (n_points, dim)."""
         return np.einsum("nk,nkd->nd", self.shape, coordinates[self.nodes])
 
-    def belonging_to(self, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def belonging_to(self, mask: Mask) -> Mask:
         """Return which candidates (n,) lie nearer to nodes of `mask` (n_points,) than to all others."""
         inside = mask[self.nodes]
         largest = np.where(inside, self.shape, -np.inf).max(axis=1)
@@ -110,14 +108,14 @@ class Pairing:
         on straight there; None where none does.
     """
 
-    facet: NDArray[np.intp]
+    facet: Indices
     xi: Array
     normal: Array
-    paired: NDArray[np.bool_]
+    paired: Mask
     offset: Array | None = None
     beyond: Array | None = None
 
-    def places(self, primary: Surface, rows: NDArray[np.intp]) -> Places:
+    def places(self, primary: Surface, rows: Indices) -> Places:
         """Return the points of `primary` that candidates `rows` (n,) face, facets going on straight beyond their ends."""
         found = places(primary, self.facet[rows], self.xi[rows])
         if self.beyond is None:
@@ -174,9 +172,7 @@ def pair(
     )
 
 
-def _straight_on(
-    pairing: Pairing, candidates: Array, primary: Surface, coordinates: Array, outside: NDArray[np.bool_]
-) -> Pairing:
+def _straight_on(pairing: Pairing, candidates: Array, primary: Surface, coordinates: Array, outside: Mask) -> Pairing:
     """Return the pairing with how far those `outside` (n,) stand beyond the ends of their facets."""
     rows = np.flatnonzero(outside)
     if not len(rows):
@@ -190,7 +186,7 @@ def _straight_on(
     return replace(pairing, beyond=beyond)
 
 
-def _at_smooth_ends(primary: Surface, coordinates: Array, found: Closest) -> NDArray[np.bool_]:
+def _at_smooth_ends(primary: Surface, coordinates: Array, found: Closest) -> Mask:
     """Return which candidates (n,) stand out at an end of a line where another line goes on from without a corner.
 
     On lines that fold inward, points at a distance lie beyond the ends of both facets at a node, but not beyond the end
@@ -203,7 +199,7 @@ def _at_smooth_ends(primary: Surface, coordinates: Array, found: Closest) -> NDA
     return np.asarray(out & smooth[found.facet, (found.xi[:, 0] > 0.0).astype(np.intp)])
 
 
-def filled_up(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
+def filled_up(parts: Sequence[AnyArray]) -> AnyArray:
     """Return arrays (n_i, k_i) as one, as wide as the widest: integers are repeated, floating-point numbers zero."""
     width = max(part.shape[1] for part in parts)
     missing = [((0, 0), (0, width - part.shape[1])) for part in parts]

@@ -6,15 +6,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pairing import Pairing
 from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError, unknown
 
-Array = NDArray[np.float64]
 Normals = str | Sequence[float]
 KINDS = ("facet", "averaged", "secondary")
 # Cosine of the angle beyond which two sides do not face each other: about 85 degrees.

@@ -11,17 +11,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._jit.parallel import portions, shared
+from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.contact import projection_kernels
 from fastcontact.contact.search.closest import Closest
 from fastcontact.contact.search.facet_tables import tables
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.mesh import elements
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 # What the projection of a point takes, in nodes of a cell: see `portions`.
 EFFORT = 16
@@ -43,7 +40,7 @@ class Places:
         Their derivatives.
     """
 
-    nodes: NDArray[np.int32]
+    nodes: Numbers
     local: Indices
     shape: Array
     gradient: Array

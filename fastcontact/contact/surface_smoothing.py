@@ -18,17 +18,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.special import comb
 
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.projection import CORNER
 from fastcontact.contact.search.closest import closest_of_kinds
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.mesh import elements
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 # Heights below this part of the size of a facet are rounding errors of node positions.
 ROUND_OFF = 1e-10
 # Columns of a fit are scaled by this with each degree, and its squares damped: where nodes leave terms undetermined, as on a
@@ -148,7 +146,7 @@ def smooth_side(side: Surface, points: Array) -> SmoothSide | None:
     return SmoothSide(heights * _limiter(near, curvature, axes)[:, None, None], curvature)
 
 
-def _neighbours(side: Surface, normal: Array) -> tuple[csr_array, Indices, NDArray[np.bool_]]:
+def _neighbours(side: Surface, normal: Array) -> tuple[csr_array, Indices, Mask]:
     """Return which facets share a node and meet at no corner, and the nodes of all these for each facet.
 
     A matrix (n_facets, n_facets), each facet with itself, positions (n_facets, most) in the points of the side, and which of
@@ -168,7 +166,7 @@ def _neighbours(side: Surface, normal: Array) -> tuple[csr_array, Indices, NDArr
     return near, padded, taken
 
 
-def _flat(points: Array, around: Array, taken: NDArray[np.bool_]) -> bool:
+def _flat(points: Array, around: Array, taken: Mask) -> bool:
     """Return whether points (n, dim) lie in one plane, or the points `around` (n, m, dim) every facet in one of their own."""
     away = points - points.mean(axis=0)
     if np.linalg.svd(away, compute_uv=False)[-1] <= ROUND_OFF * np.linalg.norm(away):
@@ -200,7 +198,7 @@ class _Fit:
         local = np.einsum("nkd,ned->nke", points - self.origin[:, None], self.axes) / self.size[:, None, None]
         return local[..., :-1], local[..., -1]
 
-    def fitted(self, points: Array, taken: NDArray[np.bool_]) -> _Fit:
+    def fitted(self, points: Array, taken: Mask) -> _Fit:
         """Return this one with polynomials fitted to those `points` (n, m, dim) that are `taken` (n, m)."""
         (plane, height), (i, j) = self.in_planes(points), self.powers
         lower = LOWER ** (i + j) * np.sqrt(comb(i + j, i))  # no direction counts more than others (Bombieri's norm)
@@ -208,9 +206,8 @@ class _Fit:
         rest = np.where(taken, height - _conic(self.curvature, plane), 0.0)
         damping = np.sqrt(DAMPING * (columns**2).sum(axis=(1, 2)))[:, None, None] * np.eye(len(i), len(i) + 1)
         # By orthogonal factors: in normal equations what the damping determines would be known to 1e-3 only.
-        R = np.linalg.qr(
-            np.concatenate([np.concatenate([columns, rest[..., None]], axis=2), damping], axis=1), mode="r"
-        )
+        rows = np.concatenate([np.concatenate([columns, rest[..., None]], axis=2), damping], axis=1)
+        R: Array = np.asarray(np.linalg.qr(rows, mode="r"))
         return replace(self, polynomial=lower * np.linalg.solve(R[:, : len(i), :-1], R[:, : len(i), -1:])[..., 0])
 
     def at(self, plane: Array) -> Array:
@@ -227,7 +224,7 @@ class _Fit:
         return self.polynomial[:, slope], self.curvature - self.polynomial[:, second] * (1.0 + np.eye(len(second)))
 
 
-def _fit(block: FacetBlock, points: Array, around: Array, taken: NDArray[np.bool_], degree: int) -> _Fit:
+def _fit(block: FacetBlock, points: Array, around: Array, taken: Mask, degree: int) -> _Fit:
     """Fit surfaces to those of the points `around` (n, m, dim) the facets of a block that are `taken` (n, m).
 
     From pass to pass, planes turn to be tangent, and what is of constant curvature is taken out of the polynomials.

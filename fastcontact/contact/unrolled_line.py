@@ -6,11 +6,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.contact.surface import Surface
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,11 +17,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.elasticity.energy import cell_volumes
 from fastcontact.elasticity.incompatible_modes import BENDING, MODES
 from fastcontact.mesh import elements
 
-Array = NDArray[np.float64]
 # Which moduli have a mean dilatation: True or 1, see `MaterialField.treatment`.
 Mask = NDArray[np.bool_] | NDArray[np.uint8]
 # Bulk over shear modulus at nu = 0.3: 2 (1 + nu) / (3 (1 - 2 nu)).

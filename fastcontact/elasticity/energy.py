@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.mesh import quadrature
 from fastcontact.mesh.elements import Element
-
-Array = NDArray[np.float64]
 
 
 def elastic_energy(stress: Array, compliance: Array) -> Array:

@@ -13,14 +13,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.elasticity.constitutive_kernels import INVARIANTS, OGDEN, PLASTIC
 from fastcontact.elasticity.materials import NEARLY_INCOMPRESSIBLE, LinearElastic, check_positive
 from fastcontact.errors import ModelError
 from fastcontact.mesh.argument_types import typed
 
-Array = NDArray[np.float64]
 STRAINS = ("small", "finite")
 
 

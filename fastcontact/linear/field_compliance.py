@@ -16,12 +16,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import block_diag, csc_array, csr_array, diags_array
 from scipy.sparse.linalg import splu
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from fastcontact.arrays import Array, Indices, Mask
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +89,7 @@ class FieldCompliance:
         compliance = self._at_edge(touched[edge], units[edge])
         return FieldEquations(csr_array(shares @ B), shares @ c, P, edge, compliance, touched[edge], units[edge])
 
-    def _at_edge(self, given: NDArray[np.intp], units: Array) -> csr_array:
+    def _at_edge(self, given: Indices, units: Array) -> csr_array:
         """Return E (e, e) among values `given` (e,), those without any equation being eliminated."""
         rest = np.setdiff1d(np.flatnonzero(self.others.diagonal() > 0.0), given)
         E = csr_array(self.others[given][:, given])
@@ -128,5 +126,5 @@ class FieldEquations:
     P: csr_array
     edge: Mask
     compliance: csr_array
-    at: NDArray[np.intp]
+    at: Indices
     units: Array

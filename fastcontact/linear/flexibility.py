@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, lstsq
 from scipy.sparse import csr_array
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ContactError, ConvergenceError
 from fastcontact.linear.field_compliance import FieldCompliance
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 # Right-hand sides at a time: whole columns of K^-1 are long, and only short parts of them are kept.
 CHUNK = 32
 # Constraints whose full compliance is formed and factorised, at most: 3.2 GB a copy, and minutes; with friction, where

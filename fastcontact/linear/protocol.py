@@ -12,14 +12,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
-import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.linear.field_compliance import FieldCompliance
 from fastcontact.linear.springs import Springs
 
-Array = NDArray[np.float64]
 # Called with an unfinished solution (u, multiplier, relative residual); where it returns True, the solver stops there.
 Monitor = Callable[[Array, Array, float], bool]
 
@@ -49,7 +47,7 @@ class Loaded(Protocol):
 
     def solve(
         self, B: csr_array, c: Array, C: Array | FieldCompliance | None = None, guess: Array | None = None,
-        monitor: Monitor | None = None, tolerance: float | None = None, nodes: NDArray[np.intp] | None = None,
+        monitor: Monitor | None = None, tolerance: float | None = None, nodes: Indices | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         """Return (u, multiplier) with ``K u = f + B.T multiplier`` and ``B u + C multiplier = c``.
 
@@ -117,7 +115,7 @@ class LoadedNonsymmetric(Loaded, Protocol):
         ...
 
     def solve_nonsymmetric(
-        self, B: csr_array, c: Array, nodes: NDArray[np.intp], guess: Array, tolerance: float,
+        self, B: csr_array, c: Array, nodes: Indices, guess: Array, tolerance: float,
         friction: FrictionTerms | None = None, C: Array | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         """Return (u, multiplier) with ``B u + C multiplier = c`` and ``K u + S u = f + forces + rows.T multiplier``.
@@ -176,7 +174,7 @@ class LinearSolver(Protocol):
         return False
 
     def prepare(
-        self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None, release: bool = False
+        self, K: bsr_array, rigid_modes: Array, involved: Indices | None = None, release: bool = False
     ) -> bsr_array | Product:
         """Do what is done once for a matrix: factorise it, or build a hierarchy.
 

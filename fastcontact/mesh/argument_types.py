@@ -23,8 +23,8 @@ from typing import Any, TypeVar, Union
 import numpy as np
 import numpy.typing
 
+from fastcontact.arrays import REFUSAL, is_masked
 from fastcontact.errors import FastcontactError
-from fastcontact.masks import REFUSAL, is_masked
 
 F = TypeVar("F", bound=Callable[..., Any])
 _ARRAY_LIKE = {*typing.get_args(np.typing.ArrayLike)}

@@ -6,9 +6,9 @@ A `Rule` consists of points (n_q, dim) and weights (n_q,), both without dimensio
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from fastcontact.arrays import Array
+
 Rule = tuple[Array, Array]
 
 

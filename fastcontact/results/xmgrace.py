@@ -8,8 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fastcontact.arrays import Array
 from fastcontact.errors import CaseError, FileError, unknown
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.files.paths import PathLike, replacing
@@ -55,8 +56,8 @@ class Curve:
         If `x` and `y` are not two vectors of one length, or there is no such style.
     """
 
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
+    x: Array
+    y: Array
     legend: str = ""
     style: str = "line"
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import AnyArray
 from fastcontact.cases.case import Case
 from fastcontact.results.plot.patches import outlines
 from fastcontact.results.step import StepResult
@@ -107,7 +107,7 @@ class AdaptiveStudy(Report):
         counts = {"n_dofs": found.n_dofs, "n_cells": found.n_cells}
         return {**counts, **found.values, **errors, "seconds": found.seconds}
 
-    def table(self) -> NDArray[Any]:
+    def table(self) -> AnyArray:
         """Return a structured array (n_rounds,), one row a mesh, as ``--csv`` writes it.
 
         Fields ``n_dofs``, ``n_cells``, the quantity in its unit, and ``energy_error``, ``estimate``, ``true_error`` (against

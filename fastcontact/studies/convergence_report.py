@@ -7,8 +7,7 @@ from functools import partial
 from itertools import zip_longest
 from typing import Any
 
-from numpy.typing import NDArray
-
+from fastcontact.arrays import AnyArray
 from fastcontact.studies import convergence_tables as tables
 from fastcontact.studies.convergence_figures import draw_differences, draw_errors, draw_pressure
 from fastcontact.studies.fit import CONFIDENCE
@@ -73,7 +72,7 @@ class Study(Report):
         }
         return self.framed(numbers)
 
-    def table(self) -> NDArray[Any]:
+    def table(self) -> AnyArray:
         """Return a structured array (n_rows,), one row a level of a combination, as ``--csv`` writes it.
 
         Fields ``element``, ``formulation``, ``level``, ``h`` [length], ``n_dofs``, ``seconds`` [s], and for every quantity

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from numpy.typing import NDArray
-
+from fastcontact.arrays import AnyArray
 from fastcontact.cases.case import Case
 from fastcontact.cases.summary import versions
 from fastcontact.mesh.html_table import html_table
@@ -47,7 +46,7 @@ class Report:
         """Return the main tables, each with its caption; the first row is a header."""
         raise NotImplementedError
 
-    def table(self) -> NDArray[Any]:
+    def table(self) -> AnyArray:
         """Return the numbers as a structured array (n_rows,)."""
         raise NotImplementedError
 

@@ -6,8 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from numpy.typing import NDArray
-
+from fastcontact.arrays import AnyArray
 from fastcontact.studies.quantities import column, title
 from fastcontact.studies.render import page
 from fastcontact.studies.render.figure import panels
@@ -67,7 +66,7 @@ class Sweep(Report):
         }
         return self.framed(numbers)
 
-    def table(self) -> NDArray[Any]:
+    def table(self) -> AnyArray:
         """Return a structured array (n_points,), one row a point, as ``--csv`` writes it.
 
         Fields: the parameters, ``h`` [length], ``n_dofs``, ``seconds`` [s], and for every quantity its value in its unit

@@ -14,12 +14,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.friction.coulomb_law import Law
+from fastcontact.arrays import Array, Mask
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 # Residual of a solution over the largest force.
 EXACT = 1e-12
 # Newton iterations from one start, the shortest step along them, and how often a longer one may be of no use.

@@ -11,10 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from fastcontact.arrays import Array, Indices, Mask
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +47,7 @@ class Law:
         closed = n > 0 if self.equality is None else (n > 0) | self.equality
         return closed, (n > 0) & (reach <= radius) & (self.mu > 0)
 
-    def slide(self, y: Array, gaps: Array, sliding: NDArray[np.intp]) -> tuple[Array, Array]:
+    def slide(self, y: Array, gaps: Array, sliding: Indices) -> tuple[Array, Array]:
         """Return the directions (k, q) in which constraints `sliding` (q,) slide, and how much of a turn t follows (q,)."""
         _, t, reach, radius = self.trial(y, gaps)
         along = np.maximum(reach[sliding], 1e-300)

@@ -17,14 +17,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.friction import lemke_kernels, sweep_kernels
 from fastcontact.analysis.friction.cone_newton import Forces, newton
 from fastcontact.analysis.friction.coulomb_law import Law
+from fastcontact.arrays import Array, Mask
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 # Residual of a solution over the largest force where round-off leaves no better one.
 ACCEPTABLE = 1e-9
 # Relative changes down to which starts are swept, and the sweeps that one may take.

@@ -11,21 +11,19 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 
 from fastcontact.analysis.friction.cone_newton import EXACT, Forces, newton
 from fastcontact.analysis.friction.coulomb_law import Law
 from fastcontact.analysis.friction.slip_directions import GIVING, aligning, compliance_of_rows, idle
 from fastcontact.analysis.solution import Accuracy
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.protocol import FrictionTerms, LoadedNonsymmetric
 from fastcontact.linear.sparse_rows import scaled, taken
 from fastcontact.linear.springs import Springs
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 # The stiffest spring across a slip, in units of what holds the constraint itself: a slip that hardly moves would ask for
 # any. The solution does not depend on it, for there nothing slips across.
 STIFFEST = 100.0
@@ -212,7 +210,7 @@ class Eliminated:
         self._inexact = False
         return self._last > self._tolerance
 
-    def _sliding(self, y: Array, gaps: Array, at: NDArray[np.intp]) -> _Sliding:
+    def _sliding(self, y: Array, gaps: Array, at: Indices) -> _Sliding:
         """Return what the constraints `at` (q,) do that slide."""
         d, turning = self.law.slide(y, gaps, at)
         pull = self.law.mu[at] * d
@@ -226,7 +224,7 @@ class Eliminated:
             at, pull, _Across(across, Springs(csr_array(rows), spring), (across * self._free[1:, at]).sum(axis=0))
         )
 
-    def _drag(self, B: csr_array, shut: NDArray[np.intp], sliding: _Sliding) -> FrictionTerms:
+    def _drag(self, B: csr_array, shut: Indices, sliding: _Sliding) -> FrictionTerms:
         """Return what sliding adds to equations B whose first rows are the gaps of `shut`."""
         pull = np.zeros((len(self._rows) - 1, len(self._usable)))
         pull[:, sliding.at] = sliding.pull
@@ -264,7 +262,7 @@ class _Across:
 class _Sliding:
     """Constraints `at` (q,) that slide: tangential over normal forces (k, q), and springs in three dimensions."""
 
-    at: NDArray[np.intp]
+    at: Indices
     pull: Array
     springs: _Across | None = None
 

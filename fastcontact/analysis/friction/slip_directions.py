@@ -6,12 +6,11 @@ All of it looks at the compliance of each constraint by itself: `own` (1 + k, 1 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import block_array, csr_array, diags_array
 
 from fastcontact.analysis.friction import slip_directions_kernels
+from fastcontact.arrays import Array, Mask
 
-Array = NDArray[np.float64]
 # A direction of slip in which a constraint gives less than this, relative to its gap, is none.
 IDLE = 1e-10
 # What a prescribed slip gives way, relative to its gap: next to nothing, but sticking has an equation so, which no force in
@@ -61,7 +60,7 @@ def aligning(own: Array) -> csr_array | None:
     return csr_array(block_array([[diags_array(np.ones(m)), zero, zero], [zero, c, s], [zero, -s, c]], format="csr"))
 
 
-def idle(own: Array) -> NDArray[np.bool_]:
+def idle(own: Array) -> Mask:
     """Return the tangents (k, m) along which supports leave no motion, or none but that of the gap.
 
     At an axis and in a plane of symmetry friction has nothing to do there, and its equation would be no equation.

@@ -13,20 +13,18 @@ import dataclasses
 import logging
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import lstsq
 from scipy.sparse import csr_array, vstack
 
 from fastcontact.analysis.friction import dense, eliminated
 from fastcontact.analysis.friction.slip_directions import GIVING, aligning, idle, own_compliance
 from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.linear.flexibility import MOST_ROWS_WITH_FRICTION, check_rows
 from fastcontact.linear.protocol import Loaded, LoadedNonsymmetric
 
 log = logging.getLogger("fastcontact")
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 def solve(
@@ -139,7 +137,7 @@ def _among(
     )  # fmt: skip
 
 
-def _add_compliance(F: Array, constraints: Constraints, rows: NDArray[np.intp]) -> None:
+def _add_compliance(F: Array, constraints: Constraints, rows: Indices) -> None:
     """Add, in place, what constraints `rows` give way by themselves to the flexibility F ((1 + k) m, (1 + k) m)."""
     if constraints.compliance is not None and len(rows):
         along = np.stack([direction[rows] for direction in constraints.directions])

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import qr, solve_triangular
 from scipy.sparse import bsr_array, csr_array, diags_array
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.constrained_system import System, diagonal_of, supports_apart
 from fastcontact.linear.elimination.coupled_pivots import RepeatedError
 from fastcontact.linear.elimination.elimination import eliminate
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 # Rows that others make up but for this part of them repeat them.
 REPEATED = 1e-9
 

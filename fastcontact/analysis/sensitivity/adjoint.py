@@ -10,14 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from fastcontact.analysis.sensitivity.moving_contact import MovingContact
+from fastcontact.arrays import Array
 from fastcontact.errors import ConvergenceError
 
-Array = NDArray[np.float64]
 # What GMRES may leave of s, and how many solutions it may take.
 LEFT, SOLUTIONS = 1e-10, 200
 

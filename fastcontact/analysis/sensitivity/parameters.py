@@ -8,13 +8,13 @@ from dataclasses import replace
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.sensitivity.adjoint import Change
 from fastcontact.analysis.sensitivity.material_constants import CONSTANTS, by_constant, check_constant
 from fastcontact.analysis.sensitivity.moving_contact import MovingContact
 from fastcontact.analysis.sensitivity.quantities import Asked
 from fastcontact.analysis.wear import Worn
+from fastcontact.arrays import Array
 from fastcontact.elasticity.inertia_loads import Centrifugal
 from fastcontact.elasticity.loads import Load, evaluated
 from fastcontact.elasticity.temperature import Temperature
@@ -25,7 +25,6 @@ from fastcontact.model.parts.base import Support
 from fastcontact.model.pretension import Pretension, PretensionForce
 from fastcontact.model.ramp import combined, multiplier
 
-Array = NDArray[np.float64]
 Item = TypeVar("Item", bound=Load | Temperature)
 FORMS = {
     "E": '("E", material), with the number of the axis, "1", of an Orthotropic',

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.contact.formulations import _cut_faces_kernels
 from fastcontact.contact.formulations._overlap import Coupling, Overlap
 from fastcontact.contact.search.box_tree_kernels import build, tree_order
@@ -21,7 +21,6 @@ from fastcontact.contact.surface_smoothing import Smoothing
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements, quadrature
 
-Array = NDArray[np.float64]
 # Facets face each other if their normals enclose more than about 95 degrees.
 FACING = -0.1
 # How far off what faces a facet may be: in distances of the closest primary facet, and radii of the facet itself.
@@ -72,7 +71,7 @@ def face_overlap(
 
 
 def _heights(
-    smoothing: Smoothing | None, pairs: NDArray[np.intp], first: tuple[int, int], blocks: tuple[_Polygons, _Polygons]
+    smoothing: Smoothing | None, pairs: Indices, first: tuple[int, int], blocks: tuple[_Polygons, _Polygons]
 ) -> tuple[Array, Array, Array]:
     """Return the heights of the facets of two blocks above their planes, and the factors (n_pairs, 2) of `Smoothing.shared`.
 
@@ -112,7 +111,7 @@ class _Polygons:
         return cls(block, nodes, count, origin, axes, radius, corners.min(axis=1), corners.max(axis=1))
 
 
-def _facing(ours: _Polygons, theirs: _Polygons, reach: Array) -> NDArray[np.intp]:
+def _facing(ours: _Polygons, theirs: _Polygons, reach: Array) -> Indices:
     """Return the pairs of facets (n, 2) that face each other with a part, in ascending order."""
     numbers = tree_order(theirs.origin)
     tree = build(theirs.low[numbers], theirs.high[numbers])
@@ -129,7 +128,7 @@ def _facing(ours: _Polygons, theirs: _Polygons, reach: Array) -> NDArray[np.intp
 
 
 def _integrated(
-    ours: _Polygons, theirs: _Polygons, pairs: NDArray[np.intp], reference: Array, heights: tuple[Array, Array, Array]
+    ours: _Polygons, theirs: _Polygons, pairs: Indices, reference: Array, heights: tuple[Array, Array, Array]
 ) -> tuple[Coupling, Array, Array]:
     """Return the coupling of pairs of facets, and of the secondary ones over what they face there the mass and `closer`."""
     one, other = elements.get(ours.block.element), elements.get(theirs.block.element)

@@ -13,17 +13,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, diags_array, lil_array
 
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.integration import facet_measure, fine_rule
 from fastcontact.contact.pair_options import spread
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.mesh import elements
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-Indices = NDArray[np.intp]
 # A line is determined by a seventh of it, a parabola by two fifths; values at the other end count no more than thirtyfold.
 DETERMINED = 1e-3
 # Facets whose mass matrix differs by less than this part are whole.

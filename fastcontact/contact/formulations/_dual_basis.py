@@ -20,12 +20,10 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Mask
 from fastcontact.mesh import elements
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 # Share of a mid node's function that either end of its edge gets: 1/4 makes parabolas Bernstein polynomials; without a
 # centre node, 3/8 is the least that leaves no negative part, that of (a + b) / 4 + 1 / 2 for a, b in [-1, 1].
 SHARE, SHARE_WITHOUT_CENTRE = 0.25, 0.375

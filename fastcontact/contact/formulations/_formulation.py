@@ -9,9 +9,9 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Compliance, Constraints
 from fastcontact.contact.held_motions import TOGETHER, HeldMotions, alike, spanned, without
@@ -27,7 +27,6 @@ from fastcontact.contact.tied import TiedPair, tied
 from fastcontact.contact.tied_offset import with_arms
 from fastcontact.errors import ContactError, unknown
 
-Array = NDArray[np.float64]
 # Vectors shorter than this have no direction; unit normals that differ by less are the same.
 TINY, ALIKE = 1e-300, 1e-9
 SLIPS = ("symmetric", "primary")
@@ -195,7 +194,7 @@ class Formulation(ABC):
             part = with_arms(part, pairing, self.primary, self.points)
         return tied(part)
 
-    def never_opening(self, positions: Array, at: Configuration) -> NDArray[np.bool_] | None:
+    def never_opening(self, positions: Array, at: Configuration) -> Mask | None:
         """Return which reference places (m, dim) [length] never open again, (m,); None if all may."""
         if self.options.always_closed:
             return np.ones(len(positions), bool)
@@ -289,7 +288,7 @@ class Formulation(ABC):
         now, before = (candidates.positions(self.points + u) for u in (at.displacement, at.start))
         return self.primary.turning(now, before, at.stance, at.stance_start)
 
-    def without_slip(self, at: Configuration) -> list[tuple[Array, NDArray[np.bool_]]]:
+    def without_slip(self, at: Configuration) -> list[tuple[Array, Mask]]:
         """Return directions (n_nodes, dim) in which both sides are held, and do not move apart, with the nodes (n_nodes,).
 
         So it is in a plane of symmetry and on an axis: slip is zero there whatever the traction, which nothing determines.
@@ -387,7 +386,7 @@ class Formulation(ABC):
         return np.where(pairing.paired, gap0 + G @ u.ravel(), np.inf), pairing.normal
 
 
-def _at_places(known: tuple[Array, NDArray[Any]], positions: Array) -> NDArray[Any]:
+def _at_places(known: tuple[Array, AnyArray], positions: Array) -> AnyArray:
     """Return what is `known` at places (k, dim) [length], values (k, ...), at the one nearest to each of `positions`."""
     from scipy.spatial import cKDTree
 

@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from fastcontact.arrays import Array, Indices
 from fastcontact.contact.surface import FacetBlock
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +23,7 @@ class Coupling:
 
     secondary: FacetBlock
     primary: FacetBlock
-    pairs: NDArray[np.intp]
+    pairs: Indices
     integrals: Array
 
 

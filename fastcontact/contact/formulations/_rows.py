@@ -6,15 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
-Array = NDArray[np.float64]
+from fastcontact.arrays import Array, Numbers
 
 
 class Entries:
     """Entries of a sparse matrix, collected facet by facet."""
 
     def __init__(self) -> None:
-        self._rows: list[NDArray[np.int32]] = []
-        self._columns: list[NDArray[np.int32]] = []
+        self._rows: list[Numbers] = []
+        self._columns: list[Numbers] = []
         self._values: list[Array] = []
 
     def add(self, rows: NDArray[np.integer], columns: NDArray[np.integer], values: Array) -> None:

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations._cut_lines import line_points
@@ -28,7 +28,6 @@ from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError
 from fastcontact.mesh import quadrature
 
-Array = NDArray[np.float64]
 # A facet that faces less than this part of its length takes no part: its multipliers would have next to no equation.
 COVERED = 1e-3
 
@@ -83,7 +82,7 @@ class SegmentMortar(PressureFieldFormulation):
         field = self._pressure_field(facet, shape, np.where(kept, area, 0.0), area)
         return self.of_points(candidates, pairing, field, at)
 
-    def _pressure_field(self, facet: NDArray[np.intp], shape: Array, area: Array, whole: Array) -> PressureField:
+    def _pressure_field(self, facet: Indices, shape: Array, area: Array, whole: Array) -> PressureField:
         """Set up the pressure field on the nodes of facets that take part, from points (m,), shapes (m, n), areas (m,).
 
         `area` is zero where a point takes no part, `whole` nowhere.

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from fastcontact.arrays import Array, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints, NodalField
 from fastcontact.contact.formulations._cut_faces import face_overlap
@@ -38,8 +39,6 @@ from fastcontact.errors import ContactError, unknown
 from fastcontact.linear.sparse_rows import scaled
 from fastcontact.mesh import elements
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 MULTIPLIERS = ("standard", "dual")
 # What faces the other side with less than this fraction of its area is left out.
 LEAST = 1e-3

@@ -14,9 +14,9 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse.linalg import SuperLU, splu
 
+from fastcontact.arrays import Array
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints, NodalField
 from fastcontact.contact.formulations._formulation import Formulation
@@ -26,7 +26,6 @@ from fastcontact.contact.pairing import Candidates, Pairing
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError, unknown
 
-Array = NDArray[np.float64]
 OPPOSITE = ("facet", "node")
 
 

@@ -12,16 +12,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.linear.elimination import elimination_kernels, pivot_order
 from fastcontact.linear.elimination.coupled_pivots import CoupledPivots
 from fastcontact.linear.elimination.elimination import Elimination, eliminate
 from fastcontact.linear.sparse_rows import scaled
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,16 +8,14 @@ and take a sparse inverse instead, that of one block a node which does the same 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array, csr_array
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.elimination.condition import condition
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 # Equations whose inverse is larger, in units of their entries, repeat each other but for round-off.
 SINGULAR = 1e12
 # Coupled columns with a larger condition number suit no elimination: errors would grow.

@@ -5,14 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.linear.elimination import elimination_kernels, pivot_order
 from fastcontact.linear.elimination.coupled_pivots import CoupledPivots
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,16 +11,13 @@ unknowns otherwise, factorised (`coupled_pivots`).
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import qr
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.csgraph import connected_components, min_weight_full_bipartite_matching
 
+from fastcontact.arrays import Indices, Mask
 from fastcontact.linear.elimination.coupled_pivots import CoupledError, CoupledPivots, RepeatedError, block_inverse
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 # An unknown is taken as pivot where its entry is at least this part of the largest one of the equation.
 SMALLEST = 0.25
 # Up to so many equations that share unknowns are inverted as a block; and where factors do not suit them.

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csc_array, csr_array
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.linear.cholesky.symmetric_factors import SymmetricFactors
 from fastcontact.linear.factors.known_loads import KnownLoads
 from fastcontact.linear.field_compliance import FieldCompliance
@@ -17,8 +17,6 @@ from fastcontact.linear.flexibility import FlexibilityColumns, check_rows, multi
 from fastcontact.linear.protocol import Counters, LinearSolver, Monitor
 
 log = logging.getLogger("fastcontact")
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 # Beyond this many unknowns last, their dense block costs more than the solutions it saves.
 LAST_UP_TO = 4000
 ROUND_OFF = 1e-14
@@ -158,7 +156,7 @@ class LoadedFactor:
 
     def solve(
         self, B: csr_array, c: Array, C: Array | FieldCompliance | None = None, guess: Array | None = None,
-        monitor: Monitor | None = None, tolerance: float | None = None, nodes: NDArray[np.intp] | None = None,
+        monitor: Monitor | None = None, tolerance: float | None = None, nodes: Indices | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         """See `Loaded`."""
         if B.shape[0] == 0:
@@ -217,7 +215,7 @@ class CondensedProblem:
 
     def solve(
         self, B: csr_array, c: Array, C: Array | FieldCompliance | None = None, guess: Array | None = None,
-        monitor: Monitor | None = None, tolerance: float | None = None, nodes: NDArray[np.intp] | None = None,
+        monitor: Monitor | None = None, tolerance: float | None = None, nodes: Indices | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         """See `Loaded`."""
         if B.shape[0] == 0:

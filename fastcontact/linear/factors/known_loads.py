@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from fastcontact.arrays import Array
+
 # Right-hand sides kept: loads and supports have seldom more ramps.
 KEPT = 4
 # What a combination may miss of a right-hand side, in 2-norms: its round-off.

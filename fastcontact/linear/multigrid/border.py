@@ -10,13 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array, diags_array
 from scipy.sparse.linalg import splu
 
+from fastcontact.arrays import Array
 from fastcontact.linear.krylov.iterations import Multiply, Precondition
 
-Array = NDArray[np.float64]
 # By how much displacements give way more than the diagonal of their matrix says.
 SOFTER = 2.0
 # Part of what they have by themselves that is added to multipliers in the preconditioner: some equations repeat each other.

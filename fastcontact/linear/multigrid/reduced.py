@@ -11,14 +11,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from fastcontact.arrays import Array
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.multigrid.matrix import ScaledMatrix
 from fastcontact.linear.springs import Springs
-
-Array = NDArray[np.float64]
 
 
 class Reduced:

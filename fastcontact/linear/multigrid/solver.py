@@ -10,10 +10,10 @@ from __future__ import annotations
 import logging
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array
 
 from fastcontact._jit.decorators import check_threads
+from fastcontact.arrays import Array
 from fastcontact.errors import ConvergenceError, ModelError
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.flexibility import FlexibilityColumns
@@ -34,7 +34,6 @@ from fastcontact.linear.protocol import Counters, Monitor
 from fastcontact.linear.springs import Springs
 
 log = logging.getLogger("fastcontact")
-Array = NDArray[np.float64]
 MAX_ITERATIONS, MAX_NONSYMMETRIC = 1000, 300
 # Columns of K^-1, each a solution, up to which they cost less than factors do.
 MOST_COLUMNS = 300

@@ -14,9 +14,9 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.flexibility import TooManyColumnsError
@@ -35,7 +35,6 @@ from fastcontact.linear.solvers.direct import Direct
 from fastcontact.linear.springs import Springs
 
 log = logging.getLogger("fastcontact")
-Array = NDArray[np.float64]
 # Unknowns up to which a factorisation replaces multigrid, by the number of components of a displacement.
 FACTORS_UP_TO = {1: 3_000_000, 2: 3_000_000, 3: 150_000}
 # Equations that stiffen a node by more than this leave the softer body too little of multigrid's tolerance; coupled ones,
@@ -81,7 +80,7 @@ class Amg(Multigrid, LinearSolver):
         return self.instead is None
 
     def prepare(
-        self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None, release: bool = False
+        self, K: bsr_array, rigid_modes: Array, involved: Indices | None = None, release: bool = False
     ) -> bsr_array | Product:
         """Build the hierarchy of K; see `LinearSolver.prepare`."""
         self.build(K, rigid_modes, release)
@@ -246,7 +245,7 @@ class _Loaded(LoadedMultigrid):
         return self._solver.instead.load(self._f)
 
     def solve_nonsymmetric(
-        self, B: csr_array, c: Array, nodes: NDArray[np.intp], guess: Array, tolerance: float,
+        self, B: csr_array, c: Array, nodes: Indices, guess: Array, tolerance: float,
         friction: FrictionTerms | None = None, C: Array | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         if self._solver.instead is not None:

@@ -11,10 +11,10 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import bsr_array, bsr_matrix, csr_array, diags_array, eye_array
 from scipy.sparse.linalg import cg
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.elimination.loaded import LoadedIteration
@@ -22,7 +22,6 @@ from fastcontact.linear.flexibility import FlexibilityColumns
 from fastcontact.linear.lower_tolerance import put_back_tolerance, tighten
 from fastcontact.linear.protocol import Counters, LinearSolver, Monitor
 
-Array = NDArray[np.float64]
 MAX_ITERATIONS = 1000
 # All neighbours are strong, as in our multigrid; everything else as pyamg has it.
 OPTIONS: dict[str, Any] = {"strength": ("symmetric", {"theta": 0.0}), "max_coarse": 200}
@@ -52,7 +51,7 @@ class Pyamg(LinearSolver):
         return f"Pyamg({len(self._hierarchy.levels)} levels, unknowns {sizes}, operator complexity {complexity:.2f})"
 
     def prepare(
-        self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None, release: bool = False
+        self, K: bsr_array, rigid_modes: Array, involved: Indices | None = None, release: bool = False
     ) -> bsr_array:
         """Build the hierarchy of K, and leave K as it is; see `LinearSolver.prepare`."""
         self.K, self._modes = K, rigid_modes

@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from fastcontact.arrays import AnyArray
 
 Rows = list[list[str]]
 
@@ -55,7 +56,7 @@ def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
     return ["  " + "  ".join(text.rjust(width) for text, width in zip(row, widths, strict=True)) for row in rows]
 
 
-def structured(columns: Mapping[str, Sequence[Any]]) -> NDArray[Any]:
+def structured(columns: Mapping[str, Sequence[Any]]) -> AnyArray:
     """Return columns of equal length (n_rows,) as a structured array (n_rows,) with a field each, in their units."""
     arrays = {name: np.array(values) for name, values in columns.items()}
     length = len(next(iter(arrays.values())))
