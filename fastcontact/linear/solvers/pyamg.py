@@ -23,8 +23,12 @@ from fastcontact.linear.lower_tolerance import put_back_tolerance, tighten
 from fastcontact.linear.protocol import Counters, LinearSolver, Monitor
 
 MAX_ITERATIONS = 1000
-# All neighbours are strong, as in our multigrid; everything else as pyamg has it.
-OPTIONS: dict[str, Any] = {"strength": ("symmetric", {"theta": 0.0}), "max_coarse": 200}
+# All neighbours are strong, as in our multigrid; rigid-body modes need no improvement, and polynomials smooth cheapest.
+SMOOTHER = ("chebyshev", {"degree": 2, "iterations": 1})
+OPTIONS: dict[str, Any] = {
+    "strength": ("symmetric", {"theta": 0.0}), "max_coarse": 200, "improve_candidates": None,
+    "presmoother": SMOOTHER, "postsmoother": SMOOTHER,
+}  # fmt: skip
 
 
 class Pyamg(LinearSolver):
