@@ -1,4 +1,4 @@
-"""The displacement components that a pairing solves for: all of them, or those of the contact surfaces alone.
+"""Degrees of freedom of the contact problem: all of them, or those of the contact surfaces after static condensation.
 
 A direct solver condenses the stiffness to the contact surfaces; then all other displacements follow once, when the contact
 forces of the load step are known.

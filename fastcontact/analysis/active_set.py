@@ -1,4 +1,4 @@
-"""The inequality solver: ``K u = f + B.T multiplier``, ``multiplier >= 0``, ``gap >= 0``, product zero.
+"""Frictionless contact by a primal-dual active set: ``K u = f + B.T multiplier``, ``0 <= multiplier _|_ gap >= 0``.
 
 The gap is ``gap0 + B u + C multiplier``; the compliance C of the constraints themselves, symmetric and positive
 semidefinite, is absent in most formulations.

@@ -1,4 +1,4 @@
-"""Acceleration of a fixed point iteration by what its last changes tell (Anderson, 1965)."""
+"""Anderson acceleration of a fixed-point iteration (Anderson, 1965)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The balance of forces at the end of a load step: reactions, and what is left out of balance."""
+"""Equilibrium at the end of a load step: reactions and the residual."""
 
 from __future__ import annotations
 

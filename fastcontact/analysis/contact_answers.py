@@ -1,4 +1,4 @@
-"""What engineers ask of a contact: force, moment, area, centre of pressure, mean gap, work of friction, wear."""
+"""Contact summary: resultant force and moment, area, centre of pressure, mean gap, frictional work, wear."""
 
 from __future__ import annotations
 

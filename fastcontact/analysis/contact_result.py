@@ -1,4 +1,4 @@
-"""The result of one contact pair at the end of a load step: pressures, closed nodes, forces, friction, middle and width."""
+"""Result of one contact pair at the end of a load step: pressures, contact status, forces, friction, centre and width."""
 
 from __future__ import annotations
 

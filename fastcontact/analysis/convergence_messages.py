@@ -1,4 +1,4 @@
-"""What a load step that does not converge says: the culprit with its nodes, and the remedy."""
+"""Messages of load steps that do not converge: the cause, with its nodes, and the remedy."""
 
 from __future__ import annotations
 

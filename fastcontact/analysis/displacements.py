@@ -1,4 +1,4 @@
-"""All displacements of a load step, once its contact forces are known."""
+"""Displacements of a load step for known contact forces."""
 
 from __future__ import annotations
 

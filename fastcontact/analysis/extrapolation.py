@@ -1,4 +1,4 @@
-"""Where a load step starts: displacements and contact forces of the last two steps, extended along the load."""
+"""Predictor of a load step: displacements and contact forces extrapolated linearly in the load."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Warnings about facets of curved sides where the gap follows chords: the pressure error beside the pressure.
+"""Warnings about straight facets on curved surfaces: the estimated error in pressure due to their sag.
 
 Chords that stand off the arc by up to h push sides of modulus E apart by pressures of the order of E h / L, whatever the
 interference is: L is the length of the facets where both sides have some, which do not match, and that of the contact where

@@ -1,4 +1,4 @@
-"""Settle the contact geometry of a load step: pair, constrain, solve, mix, until the surfaces stand still."""
+"""Contact geometry of a load step: detect, constrain, solve, accelerate, until displacements are stationary."""
 
 from __future__ import annotations
 

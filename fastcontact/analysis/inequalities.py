@@ -1,4 +1,4 @@
-"""The inequalities of one pairing: active set without friction, friction cone with it, rigid positions where needed."""
+"""Contact problem with fixed geometry: active set without friction, friction cone with it, positions of floating bodies."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Warnings about bodies that lie inside each other at the end of an analysis: where no contact is defined, and beside it."""
+"""Warnings about bodies that interpenetrate at the end of an analysis, where no contact is defined or beside it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The iterate of a load step: what one pairing hands to the next."""
+"""Iterate of the geometry loop: the data passed from one contact detection to the next."""
 
 from __future__ import annotations
 

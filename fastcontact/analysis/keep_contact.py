@@ -1,4 +1,4 @@
-"""Keep of the contact of a load step what later steps start from."""
+"""Save contact history for the next load step."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One load step: prepare, settle the contact geometry, balance, recover. Start reading the code here.
+"""One load step: predict, solve the contact problem, check equilibrium, recover. Start reading the code here.
 
 First the loads and the prescribed displacements at the end of the step are evaluated. Then the contact geometry is settled:
 the surfaces are paired on the deformed configuration, the inequalities of contact are solved, and both are repeated until

@@ -1,4 +1,4 @@
-"""Newton iterations of a load step with nonlinear bodies: linearise, solve, until displacement and forces stand still.
+"""Newton-Raphson iterations of a load step with nonlinear bodies.
 
 Bodies alone are linearised; contact, with its geometry, is solved as for linear bodies (the Newton method of Josephy, 1979,
 for generalised equations). So iterations converge quadratically, and few matrices are factorised.

@@ -1,4 +1,4 @@
-"""The problem that an analysis solves: built once from a model, never changed after."""
+"""The discrete problem of an analysis: built once from a model and immutable."""
 
 from __future__ import annotations
 

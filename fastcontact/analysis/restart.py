@@ -1,4 +1,4 @@
-"""Restart data: what a later process needs to continue an analysis, as plain numbers, strings and arrays.
+"""Restart data, as plain numbers, strings and arrays.
 
 It is the state at the end of a step, but for the displacements, which the result of the step holds; what the linear solver
 has learnt; and what tells the case from others. The state includes what later iterates owe to earlier ones in their last

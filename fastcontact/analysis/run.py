@@ -1,4 +1,4 @@
-"""The ramp: load steps one after the other, from the beginning or where others stopped, each handed over when it is done."""
+"""Run an analysis: load steps in order, from the beginning or from a restart, each yielded as it converges."""
 
 from __future__ import annotations
 

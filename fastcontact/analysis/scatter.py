@@ -1,4 +1,4 @@
-"""The accuracy that a geometry loop can attain: where displacements only scatter, round-off decides, and the loop ends.
+"""Attainable accuracy of the geometry loop: it ends where further changes are round-off.
 
 How much round-off there is depends on the condition of the stiffness and of the constraints, which nothing tells beforehand;
 the last displacements show it. An iteration that still converges, however slowly, goes on in one direction: over a window

@@ -1,4 +1,4 @@
-"""Contact at the ends of a part that repeats itself, where two nodes are one place.
+"""Contact at the ends of a period or cyclic sector, where two nodes represent one material point.
 
 Their gaps are one and the same condition (`shared_nodes`) or one value of a field of pressures, which fixes the sum of their
 forces alone. Their traction is that of the place: the sum of both forces over both areas.

@@ -1,4 +1,4 @@
-"""Sensitivities: derivatives of one quantity by any number of parameters, by one adjoint linear solution.
+"""Sensitivities: derivatives of one quantity with respect to many parameters from one adjoint solution.
 
 Where a load step has settled, ``K u = f + B.T multiplier`` and ``gap0 + B u + C multiplier = 0`` of the active constraints
 are smooth equations as long as the active set stands. The adjoint solution for a quantity, with the transposed matrix of

@@ -1,4 +1,4 @@
-"""Nodes in several contact pairs, and at both ends of a period or sector: one condition, whose forces are shared.
+"""Nodes shared by contact pairs, or by both ends of a period or sector: one constraint, whose force is shared.
 
 A node of several pairs behaves as that of one pair over all their facets. Its conditions are one and the same, which fixes
 the sum of their forces alone, and equations that repeat each other cannot be eliminated: their mean is solved for. It stands

@@ -1,4 +1,4 @@
-"""Slip of the secondary nodes of a contact pair: their motion in a load step along what they face."""
+"""Slip increment of the secondary nodes of a contact pair."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The inequalities of contact: how accurately they are solved, and their solutions without and with friction."""
+"""Solutions of the contact problem, without and with friction, and their accuracy."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The state of an analysis: everything that a load step changes, in one place."""
+"""State of an analysis: everything that a load step changes."""
 
 from __future__ import annotations
 

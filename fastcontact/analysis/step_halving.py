@@ -1,4 +1,4 @@
-"""Load steps that do not converge are cut in halves; a step that fails leaves its state as it was."""
+"""Bisection of load steps that do not converge; a failed step leaves the state unchanged."""
 
 from __future__ import annotations
 

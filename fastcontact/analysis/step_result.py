@@ -1,4 +1,4 @@
-"""Recover the result of a load step from its displacements: stresses, contact results, work of the solvers."""
+"""Recover the result of a load step: stresses, contact results, iteration counts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stresses of linear elements against recovered ones, which are continuous: a measure of locking on the solution itself.
+"""A posteriori measure of locking: stresses of linear elements against recovered, continuous ones.
 
 The energy of the difference, over that of the solution, estimates the error (Zienkiewicz and Zhu, Int. J. Numer.
 Meth. Engng 24, 1987). Where cells are nearly incompressible the mean stress alone tells: the deviator stays smooth, while the

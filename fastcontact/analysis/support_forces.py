@@ -1,4 +1,4 @@
-"""Forces of supports by group, of springs, and of bolts over the load: what engineers read off the ends of a model."""
+"""Reaction resultants by support group, spring forces, and bolt forces over the load history."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How accurate each solution of a load step has to be: loose at first with an iterative solver, tight at the end."""
+"""Forcing terms of inexact solutions in a load step: loose at first with an iterative solver, tight at the end."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bodies held by contact alone: weak springs make their stiffness matrix regular.
+"""Floating bodies, held by contact alone: springs regularise their singular stiffness matrix.
 
 Each free rigid motion gets one spring at one node, about as stiff as the body there. The springs are fixed to a rigid
 position y of the bodies; for every y the contact problem is regular. A Newton iteration moves y until the spring forces

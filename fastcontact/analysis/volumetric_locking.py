@@ -1,4 +1,4 @@
-"""How much too stiff nearly incompressible elements make a model: a lower bound from its own solution.
+"""Volumetric locking: a lower bound of the excess stiffness, from the solution itself.
 
 Let S be the stiffness that a reference without locking does not have: K is the stiffness of the model, K - S that of the
 reference. For the forces of the solution u, the potential energy of the reference is lower than that of the model by

@@ -1,4 +1,4 @@
-"""Wear after Archard (J. Appl. Phys. 24, 1953): a depth in proportion to pressure and sliding distance."""
+"""Archard wear (J. Appl. Phys. 24, 1953): depth proportional to pressure times sliding distance."""
 
 from __future__ import annotations
 

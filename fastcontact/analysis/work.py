@@ -1,4 +1,4 @@
-"""Work of a load step at its contacts: of friction, of springs, and what of it nothing explains.
+"""Energy balance of a load step: strain energy, external work, frictional work, penalties, imbalance.
 
 Over a step forces count as the mean of those at both ends, times the displacement between (trapezoidal rule). What is known
 of the path in between is put right: a normal force acts only on closed gaps, and friction slides where its traction is at

@@ -1,4 +1,4 @@
-r"""Nodal pressures that tell the story of the contact force: none at open nodes, no tension, and the force as their integral.
+r"""Non-negative nodal pressures that vanish at open nodes and integrate to the contact force.
 
 A pressure field that is found by projection undershoots beyond the edge of the contact, and what an open node has of it is
 part of the force all the same: :math:`\int p_h\,dA = \sum_j A_j p_j` holds for all nodes together. So the share

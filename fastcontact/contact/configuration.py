@@ -1,4 +1,4 @@
-"""Where the two sides of a contact pair stand when they are paired, and where they stood as the load step began."""
+"""Configuration of a contact pair: current, and at the beginning of the load step."""
 
 from __future__ import annotations
 

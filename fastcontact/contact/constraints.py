@@ -1,4 +1,4 @@
-"""The conditions of contact, row by row: ``gap >= 0``, ``multiplier >= 0``, ``gap * multiplier = 0``."""
+"""Contact constraints: ``gap >= 0``, ``multiplier >= 0``, ``gap * multiplier = 0`` row by row."""
 
 from __future__ import annotations
 

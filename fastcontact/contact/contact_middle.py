@@ -1,4 +1,4 @@
-"""Where the middle of a contact is, and how far from it places on the secondary surface lie.
+"""Centre of a contact zone, and distances from it on the secondary surface.
 
 In axisymmetry the middle is the axis. Otherwise it is the centre of pressure, of the contact as it is completed by reflection
 at the planes of symmetry that it reaches: a half or a quarter of a model has its middle on these planes. A plane of

@@ -1,4 +1,4 @@
-"""What a contact pair gets without asking for a formulation: between bodies mortar with dual multipliers.
+"""Default formulation of a contact pair: between bodies, mortar with dual Lagrange multipliers.
 
 Of all choices it alone is right on any two surfaces (``bench/defaults.py``, docs/reference/accuracy.md). Node-to-segment
 contact takes the normal of one of two facets at a node that lies opposite a node, and nodes that lie so at first no

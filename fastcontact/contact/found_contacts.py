@@ -1,4 +1,4 @@
-"""Contact pairs that a mesh has by itself: bodies whose surfaces face each other, with groups for both sides."""
+"""Automatic contact detection: bodies whose surfaces face each other, with facet groups for both sides."""
 
 from __future__ import annotations
 

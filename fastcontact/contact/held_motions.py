@@ -1,4 +1,4 @@
-"""Directions in which single nodes are held, however that is said: by supports along axes, in other frames, by relations."""
+"""Directions in which nodes are constrained, by supports along axes, in local frames, or by multi-point constraints."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pressure fields: point forces, their field, and the compliance between the two.
+"""Multiplier fields: point forces, their projection onto the field, and the compliance between the two.
 
 See `_pressure_field` for the formulas.
 """

@@ -1,4 +1,4 @@
-"""Whether the nodes of two surfaces lie opposite to each other."""
+"""Whether two surface meshes are conforming."""
 
 from __future__ import annotations
 

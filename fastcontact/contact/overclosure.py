@@ -1,4 +1,4 @@
-"""Pressure as a function of the overclosure, by a table: a soft layer between the sides of a contact pair."""
+"""Tabular pressure-overclosure relations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which point faces which facet: places of the secondary side projected on the primary facets, and their gap rows.
+"""Pairing: projection of secondary points onto primary facets, and rows of the gap function.
 
 Mortar in space pairs facets with facets instead, in `formulations._cut_faces`.
 """

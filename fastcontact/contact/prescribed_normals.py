@@ -1,4 +1,4 @@
-"""Along which normals gaps are measured, where a user says so: those of the secondary side, or one for all."""
+"""Prescribed directions of the gap function: secondary normals, or one vector for the whole side."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Projection on a surface along averaged normals: continuous where facets meet, as the closest point is not.
+"""Projection along averaged normals: continuous across facets, unlike closest-point projection.
 
 On a surface of facets the closest point jumps where an edge folds inward, by a distance in proportion to the gap; a
 pairing that is renewed in a loop may then flip for ever. Along normals interpolated between nodal means the projection

@@ -1,4 +1,4 @@
-"""Whether the two sides of a contact pair can touch at all: checks before any numerics."""
+"""Checks of the two sides of a contact pair before any numerics."""
 
 from __future__ import annotations
 

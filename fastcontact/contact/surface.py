@@ -1,4 +1,4 @@
-"""One side of a contact pair: the facets of a group, turned outward from the solid that carries them."""
+"""One side of a contact pair: the facets of a group, with outward orientation."""
 
 from __future__ import annotations
 

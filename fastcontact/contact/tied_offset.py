@@ -1,4 +1,4 @@
-"""Tied sides that lie apart: what ties them turns with the primary facet, as a stiff arm of the length of the gap.
+"""Tied sides with an offset: a rigid arm across the gap rotates with the primary facet.
 
 Equal displacements across a gap would stop no rotation: the forces of both sides would have lines of action a gap apart, and
 shear would lose its moment. With the arm, the relative displacement along a tangent t is ``t . (u_s - u_p) + g n . du_p/dt``,

@@ -1,4 +1,4 @@
-"""A surface in the plane as a line of straight pieces, and the length along it."""
+"""A contact line as a polyline, parametrised by arc length."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-r"""The compliance of forces at points that a field of fewer values cannot represent, and the same equations for that field.
+r"""Compliance of point forces outside a multiplier field, and the equivalent equations for the field.
 
 Forces of points with the weights W belong to a field with the values p, ``P p`` at the points. What the field does not
 represent gives way: :math:`C = (W^{-1} - P M^{-1} P^T) / \rho` among the points of some equations, M the mass matrix of the

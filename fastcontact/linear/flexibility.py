@@ -1,4 +1,4 @@
-"""Equations through the flexibility of the structure: ``(B K^-1 B.T + C) multiplier = c - B K^-1 f``.
+"""Schur complement of linear constraints: ``(B K^-1 B.T + C) multiplier = c - B K^-1 f``.
 
 Only the degrees of freedom that appear in B matter. Their part of ``K^-1`` is computed when they first appear and
 kept, so further active sets and pairings cost a small dense solution and one solution with K each.

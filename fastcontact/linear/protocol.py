@@ -1,4 +1,4 @@
-"""What a linear solver is: the methods that every solver has, and the counters it keeps.
+"""Protocols of linear solvers.
 
 Shapes: n unknowns, m equations among them. ``K`` is a stiffness [force / length], ``u`` a displacement [length], ``f`` a
 force [force]. Equations ``B u + C multiplier = c`` have rows B (m, n) [-] and right-hand sides c (m,) [length]; their

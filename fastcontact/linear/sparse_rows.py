@@ -1,4 +1,4 @@
-"""Sparse matrices row by row: scaled and chosen without products of matrices, which cost more than a thousand numbers do."""
+"""Row scaling and selection of sparse matrices without matrix products."""
 
 from __future__ import annotations
 

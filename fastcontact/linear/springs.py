@@ -1,4 +1,4 @@
-"""Springs along rows of displacements, such as penalties and those across sliding contacts: kept as rows, not as a matrix."""
+"""Springs along rows of displacements, such as penalties: stored as rows, not as an assembled matrix."""
 
 from __future__ import annotations
 

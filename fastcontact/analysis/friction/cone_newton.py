@@ -1,4 +1,4 @@
-r"""Newton's method for contact with Coulomb friction, whatever gives gaps and slips for forces.
+r"""Semismooth Newton method for contact with Coulomb friction, independent of how gaps and slips follow from forces.
 
 With normal forces n, tangential ones t, gaps g and slips s, in units in which each constraint has a compliance near one,
 the solution is the zero of

@@ -1,4 +1,4 @@
-"""The friction law: unilateral contact and Coulomb's cone, for forces and gaps in units of each constraint's own stiffness.
+"""Unilateral contact and Coulomb's law as a complementarity function, scaled by the stiffness of each constraint.
 
 Another law begins here. Its tangential force is also used where a sliding constraint is linearised: `dense._step`,
 `eliminated.Eliminated`, and in the fallbacks `sweep_kernels` and `dense._on_edges`. Its parameters come from

@@ -1,4 +1,4 @@
-"""Contact with Coulomb friction on a dense compliance: forces from gaps and slips without forces.
+"""Contact with Coulomb friction on a dense Delassus operator: forces from the gaps and slips without contact forces.
 
 Gaps and slips are ``(g, s) = free + F (n, t)`` with the normal forces n and the tangential ones t. Three methods stand
 behind each other:

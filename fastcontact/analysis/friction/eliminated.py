@@ -1,4 +1,4 @@
-"""Coulomb friction for solvers that eliminate constraints: no compliance is formed.
+"""Coulomb friction with eliminated constraints: the Delassus operator is not formed.
 
 A step of Newton's method holds closed gaps and sticking slips as equations. A sliding constraint drags with ``mu n`` along
 its direction d: its multiplier acts through the rows ``B + mu d T``, see `linear.protocol`. In three dimensions t follows

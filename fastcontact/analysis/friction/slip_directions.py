@@ -1,4 +1,4 @@
-"""Directions of slip that supports leave to a contact: tangents are turned to them, others are idle.
+"""Slip directions left free by supports: tangents are aligned with them, the others are idle.
 
 All of it looks at the compliance of each constraint by itself: `own` (1 + k, 1 + k, m), its normal part first.
 """

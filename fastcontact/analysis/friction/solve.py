@@ -1,4 +1,4 @@
-"""Coulomb friction: the inequalities of contact and the friction cone, solved together on their compliance.
+"""Coulomb friction: unilateral contact and the friction cone, solved together on the Delassus operator.
 
 With normal forces n >= 0 and tangential forces t of all constraints as unknowns, gaps and slips of the step are
 ``(g, s) = (g, s)_free + F (n, t)`` with ``F = R K^-1 R.T + C``, R the normal and tangential rows and C the compliance of

@@ -1,4 +1,4 @@
-"""Stiffness and mass of the motions that supports, relations and closed contact allow."""
+"""Stiffness and mass reduced to the motions that supports, multi-point constraints and closed contact allow."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The adjoint solution of a settled load step.
+"""Adjoint solution of a converged load step.
 
 With y = (w, mu) for the unknowns and the multipliers, ``(J0 + E).T y = q``. J0 is the symmetric matrix of the step: stiffness
 and active constraints as the linear solver has them. E holds what pairing on the deformed configuration adds, and takes away

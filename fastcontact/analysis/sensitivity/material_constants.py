@@ -1,4 +1,4 @@
-"""What constants of materials change in the equations of a load step, by central differences at its solution."""
+"""Derivatives of the residual with respect to material constants, by central differences at the solution."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The forces and gaps of settled contact as functions of where the surfaces are paired, and their derivatives.
+"""Contact forces and gaps as functions of the configuration in which surfaces are paired, and their derivatives.
 
 Contact is paired on the deformed configuration: forces ``B.T multiplier`` and gaps ``gap0 + B u`` also depend on the
 displacement through B and gap0 (Wriggers, Computational Contact Mechanics, 2006, chapter 6). These derivatives are taken by

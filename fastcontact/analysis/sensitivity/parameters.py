@@ -1,4 +1,4 @@
-"""The parameters that results have sensitivities by, and what they change in the equations of a load step."""
+"""Parameters of sensitivities, and the derivatives of the residual with respect to them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Faces cut by the faces opposite in their own plane, and integrated piece by piece (Puso, 2004).
+"""Segmentation of secondary faces by clipping with the primary faces, and integration over the segments (Puso, 2004).
 
 Both sides are followed along the normal of the secondary facet, so that each piece has one facet on either side.
 Curved facets are cut by their corner polygons, an error of second order in the facet's length over its radius.

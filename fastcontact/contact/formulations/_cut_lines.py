@@ -1,4 +1,4 @@
-"""Lines cut opposite the nodes of the other side, and integrated piece by piece.
+"""Segmentation of secondary lines at the projected primary nodes, and integration over the segments.
 
 The gap between facets that do not match has a kink wherever a node of the primary side stands opposite; between two of
 those it is smooth (Popp, Gee and Wall, 2009). Where the primary side ends, what is opposite lies along the normal there:

@@ -1,4 +1,4 @@
-r"""Pressure fields that their integration points determine, however little of a facet takes part.
+r"""Pressure fields that remain determined by their integration points on partly covered facets.
 
 The points of a facet that faces the other side with a strip of itself determine next to nothing of a field over all of
 it: on a strip of a fraction :math:`\theta` at the end of a line, what a polynomial of degree k is at the other end weighs

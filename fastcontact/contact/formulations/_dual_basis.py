@@ -1,4 +1,4 @@
-r"""Shape functions of pressure that are biorthogonal to those of displacement, facet by facet.
+r"""Dual shape functions: biorthogonal to the displacement shape functions on each facet.
 
 For positive shape functions :math:`\tilde N` of a facet that sum to one, the dual functions
 

@@ -1,4 +1,4 @@
-"""What faces what: integrals of products of shape functions over the parts where two surfaces face each other."""
+"""Mortar integrals: products of shape functions over the overlap of two surfaces."""
 
 from __future__ import annotations
 

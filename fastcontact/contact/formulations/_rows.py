@@ -1,4 +1,4 @@
-"""Sparse matrices of mortar contact: put together facet by facet, turned into rows of displacements."""
+"""Sparse mortar matrices: assembly facet by facet, and rows of degrees of freedom."""
 
 from __future__ import annotations
 

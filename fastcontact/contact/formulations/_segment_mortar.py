@@ -1,4 +1,4 @@
-r"""Mortar contact in the plane with a pressure field, integrated exactly over the pieces where two facets face each other.
+r"""Segment-based mortar contact in the plane with a multiplier field, integrated exactly over the segments.
 
 Every secondary facet is cut in each pairing, see `_cut_lines`, and every piece gets Gauss points of its own (Puso and
 Laursen, 2004). A uniform pressure then passes between meshes that do not match without error, which neither

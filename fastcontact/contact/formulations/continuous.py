@@ -1,4 +1,4 @@
-r"""Continuous contact: a pressure field on the secondary facets, contact decided at integration points.
+r"""Continuous formulation: a multiplier field on the secondary facets, contact status at integration points.
 
 The integration points stay where they are on the secondary facets; see `_pressure_field` for the equations.
 """

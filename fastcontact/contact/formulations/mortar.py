@@ -1,4 +1,4 @@
-"""Mortar contact: gaps integrated exactly over the pieces where two facets face each other.
+"""Mortar contact: gaps integrated exactly over the segments where two facets overlap.
 
 Two methods share this name. With standard multipliers in the plane contact is decided at integration points, see
 `_segment_mortar`; between faces in space, and with dual multipliers, each node has one weighted gap, see `_weighted_mortar`.

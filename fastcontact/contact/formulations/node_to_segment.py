@@ -1,4 +1,4 @@
-"""Node-to-segment contact: every secondary node keeps off the primary facet it faces.
+"""Node-to-segment contact: no secondary node penetrates the primary facet it projects onto.
 
 One constraint per secondary node, enforced exactly; the multiplier is the nodal contact force. The pairing, the
 normal of the primary facet and the projection are held during an active-set solution (code_aster, R5.03.50,

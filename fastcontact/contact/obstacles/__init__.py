@@ -1,4 +1,4 @@
-"""Rigid obstacles: shapes that a body may touch but not enter; one file each kind.
+"""Rigid obstacles, one file each kind.
 
 An obstacle answers one question, in its own frame: how far from it is a point, and where is outside? Distances are
 signed, positive outside. Where only a height is given (paraboloid, cone, a function of position), the distance is the

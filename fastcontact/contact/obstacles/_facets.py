@@ -1,4 +1,4 @@
-"""The facets of a rigid surface: which side is out, who is neighbour to whom, normals where facets meet.
+"""Facets of a rigid surface: orientation, adjacency, averaged normals.
 
 Facets are numbered through blocks of one kind each. Their ridges are what two facets share: the ends of a line in two
 dimensions, the edges of a face in three.

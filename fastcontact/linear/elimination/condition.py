@@ -1,4 +1,4 @@
-"""How ill conditioned a factorised matrix is, from a few solutions with its factors.
+"""Condition estimate of a factorised matrix from a few solutions.
 
 The diagonal of triangular factors does not tell: that of two equal rows among many may be as large as the others'.
 """

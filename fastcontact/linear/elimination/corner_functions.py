@@ -1,4 +1,4 @@
-"""Equations of the corners of quadratic facets, eliminated along functions that are linear on facets.
+"""Basis transformation on quadratic facets: constraints at corners eliminated along facet-wise linear functions.
 
 Gaps that are weighted with such functions, those of standard mortar multipliers, have next to no entries of their own at
 corners: the integral of a corner's quadratic function is none on triangles, and negative on quadrangles. With nodal pivots

@@ -1,4 +1,4 @@
-"""The columns of pivots inverted: small independent blocks, or a factorisation where equations of many nodes are coupled.
+"""Inverse of the pivot columns: small independent blocks, or a factorisation where constraints of many nodes are coupled.
 
 Gaps weighted with standard multipliers are coupled by a mass matrix of the secondary surface, whose inverse is full. Its
 factors are not: a solution costs next to nothing beside a product with the stiffness. Preconditioners need sparse weights

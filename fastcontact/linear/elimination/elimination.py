@@ -1,4 +1,4 @@
-"""Elimination of linear equations ``B u = c``: one unknown of each is a weighted sum of others plus an offset."""
+"""Elimination of linear constraints ``B u = c``: each pivot is a weighted sum of other unknowns plus an offset."""
 
 from __future__ import annotations
 

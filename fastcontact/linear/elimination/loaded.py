@@ -1,4 +1,4 @@
-"""What iterative solvers share: a right-hand side solved for under equations, eliminated where they can be."""
+"""Common part of iterative solvers: solution under linear constraints, eliminated where possible."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which unknown each equation eliminates, and the inverse of the columns of these pivots.
+"""Choice of the pivot of each constraint, and the inverse of the pivot columns.
 
 Six ways, the first that succeeds: every equation has an unknown that no other equation has; the equations of a node have
 unknowns that those of no other node have; layers of equations, each with an unknown that no later layer has; layers of nodes,

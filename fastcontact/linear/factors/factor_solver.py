@@ -1,4 +1,4 @@
-"""What direct solvers share: right-hand sides by factors of K, equations by columns of K^-1."""
+"""Common part of direct solvers: right-hand sides by factors of K, constraints by the Schur complement."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Solutions for right-hand sides that a load ramp combines from a few."""
+"""Reuse of solutions for right-hand sides that are linear combinations of earlier ones."""
 
 from __future__ import annotations
 

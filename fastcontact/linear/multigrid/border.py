@@ -1,4 +1,4 @@
-"""Equations ``B u + C multiplier = c`` that give way together, beside those eliminated: unknowns of their own.
+"""Saddle-point system of constraints ``B u + C multiplier = c`` that are not eliminated.
 
 The matrix of displacements and multipliers, ``[A, -B.T; B, C]``, is bordered and not positive definite. Conjugate residuals
 solve it, preconditioned by its lower triangle: multigrid for A, and for the multipliers ``C + B D^-1 B.T``, D the diagonal of

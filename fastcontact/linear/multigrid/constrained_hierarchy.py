@@ -1,4 +1,4 @@
-"""A multigrid hierarchy under eliminated equations: local changes of its levels, made and taken back.
+"""Multigrid hierarchy under eliminated constraints: local updates of its levels, applied and undone.
 
 The prolongators stay those without equations, except for the rows of the eliminated unknowns, the pivots. Only Galerkin
 products near the pivots change. The changes are stored beside the matrices of the levels, which stay as they are. On the

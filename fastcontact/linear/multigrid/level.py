@@ -1,4 +1,4 @@
-"""A level of the multigrid hierarchy: a matrix, its smoother, the way to the next coarser level, and work space."""
+"""A level of the multigrid hierarchy: matrix, smoother, transfer operators, work space."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A right-hand side for multigrid, solved for under equations some of which give way by themselves.
+"""Multigrid solution under linear constraints, some of which have a compliance of their own.
 
 An equation with a compliance of its own is a spring along its row. Springs not much stiffer than the body become part of the
 matrix and of the hierarchy; stiffer ones are eliminated like equations that do not give way, see `reduced`.

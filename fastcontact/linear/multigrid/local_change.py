@@ -1,4 +1,4 @@
-"""A change of a few block rows of a symmetric block matrix, and its Galerkin product on the next coarser level."""
+"""Local update of a symmetric block matrix, and its Galerkin product on the next coarser level."""
 
 from __future__ import annotations
 

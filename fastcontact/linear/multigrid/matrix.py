@@ -1,4 +1,4 @@
-"""Block matrices of multigrid, and the stiffness that is solved with: one store of its numbers for two precisions.
+"""Block matrices of multigrid, and the stiffness matrix stored once for two precisions.
 
 The multigrid cycle reads K in single precision, the iteration around it in double precision. Each number of K is therefore
 stored as two numbers in single precision, a high and a low part (see `split_matrix_kernels`): the cycle reads the high part,

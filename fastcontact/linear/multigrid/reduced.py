@@ -1,4 +1,4 @@
-"""The matrix of an iteration: K and springs under eliminated equations, some of which may give way by themselves.
+"""Reduced operator of the iteration: K and springs under eliminated constraints, with or without compliance.
 
 Equations ``B u + C multiplier = c`` with a diagonal compliance C are eliminated like others, but their pivots move by
 ``P^-1 s`` more, P the pivots' columns of B. Their excess ``s = B u - c = -C multiplier`` is an unknown of its own, with the

@@ -1,4 +1,4 @@
-"""From a level of the multigrid hierarchy to the next coarser one: products with the transpose of its prolongator."""
+"""Restriction: products with the transpose of the prolongator."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Nodes that equations tie to a much stiffer body: what the smoother and coarser levels need there.
+"""Nodes constrained to a much stiffer body: corrections of the smoother and of coarser levels.
 
 Equations let the unknowns of one side, the pivots, follow those of the other. Where the pivots' side is much stiffer, nodes
 of the other side become as stiff as that, and two things go wrong:

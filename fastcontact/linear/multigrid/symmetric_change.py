@@ -1,4 +1,4 @@
-"""A symmetric change of a matrix that few rows give, ``D.T G + G.T D``, and its Galerkin product.
+"""Symmetric low-rank update ``D.T G + G.T D`` of a matrix, and its Galerkin product.
 
 Equations say ``u = u + D u`` at their pivots, with rows D of weights less one. They turn A into ``T.T A T``, which changes
 it by ``D.T G + G.T D`` with ``G = A[pivots] + A[pivots][:, pivots] D / 2``. Springs along rows R change it by ``R.T S R``,
