@@ -56,7 +56,7 @@ class Balance:
 
     @property
     def excess(self) -> float:
-        """The residual in units of what is allowed."""
+        """Residual relative to its tolerance."""
         return self.residual / self.bound if self.bound else float(np.inf if self.residual else 0.0)
 
     @property

@@ -23,7 +23,7 @@ from fastcontact.results.step import ContactResult, StepResult
 
 @typed(ContactError)
 def contact_moment(contact: ContactResult, about: ArrayLike | None = None) -> Array:
-    """Return the moment of the contact forces on the secondary side, of reference places.
+    """Return the moment of the contact forces on the secondary side, about a point, on the reference configuration.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def contact_moment(contact: ContactResult, about: ArrayLike | None = None) -> Ar
 
 @dataclass(frozen=True, eq=False)
 class ContactAnswers:
-    """What a contact pair does in one load step.
+    """Contact summary of one pair in one load step.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ class ContactAnswers:
 
 @typed(ContactError)
 def contact_answers(model: Model, steps: Iterable[StepResult], name: str) -> list[ContactAnswers]:
-    """Return what a contact pair does in each of the load steps.
+    """Return the contact summary of a pair in each load step.
 
     Parameters
     ----------

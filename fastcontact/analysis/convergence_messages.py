@@ -67,7 +67,7 @@ def no_contact_stops(bodies: UnsupportedBodies, work: Array) -> str:
 
 
 def friction_exceeded(bodies: UnsupportedBodies, work: Array, friction: tuple[float, float]) -> str:
-    """Return the message for loads beyond what `friction`, the coefficient needed and the largest that is there, holds."""
+    """Return the message for loads beyond the friction cone; `friction` are the coefficients needed and given."""
     needed, largest = friction
     return (
         f"friction cannot hold {', '.join(bodies.motions.by_body())} against loads of up to {np.abs(work).max():.3g}: that "
@@ -107,7 +107,7 @@ def _most_moved(problem: Problem, change: Array) -> Nodes:
 
 
 def named_nodes(problem: Problem, nodes: Mapping[str, list[int]]) -> str:
-    """Return nodes by contact pair in words, with the places of the first three."""
+    """Return nodes by contact pair in words, with the coordinates of the first three."""
     texts = []
     for name, points in nodes.items():
         listed = ", ".join(f"{p} {np.array2string(problem.model.mesh.points[p], precision=4)}" for p in points[:3])
@@ -117,7 +117,7 @@ def named_nodes(problem: Problem, nodes: Mapping[str, list[int]]) -> str:
 
 
 def _smoother(problem: Problem) -> str:
-    """Return the advice for pairs that may flip between the facets at a node, or between what dual functions cover."""
+    """Return the advice for pairs that may oscillate between facets at a node, or between supports of dual functions."""
     faceted = [name for name, pair in problem.pairs.items() if pair.normals == "facet" and len(pair.primary.points)]
     dual = [name for name, pair in problem.pairs.items() if getattr(pair, "multipliers", "") == "dual"]
     options = {'normals="averaged"': faceted, 'multipliers="standard"': dual}

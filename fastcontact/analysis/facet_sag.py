@@ -42,7 +42,7 @@ def sag_warnings(problem: Problem, state: State, last: StepResult) -> dict[str, 
 
 
 def _text(pair: Formulation, spread: float, contact: ContactResult) -> str:
-    """Return what a `spread` [length] of the distance between chords and arcs does to pressures; empty where little."""
+    """Return the effect on pressures of a `spread` [length] of the distance between chords and arcs; empty where small."""
     side, order = pair.secondary, pair.secondary.order
     size = float(
         np.median(np.concatenate([np.linalg.norm(np.ptp(pair.points[b.facets], axis=1), axis=1) for b in side.blocks]))
@@ -66,7 +66,7 @@ def _text(pair: Formulation, spread: float, contact: ContactResult) -> str:
 
 
 def _standing_off(pair: Formulation, at: Configuration, active: Mask) -> Array:
-    """Return how far facets stand off their arcs where the gap of closed facets is measured (n,) [length]."""
+    """Return the sag of facets where the gap of closed facets is evaluated (n,) [length]."""
     points, deformed, closed = _points(pair), pair.points + at.displacement, np.zeros(len(pair.points), bool)
     closed[pair.secondary.points[active]] = True
     if isinstance(pair.primary, RigidSide):

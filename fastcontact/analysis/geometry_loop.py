@@ -95,7 +95,7 @@ class SettledContact:
 def settle_geometry(
     step: StepContext, extrapolation: Extrapolation, expected: float, begun: Iterate | None = None
 ) -> SettledContact:
-    """Alternate between pairing the surfaces and solving their inequalities until both stand still.
+    """Alternate between pairing and solving the contact problem until both are stationary.
 
     Parameters
     ----------

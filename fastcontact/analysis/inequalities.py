@@ -29,7 +29,7 @@ ROUND_OFF = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class StepContext:
-    """What stays the same through all pairings of a load step.
+    """Data that do not change between the pairings of a load step.
 
     Attributes
     ----------

@@ -20,7 +20,7 @@ from fastcontact.contact.obstacles.rigid_side import RigidSide
 
 @dataclass(eq=False)
 class Iterate:
-    """Where a load step stands between two pairings; it belongs to the geometry loop, which changes it.
+    """Iterate of a load step between two pairings, owned and modified by the geometry loop.
 
     Attributes
     ----------

@@ -85,7 +85,7 @@ def first_contacts(problem: Problem, start: State, load: StepLoad, u: Array) -> 
 
 
 def never_opening(problem: Problem, start: State, settled: SettledContact) -> dict[str, tuple[Array, Mask]]:
-    """Return by contact pair that is bilateral once closed the places of its constraints, and which are closed for good."""
+    """Return, for pairs without separation, the positions of their constraints and which of them have closed."""
     found = dict(start.never_opening)
     for name, rows in settled.constraints.rows().items():
         if problem.pairs[name].options.kind == "bilateral_once_closed":
@@ -97,7 +97,7 @@ def never_opening(problem: Problem, start: State, settled: SettledContact) -> di
 
 
 def tractions(problem: Problem, settled: SettledContact) -> dict[str, tuple[Array, Array]]:
-    """Return by contact pair with a tangential penalty the places of its constraints, and the tangential tractions there."""
+    """Return, for pairs with a tangential penalty, the positions of their constraints and the tangential tractions there."""
     found = {}
     for name, rows in settled.constraints.rows().items():
         part, solution = settled.constraints.parts[name], settled.solution

@@ -149,7 +149,7 @@ def equilibrium(
 def after_contact(
     problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State, energy: tuple[float, float]
 ) -> tuple[State, dict[str, ContactResult]]:
-    """Return the end of the step with what later steps start from, and the results of all contact pairs."""
+    """Return the state at the end of the step with its contact history, and the results of all contact pairs."""
     end = keep_contact(problem, start, load, settled, end)
     results = contact_results(problem, start, load, settled, end)
     end, results = keep_path(problem, start, load, settled, end, results, energy)

@@ -163,7 +163,7 @@ def _linear_contact(
     problem: Problem, start: State, load: StepLoad, at: tuple[DeformedBodies, Array], iterate: Iterate,
     scale: tuple[float, float],
 ) -> tuple[SettledContact | None, Array, Array]:  # fmt: skip
-    """Return what `_solve` does, with the tangent as it is."""
+    """Return the result of `_solve` for the full tangent."""
     tangent, linear = problem.linearised(*at, load, iterate.rigid)
     iterate.u, iterate.history = at[1].copy(), []
     loaded, settled = with_loads(tangent, linear), None
@@ -196,7 +196,7 @@ def _searched(
     problem: Problem, start: State, load: StepLoad, begin: tuple[Array, DeformedBodies], end: tuple[Array, DeformedBodies],
     contact_force: Array,
 ) -> tuple[Array, DeformedBodies, float]:  # fmt: skip
-    """Return what `_reach` does, after a line search between two displacements (Crisfield, 1991, section 9.2).
+    """Return the result of `_reach` after a line search between two displacements (Crisfield, 1991, section 9.2).
 
     Under contact forces (n_dofs,) [force] as they are, the potential falls along the way at its beginning; where it rises at
     the end by much of that, the end lies too far.

@@ -160,7 +160,7 @@ class Problem:
         return StepLoad(lift, force, obstacles, clearances, angles, following)
 
     def factors(self, histories: Iterable[Temperature | InitialState], instant: float) -> list[float]:
-        """Return what temperatures or initial states of the model are multiplied with at an instant of the ramp [-]."""
+        """Return the load factors of temperatures or initial states at an instant of the ramp [-]."""
         return [multiplier(own.ramp, self.ramp, instant) for own in histories]
 
     def displacement(self, u: Array) -> Array:
@@ -201,7 +201,7 @@ class Problem:
         )
 
     def _worn(self, name: str, state: State) -> Array | None:
-        """Return what has been worn off a contact pair at all points (n_points,) [length], None for nothing."""
+        """Return the wear depth of a contact pair at all points (n_points,) [length], None without wear."""
         if name not in state.worn:
             return None
         depth = np.zeros(self.model.mesh.n_points)

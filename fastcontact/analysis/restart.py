@@ -30,7 +30,7 @@ SAME_INSTANT = 1e-12
 
 
 def identity(model: Model, ramp: Ramp, criteria: Criteria) -> dict[str, Any]:
-    """Return what tells a case from another one: digests of its parts, and its load history."""
+    """Return the identity of a case: digests of its parts, and its load history."""
     options = {name: getattr(criteria, name) for name in ANSWER}
     return {"parts": fingerprint(model, options), "table": [list(row) for row in ramp.table]}
 
@@ -63,7 +63,7 @@ def _formulations(then: dict[str, str], now: dict[str, str], model: Model) -> st
 
 
 def taken(problem: Problem, state: State, case: dict[str, Any]) -> dict[str, Any]:
-    """Return what a later process needs to continue after a step; `case` from `identity`."""
+    """Return the restart data after a step; `case` from `identity`."""
     kept = state.to_dict(problem.model.n_dofs)
     extrapolation, memory = kept.pop("extrapolation"), kept.pop("solver")
     kept = {"format": FORMAT, "case": case, **kept, "solver": {"kind": _kind(problem.solver), "memory": memory}}
@@ -74,7 +74,7 @@ def taken(problem: Problem, state: State, case: dict[str, Any]) -> dict[str, Any
 
 @on_one_blas_thread
 def put_back(problem: Problem, step: StepResult, touched: frozenset[str]) -> State:
-    """Return the state after `step`, which `check` has found to fit; the linear solver remembers what it had learnt.
+    """Return the state after `step`, which `check` has accepted; the linear solver continues from its snapshot.
 
     `touched` are the contact pairs that were closed at the end of a step so far.
     """
@@ -109,5 +109,5 @@ def _history(table: Sequence[Sequence[float]], end: float, other: Sequence[Seque
 
 
 def _kind(solver: Any) -> list[Any]:
-    """Return what solvers that take each other's memory share."""
+    """Return the kind of a solver: solvers of one kind can continue from each other's snapshots."""
     return [getattr(solver, "name", type(solver).__name__), solver.tolerance if solver.asked is None else solver.asked]

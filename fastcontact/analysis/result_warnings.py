@@ -98,7 +98,7 @@ def _too_fast(name: str, pair: Formulation, state: State) -> Iterator[str]:
 
 
 def _unbalanced(state: State) -> Iterator[str]:
-    """Yield a warning where energies and works of all steps do not add up, but for what is round-off beside forces."""
+    """Yield a warning where the energy balance of all steps is violated by more than round-off."""
     work, round_off = state.work, ROUND_OFF * state.largest_force * float(np.abs(state.u).max(initial=0.0))
     if work is not None and abs(work.imbalance) > IMBALANCE * work.largest and work.largest > round_off:
         yield (
@@ -180,7 +180,7 @@ def _large_strain(problem: Problem, last: StepResult) -> Iterator[str]:
 
 
 def _large_stress_free_strain(problem: Problem, last: StepResult) -> Iterator[str]:
-    """Yield a warning where temperatures or initial states strain bodies by much, of which stresses need not tell."""
+    """Yield a warning where temperatures or initial states cause large strains, which stresses need not show."""
     model = problem.model
     if not (model.temperatures or model.initial_states):
         return

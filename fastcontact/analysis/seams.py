@@ -21,7 +21,7 @@ APART = 0.02
 
 
 def joined(problem: Problem, results: dict[str, ContactResult]) -> dict[str, ContactResult]:
-    """Return the results of contact pairs with one traction for each place, and closed where one of its nodes is."""
+    """Return the results of contact pairs with one traction for both nodes of a point, closed where one of them is."""
     found = dict(results)
     for name, contact in results.items() if problem.model.seams else ():
         pair = problem.pairs[name]
@@ -39,7 +39,7 @@ def joined(problem: Problem, results: dict[str, ContactResult]) -> dict[str, Con
 
 
 def _rows(problem: Problem, contact: ContactResult, seam: Seam) -> tuple[Indices, Indices]:
-    """Return the rows of the nodes of one place among those of a contact, where it has both."""
+    """Return the rows of a contact that belong to the two nodes of one point."""
     row = np.full(problem.model.mesh.n_points, -1, np.intp)
     row[contact.points] = np.arange(len(contact.points))
     both = (row[seam.first] >= 0) & (row[seam.second] >= 0)
@@ -47,7 +47,7 @@ def _rows(problem: Problem, contact: ContactResult, seam: Seam) -> tuple[Indices
 
 
 def seam_warnings(problem: Problem, last: StepResult) -> list[str]:
-    """Return a warning for each contact whose forces are split unevenly between nodes of one place.
+    """Return a warning for each contact whose forces are split unevenly between the two nodes of a point.
 
     Formulations with a condition a node know of such nodes (`shared_nodes`), fields of pressures unless tractions turn.
     """

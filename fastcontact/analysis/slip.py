@@ -23,7 +23,7 @@ def slip_in_step(pair: Formulation, at: Configuration, contact: ContactResult) -
 
 
 def slip_of_nodes(pair: Formulation, at: Configuration) -> Array:
-    """Return the slip (m, dim) of the secondary nodes in a step along what they face, else zero [length]."""
+    """Return the slip increment (m, dim) of the secondary nodes, zero where they face nothing [length]."""
     nodes = Candidates.nodes_of(pair.secondary)
     pairing = pair.facing(nodes, at, max(pair.projection_tolerance or 0.0, STANDS_OUT))
     directions = tangents(pairing.normal)

@@ -94,13 +94,13 @@ class State:
     solver: Mapping[str, Any] = field(default_factory=dict)
 
     def after_touching(self, pairs: Iterable[str]) -> State:
-        """Return the state when these contact pairs are closed; places of first contact count of pairs that have been."""
+        """Return the state with these contact pairs closed; pairs that have touched keep their first contact."""
         touched = self.touched.union(pairs)
         met = {name: place for name, place in self.first_contact.items() if name in touched}
         return dataclasses.replace(self, touched=touched, first_contact=met)
 
     def to_dict(self, n_dofs: int) -> dict[str, Any]:
-        """Return what a later process needs to continue, beside the displacements of the `n_dofs` components of the mesh."""
+        """Return the restart data, without the displacements of the `n_dofs` components of the mesh."""
         return {
             "numbers": {
                 "largest_force": float(self.largest_force),

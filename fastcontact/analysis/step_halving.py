@@ -62,7 +62,7 @@ def _parts(
 
 
 def _joined(parts: list[StepResult]) -> StepResult:
-    """Return the last part with what adds up over all of them."""
+    """Return the last part with the sums over all parts."""
     end = parts[-1]
     if len(parts) == 1:
         return end

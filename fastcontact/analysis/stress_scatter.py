@@ -33,7 +33,7 @@ BATCH = 50_000
 
 
 class StressScatter:
-    """What linear cells have of the energy and of the mean stress, and how much of it recovered stresses lack.
+    """Energy and mean stress of linear cells, and their difference from the recovered stresses.
 
     Parameters
     ----------

@@ -75,7 +75,7 @@ def multipliers(reaction: Array, rows: Sequence[csr_array], held: Mask) -> list[
 
 @typed(ModelError)
 def spring_forces(model: Model, step: StepResult) -> dict[str, Array]:
-    """Return the tension (m,) in springs by what they are called, such as ``"spring on 'TOP'"`` [force].
+    """Return the tension (m,) in springs by name, such as ``"spring on 'TOP'"`` [force].
 
     Parameters
     ----------

@@ -120,7 +120,7 @@ class UnsupportedBodies:
         return np.asarray(self.motions.displacement @ position)
 
     def report(self, found: RigidPosition, load: float) -> dict[str, Any]:
-        """Return what was regularised, and by how much, as plain numbers and strings.
+        """Return a report of the regularisation, as plain numbers and strings.
 
         Keys: ``motions``, names of the free motions; ``springs``, their places; ``spring_stiffness`` [force / length];
         ``force_left``, what each spring still carries [force]; ``relative_to_load``, the largest over the load;
@@ -137,7 +137,7 @@ class UnsupportedBodies:
         }
 
     def _owner(self, motions: FreeMotions, dof: int, weightless: Mask) -> str:
-        """Return what a spring hangs on: a point of a body, or an obstacle that has no point in the mesh."""
+        """Return the name of the point or obstacle that a spring is attached to."""
         if not weightless[dof]:
             return f"point {dof // self._dim}"
         column = int(np.argmax(np.abs(motions.displacement[dof])))
@@ -205,7 +205,7 @@ class UnsupportedBodies:
 
 
 class _Search:
-    """Where the search for the position stands."""
+    """State of the search for the position."""
 
     def __init__(self, solve_at: Callable[[Array], Solution], dofs: Indices, start: Array) -> None:
         self._solve_at, self._dofs = solve_at, dofs

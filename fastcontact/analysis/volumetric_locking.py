@@ -82,7 +82,7 @@ class Comparison:
         return recovery.internal_force(mesh, kinematics, surplus)
 
     def _add_beyond_nodal_mean(self, reference: dict[str, Array], surplus: dict[str, Array]) -> None:
-        """Add to `surplus` what mean pressures of cells have beyond the means at their nodes, material by material."""
+        """Add to `surplus` the deviation of cell mean pressures from the nodal means, material by material."""
         mesh, names = self._model.mesh, [name for name in self._cells if name in AT_NODES]
         volume, pressure = {}, {}
         for name in names:

@@ -16,7 +16,7 @@ from fastcontact.results.step import ContactResult
 
 @dataclass(frozen=True, eq=False)
 class Worn:
-    """What has been worn off a contact pair at the end of a load step.
+    """Wear of a contact pair at the end of a load step.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class Worn:
         return cls(np.zeros(count), np.zeros(count))
 
     def after(self, pair: Formulation, at: Configuration, contact: ContactResult, coefficient: float) -> Worn:
-        """Return what has been worn off after a load step more, see `worn_in_step`."""
+        """Return the wear after one more load step, see `worn_in_step`."""
         more = worn_in_step(pair, at, contact, self.pressure, coefficient)
         mean = 0.5 * np.maximum(contact.pressure + self.pressure, 0.0)
         pace = np.divide(more, mean, out=np.zeros_like(more), where=mean > 0.0)

@@ -49,7 +49,7 @@ class Configuration:
 
     @property
     def stance(self) -> Stance:
-        """Where a rigid obstacle stands now."""
+        """Current position of a rigid obstacle."""
         return Stance(self.obstacle, self.angle)
 
     @property

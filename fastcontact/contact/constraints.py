@@ -22,7 +22,7 @@ class Compliance(Protocol):
         ...
 
     def among(self, rows: Indices) -> Array | FieldCompliance:
-        """Return the same, or what a linear solver can do without them."""
+        """Return the same, or an equivalent form that a linear solver can use without forming the block."""
         ...
 
     def apply(self, multiplier: Array) -> Array:
@@ -31,7 +31,7 @@ class Compliance(Protocol):
 
 
 class NodalField(Protocol):
-    """What the forces of constraints mean at the secondary nodes.
+    """Nodal interpretation of the forces of constraints.
 
     Attributes
     ----------
@@ -82,15 +82,15 @@ class NodalField(Protocol):
 
 
 class Tied(Protocol):
-    """Linear equations in the place of contact; see `tied.TiedPair`."""
+    """Linear equations that replace contact; see `tied.TiedPair`."""
 
     @property
     def directions(self) -> tuple[Array, ...]:
-        """Tangents (m, dim) at the places of the formulation."""
+        """Tangents (m, dim) at the constraints of the formulation."""
         ...
 
     def forces(self, multiplier: Array) -> tuple[Array, Array]:
-        """Return normal (m,) and tangential (m, k) forces at the places of the formulation [force]."""
+        """Return normal (m,) and tangential (m, k) forces at the constraints of the formulation [force]."""
         ...
 
 
@@ -210,7 +210,7 @@ class Constraints:
         return total
 
     def normal_forces(self, multiplier: Array) -> Array:
-        """Return the normal forces (m,) at the places of the formulation [force]."""
+        """Return the normal forces (m,) at the constraints of the formulation [force]."""
         return multiplier if self.tied is None else self.tied.forces(multiplier)[0]
 
     def pressure(self, multiplier: Array) -> Array:
@@ -291,7 +291,7 @@ def _stacked_slips(found: Sequence[Array | None], parts: list[Constraints]) -> A
 
 
 def _stacked_tangents(parts: list[Constraints]) -> tuple[csr_array, ...]:
-    """Return the tangential rows of all parts; empty rows stand for parts without friction."""
+    """Return the tangential rows of all parts, empty for parts without friction."""
     count = max(len(part.tangents) for part in parts)
     return tuple(
         csr_array(vstack([p.tangents[j] if p.tangents else csr_array(p.B.shape) for p in parts], format="csr"))

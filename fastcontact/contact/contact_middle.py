@@ -107,7 +107,7 @@ def contact_middle(pair: Formulation, normal: Array, force: Array, closed: Mask,
 
 
 def _in_space(points: Array, weight: Array, planes: list[tuple[int, Indices]], mean: Array) -> ContactMiddle:
-    """Return the middle on a surface in space; parallel planes of symmetry at both ends stand for an endless one."""
+    """Return the centre on a surface in space; parallel planes of symmetry at both ends represent an infinite one."""
     centre = weight @ points
     ends: dict[int, list[float]] = {}
     for axis, nodes in planes:

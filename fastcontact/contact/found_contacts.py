@@ -62,7 +62,7 @@ class FoundContact:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FoundContacts(Sequence[FoundContact]):
-    """What `find_contacts` has found: a sequence of `FoundContact` that prints as a table.
+    """Result of `find_contacts`: a sequence of `FoundContact` that prints as a table.
 
     Attributes
     ----------
@@ -234,7 +234,7 @@ def _whole_bodies(mesh: Mesh) -> Numbers:
 
 
 def _names(mesh: Mesh, body: Indices) -> list[str]:
-    """Return what bodies are called: by a cell group that is all of a body, else by their number from 1."""
+    """Return the names of bodies: a cell group that is all of a body, else its number from 1."""
     names, count = [f"body {k + 1}" for k in range(body.max() + 1)], np.bincount(body[body >= 0])
     for group in reversed(list(mesh.cell_groups)):
         members = body[mesh.cell_groups[group]]

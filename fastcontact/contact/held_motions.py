@@ -35,7 +35,7 @@ class HeldMotions:
 
     @classmethod
     def of(cls, supported: Mask, relations: csr_array) -> HeldMotions:
-        """Return what `supported` components (n_points, dim) and `relations` (m, n_dofs) of single nodes hold."""
+        """Return the constraints by `supported` components (n_points, dim) and single-node `relations` (m, n_dofs)."""
         dim = supported.shape[1]
         owners, normals = _rows_of_single_nodes(relations, dim)
         nodes = np.union1d(np.flatnonzero(supported.any(axis=1)), owners)

@@ -21,7 +21,7 @@ MOST_POINTS = 10_000
 
 @dataclass(frozen=True, eq=False)
 class Projection:
-    """Projection of point forces on a multiplier field, and the compliance of what it cannot represent.
+    """Projection of point forces on a multiplier field, and the compliance of the complement.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class Projection:
         return np.zeros(self.P.shape[1]) if self.mass is None else self.mass.solve(self.P.T @ multiplier)
 
     def compliant(self, columns: Indices) -> Array:
-        r"""Return a factor Z (m, h) of what dropping `columns` of the multiplier field adds to the compliance C.
+        r"""Return a factor Z (m, h) of the compliance added by dropping `columns` of the multiplier field.
 
         At supported nodes, as on an axis or in a plane of symmetry, the slip of a facet has one nodal value less than its
         multiplier field: a field that alternates from node to node and dies out along the surface does no work on any slip,

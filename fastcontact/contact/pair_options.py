@@ -84,7 +84,7 @@ class PairOptions:
         )
 
     def borders(self, side: Surface) -> tuple[Indices, Array]:
-        """Return (facet, xi) of the points of lines where what belongs to excluded nodes ends."""
+        """Return (facet, xi) of the points on lines that bound the share of excluded nodes."""
         mask = self.excluded
         if mask is None:
             return np.empty(0, np.intp), np.empty(0)
@@ -127,7 +127,7 @@ class PairOptions:
     def added_gap(
         self, candidates: Candidates, pairing: Pairing, primary: object, reference: Array, factor: float
     ) -> Array:
-        """Return what clearances times a factor add to the gaps (n,) of candidates, zero where nothing is faced [length]."""
+        """Return the contribution of clearances times a factor to the gaps (n,) of candidates, zero if unpaired [length]."""
         added = np.zeros(len(candidates.nodes))
         rows = np.flatnonzero(pairing.paired)
         if not len(rows):

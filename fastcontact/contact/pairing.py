@@ -173,7 +173,7 @@ def pair(
 
 
 def _straight_on(pairing: Pairing, candidates: Array, primary: Surface, coordinates: Array, outside: Mask) -> Pairing:
-    """Return the pairing with how far those `outside` (n,) stand beyond the ends of their facets."""
+    """Return the pairing with the overhang of candidates `outside` (n,) beyond the ends of their facets."""
     rows = np.flatnonzero(outside)
     if not len(rows):
         return pairing
@@ -187,7 +187,7 @@ def _straight_on(pairing: Pairing, candidates: Array, primary: Surface, coordina
 
 
 def _at_smooth_ends(primary: Surface, coordinates: Array, found: Closest) -> Mask:
-    """Return which candidates (n,) stand out at an end of a line where another line goes on from without a corner.
+    """Return which candidates (n,) overhang an end at which another line continues smoothly.
 
     On lines that fold inward, points at a distance lie beyond the ends of both facets at a node, but not beyond the end
     of the surface. At a corner they lie beside it.
@@ -256,7 +256,7 @@ def normals(directions: Sequence[Array]) -> Array:
 def rows_along(
     direction: Array, candidates: Candidates, pairing: Pairing, primary: Surface | RigidSide, n_dofs: int
 ) -> csr_array:
-    """Return rows (n, n_dofs): motion of the candidates along `direction` (n, dim) relative to what they face.
+    """Return rows (n, n_dofs) of the relative motion of paired points along `direction` (n, dim).
 
     Rows of unpaired candidates are empty.
     """

@@ -123,7 +123,7 @@ def smooth_normals(side: Surface, coordinates: Array) -> list[Array]:
 
 
 def at_nodes_of_facets(parts: Sequence[Array]) -> Array:
-    """Return what blocks have at the nodes of their facets (n_facets, k, ...) as one array, as wide as the widest block.
+    """Return values at the nodes of facets (n_facets, k, ...) of all blocks as one array, as wide as the widest block.
 
     The last entry of facets with fewer nodes is repeated, as in `places`.
     """
@@ -157,7 +157,7 @@ def _angles(block: FacetBlock, coordinates: Array) -> Array:
 
 
 def interpolated(normals: Array, at: Places) -> Array:
-    """Return unit normals (n, dim) at places, interpolated from those at the nodes of their facets (n, k, dim)."""
+    """Return unit normals (n, dim) interpolated from those at the nodes of facets (n, k, dim)."""
     normal = np.einsum("nk,nkd->nd", at.shape, normals)
     return normal / np.linalg.norm(normal, axis=1, keepdims=True)
 

@@ -65,7 +65,7 @@ class TiedPair:
 
 
 def tied(part: Constraints) -> TiedPair:
-    """Return the equations that tie what the constraints `part`, with tangents, pair."""
+    """Return the tying equations of the constraints `part`, which have tangents."""
     moments = moments_of(part)
     size = np.maximum(np.asarray(abs(moments).sum(axis=1)).ravel(), 1e-300)
     positions = abs(moments) @ part.positions / size[:, None]

@@ -24,7 +24,7 @@ from fastcontact.arrays import Array, Indices, Mask
 
 @dataclass(frozen=True, eq=False)
 class FieldCompliance:
-    """See the module; equations that do not give way are fields of one point without springs.
+    """See the module; exact constraints are fields of one point without springs.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class FieldCompliance:
 
     @classmethod
     def none(cls, m: int) -> FieldCompliance:
-        """Return that of m equations that do not give way."""
+        """Return that of m exact constraints."""
         one = csr_array(diags_array(np.ones(m)))
         return cls(one, np.ones(m), np.zeros(m), csr_array((m, m)), lambda: np.zeros((m, m)))
 
@@ -77,7 +77,7 @@ class FieldCompliance:
         return FieldCompliance(self.P, weights, self.stiffness * share, others, dense, self.bordered)
 
     def of_field(self, B: csr_array, c: Array) -> FieldEquations:
-        """Return the same equations for the field, of rows B (m, n) and right-hand sides c (m,) [length]."""
+        """Return the equivalent equations for the field, from rows B (m, n) and right-hand sides c (m,) [length]."""
         shares = csr_array(self.P.T @ diags_array(self.weights))
         size = np.asarray(abs(shares).sum(axis=1))
         touched = np.flatnonzero(size > 0.0)

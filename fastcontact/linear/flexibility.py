@@ -112,7 +112,7 @@ class FlexibilityColumns:
             self._dofs, self._values = self._dofs[:-count], self._values[:-count, :-count].copy()
 
     def _places(self, dofs: NDArray[np.integer]) -> Indices:
-        """Return where `dofs` (k,), which may repeat, stand among those kept; solve for those that are new."""
+        """Return the positions of `dofs` (k,), which may repeat, among stored columns; solve for new ones."""
         new = np.unique(dofs[self._place[dofs] < 0]).astype(np.intp)
         if len(new):
             self._extend(new)
@@ -169,7 +169,7 @@ def solve_multipliers(flexibility: Array, wanted: Array, C: Array | FieldComplia
 
 
 def _smallest(flexibility: Array, wanted: Array) -> Array:
-    """Return the smallest multipliers (m,) where rows repeat each other and leave them open."""
+    """Return the minimum-norm multipliers (m,) of linearly dependent rows."""
     return np.asarray(lstsq(flexibility, wanted, cond=_round_off(flexibility))[0])
 
 

@@ -14,7 +14,7 @@ LEFT, LEAST = 0.1, 1e-15
 
 
 def tighten(solver: LinearSolver, excess: float) -> bool:
-    """Lower the tolerance of `solver`, whose solutions leave `excess` times what is allowed; False at the least one."""
+    """Lower the tolerance of `solver`, whose residual exceeds its bound by the factor `excess`; False at the lower limit."""
     tolerance = max(solver.tolerance * LEFT / excess, LEAST)
     if not tolerance < solver.tolerance:
         return False

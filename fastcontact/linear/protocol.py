@@ -23,7 +23,7 @@ Monitor = Callable[[Array, Array, float], bool]
 
 
 class Product(Protocol):
-    """What a solver that has copied a matrix K (n, n) returns in its place."""
+    """Matrix-vector products of a solver that stores K (n, n) in its own format."""
 
     def __matmul__(self, u: Array) -> Array:
         """Return ``K u``, shape (n,) [force]."""
@@ -127,7 +127,7 @@ class LoadedNonsymmetric(Loaded, Protocol):
         Raises
         ------
         ConvergenceError
-            If equations that do not give way repeat each other, in B or in rows, or the iteration does not end.
+            If exact constraints are linearly dependent, in B or in rows, or the iteration does not converge.
         """
         ...
 
@@ -176,7 +176,7 @@ class LinearSolver(Protocol):
     def prepare(
         self, K: bsr_array, rigid_modes: Array, involved: Indices | None = None, release: bool = False
     ) -> bsr_array | Product:
-        """Do what is done once for a matrix: factorise it, or build a hierarchy.
+        """Factorise the matrix, or build a multigrid hierarchy.
 
         Parameters
         ----------
@@ -214,5 +214,5 @@ class LinearSolver(Protocol):
         ...
 
     def improve(self, excess: float) -> bool:
-        """Make later solutions more accurate, since they leave `excess` times what is allowed; False if there is no way."""
+        """Make later solutions more accurate, since the residual exceeds its bound by `excess`; False if impossible."""
         return False

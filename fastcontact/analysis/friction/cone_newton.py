@@ -50,7 +50,7 @@ class Forces:
 
 
 class Linearised(Protocol):
-    """What forces do to gaps and slips, and the step of Newton's method.
+    """Map from forces to gaps and slips, and its Newton step.
 
     Attributes
     ----------

@@ -35,7 +35,7 @@ class Law:
         return n, t, np.sqrt((t * t).sum(axis=0)), self.mu * np.maximum(n, 0.0)
 
     def residual(self, y: Array, gaps: Array) -> Array:
-        """Return the left-hand sides (1 + k, m) of the equations."""
+        """Return the residual (1 + k, m) of the complementarity function."""
         n, t, reach, radius = self.trial(y, gaps)
         inside = np.divide(radius, reach, out=np.ones_like(reach), where=reach > radius)
         pushed = np.maximum(n, 0.0) if self.equality is None else np.where(self.equality, n, np.maximum(n, 0.0))

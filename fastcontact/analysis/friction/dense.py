@@ -162,7 +162,7 @@ def _step(problem: _Problem, y: Array, gaps: Array, closed: Mask, sticking: Mask
 
 
 def _solved(A: Array, right: Array) -> Array:
-    """Solve a linear system; of constraints that repeat each other any forces do, the smallest are taken."""
+    """Solve a linear system; of minimum norm where constraints are linearly dependent."""
     try:
         found = np.linalg.solve(A, right)
         if np.abs(A @ found - right).max() <= 1e-8 * np.abs(right).max(initial=0.0):

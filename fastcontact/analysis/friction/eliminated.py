@@ -24,8 +24,8 @@ from fastcontact.linear.protocol import FrictionTerms, LoadedNonsymmetric
 from fastcontact.linear.sparse_rows import scaled, taken
 from fastcontact.linear.springs import Springs
 
-# The stiffest spring across a slip, in units of what holds the constraint itself: a slip that hardly moves would ask for
-# any. The solution does not depend on it, for there nothing slips across.
+# Bound of the tangential stiffness across a slip, which is unbounded as the slip vanishes, in units of the stiffness of the
+# constraint. The solution does not depend on it, since nothing slips across there.
 STIFFEST = 100.0
 # Constraints are taken for so much softer than the unknowns that they act on are by themselves, for neighbours give way, too.
 # Nearly incompressible cells resist a single node far more than a surface (`LinearSolver.contrast`): beyond MILD, constraints
@@ -143,7 +143,7 @@ class Eliminated:
         )
 
     def _own(self, rows: tuple[csr_array, ...], yielding: Array) -> Array:
-        """Return `compliance_of_rows`, and what constraints give along their tangents: what gives way is not idle."""
+        """Return `compliance_of_rows` plus the own tangential compliance: directions with compliance are not idle."""
         own = compliance_of_rows(rows, yielding)
         slips = np.arange(1, len(rows))
         own[slips, slips] += self._gives[1:]
@@ -170,7 +170,7 @@ class Eliminated:
         return self._free + np.stack([R @ u for R in self._rows]) + self._gives * forces
 
     def _scaled(self, gaps: Array) -> Array:
-        """Return gaps in units of the constraints; what cannot close is open, by whatever."""
+        """Return scaled gaps; constraints that cannot close count as open."""
         gaps = np.where(self._usable, gaps * self._unit, 0.0)
         gaps[0, ~self._usable] = 1.0
         return gaps
@@ -211,7 +211,7 @@ class Eliminated:
         return self._last > self._tolerance
 
     def _sliding(self, y: Array, gaps: Array, at: Indices) -> _Sliding:
-        """Return what the constraints `at` (q,) do that slide."""
+        """Return slip directions and friction rows of the sliding constraints `at` (q,)."""
         d, turning = self.law.slide(y, gaps, at)
         pull = self.law.mu[at] * d
         if len(d) == 1:
@@ -225,7 +225,7 @@ class Eliminated:
         )
 
     def _drag(self, B: csr_array, shut: Indices, sliding: _Sliding) -> FrictionTerms:
-        """Return what sliding adds to equations B whose first rows are the gaps of `shut`."""
+        """Return the frictional terms of equations B whose first rows are the gaps of `shut`."""
         pull = np.zeros((len(self._rows) - 1, len(self._usable)))
         pull[:, sliding.at] = sliding.pull
         through = taken(self._rows[0], shut)
@@ -240,7 +240,7 @@ class Eliminated:
 
 
 def _diagonal_compliance(constraints: Constraints) -> Array:
-    """Return what constraints give way by themselves along their normals and tangents (1 + k, m) [length / force]."""
+    """Return the own compliance of constraints along normals and tangents (1 + k, m) [length / force]."""
     found = np.zeros((1 + len(constraints.tangents), len(constraints)))
     if constraints.softness is not None:
         found[0] = constraints.softness

@@ -26,7 +26,7 @@ def own_compliance(F: Array, parts: int) -> Array:
 
 
 def compliance_of_rows(rows: tuple[csr_array, ...], yielding: Array) -> Array:
-    """Return the compliance (parts, parts, m) of each constraint if every unknown gave way by itself.
+    """Return the compliance (parts, parts, m) of each constraint for a diagonal stiffness matrix.
 
     Parameters
     ----------

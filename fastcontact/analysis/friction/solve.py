@@ -96,7 +96,7 @@ def _eliminated(
 def _among(
     chosen: Mask, loaded: Loaded, constraints: Constraints, closed: Mask, u: Array, forces: Array | None
 ) -> FrictionalEquilibrium:
-    """Solve with the `chosen` constraints (m,) alone; gaps and slips of the others are what the displacement leaves."""
+    """Solve with the `chosen` constraints (m,) alone; gaps and slips of the others follow from the displacement."""
     rows = np.flatnonzero(chosen)
     k, m = len(constraints.tangents), len(constraints)
     check_rows((1 + k) * len(rows), MOST_ROWS_WITH_FRICTION)
@@ -138,7 +138,7 @@ def _among(
 
 
 def _add_compliance(F: Array, constraints: Constraints, rows: Indices) -> None:
-    """Add, in place, what constraints `rows` give way by themselves to the flexibility F ((1 + k) m, (1 + k) m)."""
+    """Add, in place, the own compliance of constraints `rows` to the Delassus operator F ((1 + k) m, (1 + k) m)."""
     if constraints.compliance is not None and len(rows):
         along = np.stack([direction[rows] for direction in constraints.directions])
         F += _turned(constraints.compliance.block(rows), along)

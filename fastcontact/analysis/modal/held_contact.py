@@ -25,7 +25,7 @@ from fastcontact.results.step import ContactResult, StepResult
 
 @dataclass(frozen=True, eq=False)
 class HeldContact:
-    """What contact does to small motions.
+    """Constraints and compliance of closed contact for small motions.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ def held_contact(model: Model, step: StepResult | None, held: HeldMotions, hold_
 
 
 def _configuration(model: Model, step: StepResult | None, contact: ContactResult | None) -> Configuration:
-    """Return where both sides of a pair stand."""
+    """Return the configuration of both sides of a pair."""
     if step is None or contact is None:
         return Configuration.undeformed(model.mesh.points)
     still = np.zeros(model.mesh.dim)
@@ -90,7 +90,7 @@ def _worn(model: Model, contact: ContactResult) -> Array | None:
 def _rows(
     pair: Formulation, part: Constraints, contact: ContactResult | None, hold_sliding: bool
 ) -> Iterator[tuple[csr_array, Indices, csr_array | None]]:
-    """Yield rows along the normal and along each tangent, their nodes, and the matrix by which they give way, if they do.
+    """Yield rows along the normal and along each tangent, their nodes, and their compliance matrix, if any.
 
     They are tested with the formulation's multipliers, as those of tied pairs are, see `contact.tied`.
     """
@@ -119,7 +119,7 @@ def _rows(
 
 
 def _nodes(pair: Formulation, part: Constraints, moments: csr_array) -> Indices:
-    """Return the secondary node (q,), as a position on its side, that each row of the moments (q, m) stands for."""
+    """Return the secondary node (q,), as an index on its side, of each row of the moments (q, m)."""
     if isinstance(part.nodal, PressureField):
         field = part.nodal
         alone = moments.indices[moments.indptr[len(field.independent) : -1]]  # points on an axis

@@ -25,7 +25,7 @@ class Reduced:
     mass : bsr_array (n, n)
         [mass].
     rows : csr_array (m, n)
-        They may repeat each other [-].
+        They may be linearly dependent [-].
     nodes : ndarray of int (m,)
         A node that each row belongs to: a hint which unknowns to eliminate.
 
@@ -86,5 +86,5 @@ def _independent(rows: csr_array) -> tuple[Indices, csr_array]:
 
 
 def _selection(columns: Indices, n: int) -> csr_array:
-    """Return the matrix (k, n) that puts k columns in their places."""
+    """Return the selection matrix (k, n) of k columns."""
     return csr_array((np.ones(len(columns)), (np.arange(len(columns)), columns)), shape=(len(columns), n))

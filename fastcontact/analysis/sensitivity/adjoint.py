@@ -47,7 +47,7 @@ class Gradient:
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """What a parameter changes in the equations, displacements and multipliers held.
+    """Partial derivatives of the residual with respect to a parameter, at fixed displacements and multipliers.
 
     Attributes
     ----------
@@ -136,7 +136,7 @@ class Adjoint:
         return self._kept(right - s, multiplier)
 
     def _kept(self, right: Array, multiplier: Array) -> tuple[Array, Array]:
-        """Return ``J0^-T`` of right-hand sides (n,) and (k,), by the linear solver as it is."""
+        """Return ``J0^-T`` applied to right-hand sides (n,) and (k,), by the linear solver of the analysis."""
         self.solutions += 1
         loaded = self._solver.load(np.ascontiguousarray(right))
         w, force = loaded.solve(self._rows, -multiplier, self._C)

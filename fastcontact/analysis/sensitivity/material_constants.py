@@ -26,7 +26,7 @@ CHANGED = 1e-3
 
 
 def by_constant(contact: MovingContact, asked: Asked) -> tuple[Array, Array | None]:
-    """Return what a constant changes in `Change.out` (n_dofs,) and `Change.sample`, None for nothing."""
+    """Return the derivatives of `Change.out` (n_dofs,) and `Change.sample` with respect to a constant, None for zero."""
     model, name = contact.problem.model, str(asked[0])
     number, material, place = _found(model, asked)
     step = CHANGED * _room(material, name, place)

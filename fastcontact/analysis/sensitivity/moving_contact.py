@@ -39,7 +39,7 @@ TOGETHER = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """Contact at one place.
+    """Contact forces, gaps and pressures at one configuration.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ class MovingContact:
 
     @cached_property
     def constraints(self) -> StackedConstraints:
-        """The constraints where the bodies stand."""
+        """Constraints at the current configuration."""
         return self.constraints_at(self.u)
 
     @cached_property

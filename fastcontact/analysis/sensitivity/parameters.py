@@ -58,12 +58,12 @@ def check_parameter(model: Model, asked: Asked) -> None:
 
 
 def change_by(contact: MovingContact, asked: Asked) -> Change:
-    """Return what a parameter that `check_parameter` has found changes in the equations."""
+    """Return the change of the residual by a parameter that `check_parameter` has accepted."""
     return KINDS[str(asked[0])][1](contact, asked)
 
 
 def _one(kind: str, known: Mapping[str, Any], asked: Asked) -> Any:
-    """Return what has the name that is asked for; ModelError if nothing has."""
+    """Return the item of a given name; ModelError if there is none."""
     if asked[1] not in known:
         raise ModelError(unknown(kind, str(asked[1]), known))
     return known[str(asked[1])]
@@ -180,7 +180,7 @@ def _prescribing(model: Model, asked: Asked) -> tuple[list[Support], list[int]]:
 
 
 def _of_prescribed(contact: MovingContact, asked: Asked) -> Change:
-    """Return the change by the factor of what supports prescribe on a group."""
+    """Return the change by the load factor of prescribed displacements of a group."""
     problem, instant = contact.problem, contact.instant
     model = problem.model
     supports, along = _prescribing(model, asked)

@@ -130,7 +130,7 @@ def _facing(ours: _Polygons, theirs: _Polygons, reach: Array) -> Indices:
 def _integrated(
     ours: _Polygons, theirs: _Polygons, pairs: Indices, reference: Array, heights: tuple[Array, Array, Array]
 ) -> tuple[Coupling, Array, Array]:
-    """Return the coupling of pairs of facets, and of the secondary ones over what they face there the mass and `closer`."""
+    """Return the coupling of pairs of facets, and mass and `closer` of the secondary ones over the overlap."""
     one, other = elements.get(ours.block.element), elements.get(theirs.block.element)
     to_terms, other_to_terms = tables(one.n_nodes).to_terms, tables(other.n_nodes).to_terms
     n, k = ours.block.facets.shape

@@ -29,7 +29,7 @@ WHOLE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class WholeFacets:
-    """What the fields of the facets of a block weigh over all of them.
+    """Mass matrices of the fields over whole facets of a block.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class WholeFacets:
         return cls(block, to_corners, np.einsum("fq,qa,qb->fab", dA, N, N))
 
     def degrees(self, mass: Array) -> Indices:
-        """Return what field (n_facets,) `mass` (n_facets, k, k) over what takes part determines.
+        """Return the degree of the field (n_facets,) that `mass` (n_facets, k, k) over the covered part determines.
 
         2 all of it, 1 one that is linear between the corners, 0 none, -1 where nothing takes part.
         """

@@ -55,7 +55,7 @@ def positive(name: str) -> Array:
 
 
 def _edges(element: elements.Element) -> tuple[tuple[int, int], ...]:
-    """Return the ends of what each mid node halves."""
+    """Return the end nodes of the edge of each mid node."""
     return ((0, 1),) if element.dim == 1 else element.edges
 
 

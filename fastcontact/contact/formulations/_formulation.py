@@ -163,7 +163,7 @@ class Formulation(ABC):
         return replace(part, equality=self.never_opening(part.positions, at))
 
     def _softened(self, part: Constraints, at: Configuration) -> Constraints:
-        """Return constraints that give way by penalties along the normal and along the tangents, where there are any."""
+        """Return constraints with the compliance of normal and tangential penalties, if any."""
         normal, tangential, areas = self.options.penalty, self.options.tangential_penalty, part.areas
         if normal is None and tangential is None:
             return part
@@ -195,7 +195,7 @@ class Formulation(ABC):
         return tied(part)
 
     def never_opening(self, positions: Array, at: Configuration) -> Mask | None:
-        """Return which reference places (m, dim) [length] never open again, (m,); None if all may."""
+        """Return which constraints, by reference position (m, dim) [length], do not separate (m,); None if all may."""
         if self.options.always_closed:
             return np.ones(len(positions), bool)
         if at.never_opening is None:
@@ -203,7 +203,7 @@ class Formulation(ABC):
         return np.asarray(_at_places(at.never_opening, positions))
 
     def facing(self, candidates: Candidates, at: Configuration, tolerance: float | None = None) -> Pairing:
-        """Return what candidates face on the displaced configuration, by the options of the pair.
+        """Return the pairing of candidates on the deformed configuration, by the options of the pair.
 
         `tolerance` takes the place of `projection_tolerance` where it is given.
         """
@@ -242,7 +242,7 @@ class Formulation(ABC):
     def slips(
         self, candidates: Candidates, pairing: Pairing, directions: Sequence[Array], at: Configuration
     ) -> tuple[tuple[csr_array, ...], Array | None]:
-        """Return rows (n, n_dofs) of the slip of candidates along k tangents (n, dim), and what it is beside these (k, n).
+        """Return rows (n, n_dofs) of the slip of candidates along k tangents (n, dim), and its constant part (k, n).
 
         The latter: what a rigid primary side moves in the step, or minus the part that closes a gap [length]; None is zero.
         """
@@ -258,7 +258,7 @@ class Formulation(ABC):
         return along, drift
 
     def added_gap(self, candidates: Candidates, pairing: Pairing, at: Configuration) -> Array:
-        """Return what clearances and wear add to the gaps (n,) of candidates, zero where nothing is faced [length]."""
+        """Return the contribution of clearances and wear to the gaps (n,) of candidates, zero if unpaired [length]."""
         added = self.options.added_gap(candidates, pairing, self.primary, self.points, at.clearance_factor)
         if at.worn is None:
             return added
@@ -283,7 +283,7 @@ class Formulation(ABC):
         return closer
 
     def turning(self, candidates: Candidates, at: Configuration) -> Array | None:
-        """Return how far the rotation of an obstacle carries what candidates face (n, dim) [length]; None without any."""
+        """Return the displacement of the points faced by candidates due to obstacle rotation (n, dim) [length], or None."""
         assert isinstance(self.primary, RigidSide)
         now, before = (candidates.positions(self.points + u) for u in (at.displacement, at.start))
         return self.primary.turning(now, before, at.stance, at.stance_start)
@@ -387,7 +387,7 @@ class Formulation(ABC):
 
 
 def _at_places(known: tuple[Array, AnyArray], positions: Array) -> AnyArray:
-    """Return what is `known` at places (k, dim) [length], values (k, ...), at the one nearest to each of `positions`."""
+    """Return `known` values (k, ...) at the point (k, dim) [length] nearest to each of `positions`."""
     from scipy.spatial import cKDTree
 
     places_before, values = known

@@ -104,7 +104,7 @@ class PressureField(NodalField):
 
     @property
     def covered(self) -> Array:
-        """What part of the areas takes part; all of it for nodes without area."""
+        """Covered part of the nodal areas; one for nodes without area."""
         whole = self.nodal_areas
         with_area = np.abs(whole) > NO_AREA * np.abs(whole).max(initial=0.0)
         return np.divide(self.covered_areas, whole, out=np.ones_like(whole), where=with_area)
@@ -172,7 +172,7 @@ class PressureFieldFormulation(Formulation):
 
     @property
     def eliminable(self) -> bool:
-        """See `Formulation`: what the field does not represent gives way, but its values can be eliminated.
+        """See `Formulation`: the part outside the field is compliant, but the field values can be eliminated.
 
         In space, without friction, which would couple them along all directions.
         """
@@ -184,7 +184,7 @@ class PressureFieldFormulation(Formulation):
             raise ContactError(f"augmentation = {self.augmentation} must be positive; 1 suits most problems")
 
     def repeated(self, field: tuple[csr_array, Indices]) -> tuple[csr_array, Indices]:
-        """Return a field, its nodal by its independent values and their nodes, with one value for nodes at one place."""
+        """Return a field with one value for coincident nodes: nodal by independent values, and the nodes of the latter."""
         same, (values, nodes) = self.options.same_place, field
         if same is None:
             return field

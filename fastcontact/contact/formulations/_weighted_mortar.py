@@ -161,7 +161,7 @@ class WeightedMortar(Formulation):
         )
 
     def _nodal(self, weight: Array) -> WeightedPressures:
-        """Return what forces mean at the nodes; `weight` (m,) are the areas of the gaps [area]."""
+        """Return the nodal interpretation of forces; `weight` (m,) are the areas of the gaps [area]."""
         quadratic = [
             (elements.get(block.element).n_corners, T, block.local)
             for block, T in zip(self.secondary.blocks, self._test, strict=True)
@@ -289,7 +289,7 @@ class WeightedMortar(Formulation):
         return np.where(length > 0, mean / np.where(length > 0, length, 1.0), np.eye(mean.shape[1])[-1])
 
     def _clearance(self, own: csr_array, across: csr_array, weight: Array) -> Array:
-        """Return what clearances add to the mean gaps (m,), interpolated between the nodes of both sides [length]."""
+        """Return the contribution of nodal clearances on both sides to the weighted gaps (m,) [length]."""
         added = np.zeros(own.shape[0])
         for matrix, side, clearance in (
             (own, self.secondary, self.options.clearance), (across, self.primary, self.options.clearance_primary)
@@ -340,12 +340,12 @@ class WeightedPressures(NodalField):
     held: Mask
 
     def pressure(self, force: Array) -> Array:
-        """Return forces over the areas that their gaps stand for; at mid nodes without a gap, the mean of their corners."""
+        """Return forces over the areas of their gaps; at mid nodes without a gap, the mean of their corners."""
         return self._at_nodes(force / self.weight, only_without_gap=True)
 
     @property
     def covered(self) -> Array:
-        """What part of the whole areas the gaps stand for; at mid nodes without a gap, the mean of their corners."""
+        """Covered part of the nodal areas; at mid nodes without a gap, the mean of their corners."""
         usable = np.isfinite(self.weight)
         part = np.divide(self.weight, self.tested, out=np.zeros_like(self.weight), where=usable & (self.tested > 0.0))
         return self._at_nodes(part, only_without_gap=True)

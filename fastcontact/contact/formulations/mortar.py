@@ -15,7 +15,7 @@ from fastcontact.contact.formulations._weighted_mortar import WeightedMortar
 
 
 class Mortar(SegmentMortar):
-    """The mortar formulation of a user; `variant` tells which method it is."""
+    """Mortar formulation as named by the user; `variant` selects the method."""
 
     @classmethod
     def variant(cls, dim: int, options: Mapping[str, Any]) -> type[Formulation]:

@@ -65,7 +65,7 @@ class NodeToSegment(Formulation):
             )
 
     def facing(self, candidates: Candidates, at: Configuration, tolerance: float | None = None) -> Pairing:
-        """Return what candidates face: facets, or the primary nodes nearest to them."""
+        """Return the pairing of candidates with facets, or with the nearest primary nodes."""
         found = super().facing(candidates, at, tolerance)
         if self.opposite == "facet":
             return found

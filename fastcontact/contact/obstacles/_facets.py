@@ -138,7 +138,7 @@ def _out_of_solids(nodes: Numbers, outer: Numbers | None) -> Numbers:
 
 
 def _described(blocks: list[Block], facet: int) -> str:
-    """Return number, kind and place of a facet, in words."""
+    """Return number, kind and position of a facet, in words."""
     for block in blocks:
         if facet < len(block.nodes):
             break

@@ -15,7 +15,7 @@ from fastcontact.errors import ContactError
 
 @dataclass(frozen=True, eq=False)
 class Stance:
-    """Where a rigid obstacle stands.
+    """Position and rotation of a rigid obstacle.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class Stance:
 
 @dataclass(frozen=True, eq=False)
 class RigidSide:
-    """A rigid obstacle that may move and turn; where it stands is part of the configuration."""
+    """A rigid obstacle that may translate and rotate; its position is part of the configuration."""
 
     obstacle: Obstacle  # where it stands at rest
     motion: Array  # (dim,): its displacement where the multiplier of its history is 1 [length]

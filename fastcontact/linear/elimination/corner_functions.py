@@ -50,7 +50,7 @@ class CornerElimination(Elimination):
             x[self.pivots] += offset
 
     def move_forces(self, r: Array) -> None:
-        """See `Elimination.move_forces`: what is left does no work along the corners' functions."""
+        """See `Elimination.move_forces`: the remainder does no work along the corner functions."""
         W = self.force_weights
         elimination_kernels.add_rows(W.indptr, W.indices, W.data, self.multiplier(r[self.pivots]), r)
 
@@ -61,7 +61,7 @@ class CornerElimination(Elimination):
         r[self.pivots] = forces
 
     def full_weights(self) -> csr_array:
-        """See `Elimination.full_weights`: what becomes of the pivots (q, n)."""
+        """See `Elimination.full_weights`."""
         inverse = self.own_inverse if self.coupled is None else csr_array(self.coupled.solve(np.eye(len(self.corners))))
         assert inverse is not None
         return self._following(inverse, self.weights)
@@ -119,7 +119,7 @@ def eliminate_corners(
     Raises
     ------
     RepeatedError
-        If equations repeat each other.
+        If constraints are linearly dependent.
     """
     B, n = csr_array(B, copy=True), B.shape[1]
     B.eliminate_zeros()

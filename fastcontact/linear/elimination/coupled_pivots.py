@@ -16,7 +16,7 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.elimination.condition import condition
 
-# Equations whose inverse is larger, in units of their entries, repeat each other but for round-off.
+# Constraints whose inverse is larger, in units of their entries, are linearly dependent up to round-off.
 SINGULAR = 1e12
 # Coupled columns with a larger condition number suit no elimination: errors would grow.
 ILL_CONDITIONED = 1e6
@@ -25,7 +25,7 @@ LUMPED = 0.3
 
 
 class RepeatedError(ConvergenceError):
-    """Equations repeat each other."""
+    """Constraints are linearly dependent."""
 
     def __init__(self) -> None:
         super().__init__(

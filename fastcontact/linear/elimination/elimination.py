@@ -46,7 +46,7 @@ class Elimination:
     compliance: Array | None = None
 
     def shifted(self, c: Array) -> Array:
-        """Return how far the pivots (m,) move if the equations' right-hand sides rise by c (m,)."""
+        """Return the change of the pivots (m,) for a change c (m,) of the right-hand sides."""
         if self.coupled is not None:
             return self.coupled.solve(c)
         assert self.own_inverse is not None
@@ -113,7 +113,7 @@ def eliminate(
     Raises
     ------
     RepeatedError
-        If equations repeat each other, so that there is no unknown to eliminate for each.
+        If constraints are linearly dependent, so that there is no pivot for each.
     """
     B = csr_array(B, copy=True)
     if not B.has_canonical_format:

@@ -49,7 +49,7 @@ class LoadedIteration:
         self, B: csr_array, c: Array, C: Array | FieldCompliance | None = None, guess: Array | None = None,
         monitor: Monitor | None = None, tolerance: float | None = None, nodes: Indices | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
-        """See `Loaded`: equations that repeat each other or have a compliance go through columns of K^-1."""
+        """See `Loaded`: linearly dependent constraints, and those with a compliance, go through columns of K^-1."""
         solver = self._solver
         if C is None or not B.shape[0]:
             try:

@@ -48,7 +48,7 @@ def chosen(B: csr_array, nodes: Indices | None = None, size: int = 1) -> tuple[I
     Raises
     ------
     RepeatedError
-        If equations repeat each other.
+        If constraints are linearly dependent.
     """
     if not B.shape[0]:
         return np.empty(0, np.intp), csr_array((0, 0))

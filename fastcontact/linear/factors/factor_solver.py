@@ -111,7 +111,7 @@ class FactorSolver(LinearSolver):
         return LoadedFactor(self, f, self.known_loads.solution(f, self.back_substitute))
 
     def snapshot(self) -> dict[str, Any]:
-        """See `LinearSolver.snapshot`: columns of ``K^-1`` asked for, and right-hand sides that others are made of."""
+        """See `LinearSolver.snapshot`: columns of ``K^-1`` computed so far, and stored right-hand sides."""
         kept = {"asked": list(self.columns.asked), "loads": self.known_loads.snapshot()}
         return {**kept, "refines": True} if self.refines else kept
 
@@ -122,7 +122,7 @@ class FactorSolver(LinearSolver):
         self.known_loads.put_back(snapshot["loads"], self.n, self._solution)
 
     def improve(self, excess: float) -> bool:
-        """See `LinearSolver.improve`: correct later solutions once by what they leave out of balance."""
+        """See `LinearSolver.improve`: one step of iterative refinement for later solutions."""
         if self.refines:
             return False
         log.info(

@@ -16,7 +16,7 @@ MISSED = 16 * np.finfo(float).eps
 
 
 class KnownLoads:
-    """Keeps the last right-hand sides and their solutions; combines them where that is exact to round-off."""
+    """Stores the last right-hand sides and solutions, and combines them where that is exact to round-off."""
 
     def __init__(self) -> None:
         self._loads: list[Array] = []
@@ -36,7 +36,7 @@ class KnownLoads:
         return size * u
 
     def _projected(self, f: Array) -> tuple[Array, Array]:
-        """Return the weights of the loads kept that come closest to f, and what they leave of it (n,)."""
+        """Return the least-squares weights of the stored loads for f, and the remainder (n,)."""
         weights, left = np.zeros(len(self._loads)), f
         if self._loads:
             gram = np.array([[one @ other for other in self._loads] for one in self._loads])

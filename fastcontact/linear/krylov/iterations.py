@@ -149,7 +149,7 @@ class ConjugateResiduals(Iteration):
         return True
 
     def _keep(self, z: Array, q: Array, size: float) -> None:
-        """Keep a direction and its image, of the norm `size`, in the place of the oldest one where there is no room."""
+        """Store a direction and its image, of norm `size`, replacing the oldest one when full."""
         if len(self._kept) >= self._room:
             pair = self._kept.popleft()
         else:

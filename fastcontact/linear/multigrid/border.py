@@ -18,7 +18,7 @@ from fastcontact.linear.krylov.iterations import Multiply, Precondition
 
 # By how much displacements give way more than the diagonal of their matrix says.
 SOFTER = 2.0
-# Part of what they have by themselves that is added to multipliers in the preconditioner: some equations repeat each other.
+# Part of what they have by themselves that is added to multipliers in the preconditioner: some are linearly dependent.
 REPEATED = 1e-10
 
 
@@ -39,7 +39,7 @@ class Border:
         return len(self.right)
 
     def prepare(self, diagonal: Array) -> None:
-        """Factorise what preconditions the multipliers, given the diagonal (n,) of A [force / length]."""
+        """Factorise the preconditioner of the multipliers, given the diagonal (n,) of A [force / length]."""
         yielding = np.divide(1.0, diagonal, out=np.zeros(len(diagonal)), where=diagonal > 0.0)
         S = self.compliance + SOFTER * (self.rows @ diags_array(yielding) @ self.rows.T)
         own = S.diagonal()

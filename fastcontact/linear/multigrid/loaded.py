@@ -41,7 +41,7 @@ class LoadedMultigrid(LoadedIteration):
         self, B: csr_array, c: Array, C: Array | FieldCompliance | None = None, guess: Array | None = None,
         monitor: Monitor | None = None, tolerance: float | None = None, nodes: Indices | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
-        """See `Loaded`: equations with a full compliance, and those that repeat each other, go through columns of K^-1."""
+        """See `Loaded`: constraints with a full compliance, and linearly dependent ones, go through columns of K^-1."""
         parts: _Parts | None = None
         if C is not None and len(c) and (isinstance(C, FieldCompliance) or C.ndim == 1):
             try:
@@ -136,12 +136,12 @@ class LoadedMultigrid(LoadedIteration):
     def _parts(
         self, B: csr_array, c: Array, C: Array | None, nodes: Indices | None, through: csr_array | None = None
     ) -> _Parts:
-        """Return what is eliminated and what becomes springs, of multipliers that act `through` rows, B by default.
+        """Split constraints into eliminated ones and springs; multipliers act `through` rows, B by default.
 
         Raises
         ------
         RepeatedError
-            If equations that do not give way repeat each other.
+            If exact constraints are linearly dependent.
         """
         size = self._solver.K.blocksize[0]
         if C is None or not C.any():
@@ -174,7 +174,7 @@ class _Parts:
         cls, B: csr_array, c: Array, C: Array, stiff: Mask, nodes: Indices | None, size: int,
         through: csr_array | None, functions: csr_array | None,
     ) -> _Parts:  # fmt: skip
-        """Return the parts of ``B u + C multiplier = c``; RepeatedError where those that are stiff repeat each other."""
+        """Return the parts of ``B u + C multiplier = c``; RepeatedError if stiff ones are linearly dependent."""
         gives = C[stiff].any()
         if gives:  # excesses take the places of nodal pivots
             functions = None
@@ -198,7 +198,7 @@ class _Parts:
 
     @property
     def giving(self) -> bool:
-        """Whether equations eliminated give way."""
+        """Whether eliminated constraints have a compliance."""
         return self.elimination is not None and self.elimination.compliance is not None
 
     def pushed(self, f: Array, c: Array) -> Array:
@@ -229,7 +229,7 @@ class _FieldParts:
 
     @classmethod
     def of(cls, B: csr_array, c: Array, C: FieldCompliance, size: int) -> _FieldParts:
-        """Return the parts; RepeatedError where equations that do not give way repeat each other."""
+        """Return the parts; RepeatedError if exact constraints are linearly dependent."""
         field, elimination = C.of_field(B, c), None
         if not field.edge.all():
             rows = csr_array(field.rows[~field.edge])

@@ -14,7 +14,7 @@ from fastcontact.linear.multigrid.matrix import BlockMatrix, diagonal_blocks
 
 @dataclass(frozen=True, eq=False)
 class LocalChange:
-    """What is added to the blocks of some nodes; nothing beyond them.
+    """Update of the blocks among some nodes.
 
     Attributes
     ----------

@@ -371,7 +371,7 @@ class Multigrid:
         cg.start()
 
     def _scale(self, f: Array, elimination: Elimination | None) -> float:
-        """Return the size of the right-hand side, forces that impose the equations included."""
+        """Return the norm of the right-hand side, constraint forces included."""
         square = self._cg.dot(f, f)
         if elimination is not None and elimination.offset.any():
             forces = np.zeros(len(f))

@@ -20,7 +20,7 @@ from scipy.sparse.linalg import splu
 from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.linear.elimination.elimination import Elimination
 
-# Equations that repeat each other on the stiffened nodes are told apart by so much of their own compliance.
+# Constraints that are linearly dependent on the stiffened nodes are regularised by this part of their own compliance.
 REPEATED = 1e-6
 # Unknowns follow where translations of their side move the pivots by at least this part of them.
 LEAST = 0.3
