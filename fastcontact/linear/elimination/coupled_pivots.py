@@ -29,8 +29,8 @@ class RepeatedError(ConvergenceError):
 
     def __init__(self) -> None:
         super().__init__(
-            "active contact constraints are linearly dependent, so that an iterative solver cannot eliminate them: leave out one "
-            "of two contacts on the same nodes, or use the direct solver"
+            "active contact constraints are linearly dependent, so that an iterative solver cannot eliminate them: leave out "
+            "one of two contacts on the same nodes, or use the direct solver"
         )
 
 
