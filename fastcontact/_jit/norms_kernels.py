@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Norms of long vectors, without the copies that NumPy makes of them."""
+"""Norms of long vectors without temporary copies."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Two equal elastic half spheres pressed together as finite bodies: what a convergent solution tends to.
+"""Two equal elastic half-spheres pressed together as finite bodies: mesh-converged reference values.
 
 Hertz's theory takes each body for a half space with a parabolic surface. Real half spheres differ from that
 by terms of the order a/R: at an approach of 8 % of the radius the force is 12.6 % above Hertz's.

@@ -1,4 +1,4 @@
-"""Linear elastic materials that are not isotropic: with three planes of symmetry, or with none."""
+"""Anisotropic linear elastic materials: orthotropic, and fully anisotropic."""
 
 from __future__ import annotations
 

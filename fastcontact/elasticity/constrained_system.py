@@ -1,4 +1,4 @@
-"""The linear system of a model: from all displacements u to the unknowns v of the linear solver and back.
+"""Linear system with supports and multi-point constraints eliminated: ``u = T v + t``.
 
 ``u = T v + t``: T is the identity except for the displacements that relations express by others, t holds the prescribed
 displacements. The matrix for the solver is ``T.T K T``. It keeps the size and blocks of K: in the rows and columns of

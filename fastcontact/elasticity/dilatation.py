@@ -1,4 +1,4 @@
-"""Mean dilatation: elements that do not lock where materials are nearly incompressible.
+"""Mean dilatation (B-bar): elements free of volumetric locking.
 
 The dilatation, the trace of the strain, is projected on polynomials of low degree in each cell: its mean in linear elements
 (the B-bar method: Hughes, Int. J. Numer. Meth. Engng 15, 1980), a linear function in quadratic ones. What remains of the

@@ -1,4 +1,4 @@
-"""Elastic energy of stresses, and quadrature rules to integrate it over cells more exactly than the stiffness."""
+"""Strain energy of stresses, with quadrature of higher order than that of the stiffness."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pressure that follows the deformed surface: forces, and their derivative (Bonet and Wood, 2008, section 8.5)."""
+"""Follower pressure: nodal forces and load stiffness (Bonet and Wood, 2008, section 8.5)."""
 
 from __future__ import annotations
 

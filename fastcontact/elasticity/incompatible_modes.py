@@ -1,4 +1,4 @@
-"""Incompatible modes: quadrangles and hexahedra that lock neither in shear nor in volume.
+"""Incompatible modes: quadrangles and hexahedra free of shear and volumetric locking.
 
 Each linear cell gets displacements of its own, 1 - xi^2 along each reference direction, by which its edges may curve;
 neighbours do not share them, and static condensation removes them from the stiffness (Wilson, Taylor, Doherty and

@@ -1,4 +1,4 @@
-"""Initial stresses and strains of solid cells, and what they and temperatures add to the stress of the displacements."""
+"""Initial stresses and strains, and stress-free strains due to temperature."""
 
 from __future__ import annotations
 

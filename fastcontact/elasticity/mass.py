@@ -1,4 +1,4 @@
-"""Matrices by which modes differ from statics: the consistent mass, and the stiffness that stresses give by themselves."""
+"""Consistent mass matrix and geometric (initial-stress) stiffness."""
 
 from __future__ import annotations
 

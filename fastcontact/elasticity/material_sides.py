@@ -1,4 +1,4 @@
-"""Nodes where cells of several materials meet: stress jumps there, so each material has a value of its own."""
+"""Nodes on material interfaces, where stress is discontinuous: one nodal value for each material."""
 
 from __future__ import annotations
 

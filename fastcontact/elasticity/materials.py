@@ -1,4 +1,4 @@
-"""Material laws: small-strain linear elasticity. What all have in common, and the isotropic one."""
+"""Linear elastic material laws: base class and isotropic elasticity."""
 
 from __future__ import annotations
 

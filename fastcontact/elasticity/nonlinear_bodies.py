@@ -1,4 +1,4 @@
-"""Solid cells with nonlinear laws or finite strains as one term of the equilibrium: forces, tangent, history."""
+"""Bodies with nonlinear laws or finite strains: internal forces, consistent tangent, history."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Materials beyond linear elasticity: von Mises plasticity for small strains, hyperelasticity for finite ones.
+"""Nonlinear material laws: von Mises plasticity (small strain) and hyperelasticity (finite strain).
 
 A law is a row of constants for `constitutive_kernels`: its number, the shear modulus, the bulk modulus of the volumetric
 part ``U(J) = K (J - 1)^2 / 2``, then its own. Loads, contact and checks see the isotropic elasticity of small strains that

@@ -1,4 +1,4 @@
-"""Linear relations between displacements, and their elimination: ``R u = r`` becomes ``u = T w + S r``."""
+"""Multi-point constraints ``R u = r`` and their elimination: ``u = T w + S r``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Nodal stresses that are smoother and more accurate than those of the solution, to estimate its error.
+"""Recovered nodal stresses for error estimation.
 
 At the centres of linear cells, and at the reduced Gauss points of quadratic ones, stresses are more accurate than elsewhere
 (Barlow, 1976). They are extrapolated from there to the nodes and averaged over the cells of one material at each node.

@@ -1,4 +1,4 @@
-"""Constants of materials that vary: functions of the position, and numbers for each cell or each point of a mesh."""
+"""Spatially varying material constants: functions of position, or values per cell or point."""
 
 from __future__ import annotations
 

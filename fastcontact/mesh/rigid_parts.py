@@ -1,4 +1,4 @@
-"""Parts of bodies that can turn about each other without deforming: they share one node only, or nodes on one line.
+"""Parts of bodies connected by a hinge: they share a single node, or nodes on one line.
 
 Cells with a common facet belong to one part, and so do parts with two common nodes in the plane, or in space with three that
 are not in line. What is left between parts are hinges.

@@ -1,4 +1,4 @@
-"""Parts that repeat themselves: one period or one sector stands for all, its two ends tied node by node."""
+"""Periodic cells and cyclic sectors: their two ends are tied node by node."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Contact nodes that supports push into the other side, or off it where it is tied: no contact force can move them back."""
+"""Contact nodes that supports prescribe to penetrate, or to separate where tied, which no contact force can prevent."""
 
 from __future__ import annotations
 

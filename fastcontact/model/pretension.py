@@ -1,4 +1,4 @@
-"""Pretension sections: a cut through a bolt whose sides a force pulls together, until their approach is locked."""
+"""Pretension sections: a force closes a cut through a bolt until its shortening is locked."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rows of linear relations: displacements along the normals of a surface, nodes of one group with those of another."""
+"""Rows of multi-point constraints: along surface normals, and between the nodes of two groups."""
 
 from __future__ import annotations
 

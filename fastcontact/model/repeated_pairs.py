@@ -1,4 +1,4 @@
-"""Facets and nodes that two contact pairs press on each other: their forces would be shared out at will."""
+"""Facets and nodes that belong to two contact pairs, whose force split is undetermined."""
 
 from __future__ import annotations
 

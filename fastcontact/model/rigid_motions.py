@@ -1,4 +1,4 @@
-"""Rigid-body motions that supports and relations leave free, and whether contact and loads can stop them.
+"""Rigid-body modes left free by supports and multi-point constraints, and whether contact can stop them.
 
 A body in contact stays in equilibrium if no motion that opens gaps, or leaves them, is driven by the loads: the loads
 then lie inside the cone of the contact forces (Fichera, 1964; Lions and Stampacchia, 1967).

@@ -1,4 +1,4 @@
-"""Forces spread over a group by the distance from a place, through which their resultant passes."""
+"""Forces distributed over a group, with a prescribed point of application of the resultant."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What stands where in a result file.
+"""Layout of result files.
 
 A result file is an HDF5 file with two groups. Viewers read the first, whose layout is that of VTK:
 

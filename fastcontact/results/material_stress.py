@@ -1,4 +1,4 @@
-"""Nodal stress where materials meet: one value for each of them, since stress jumps from one to the other."""
+"""Nodal stress on material interfaces: one value for each material."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every part of a model builds on: the mesh, the kinematics, and lists of what was added."""
+"""Base of all parts of a model: mesh, kinematics, and lists of added items."""
 
 from __future__ import annotations
 

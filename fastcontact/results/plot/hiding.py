@@ -1,4 +1,4 @@
-"""What triangles hide from the eye, in a parallel projection."""
+"""Hidden-surface removal for triangles in parallel projection."""
 
 from __future__ import annotations
 
