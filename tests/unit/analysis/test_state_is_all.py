@@ -12,11 +12,13 @@ from fastcontact.analysis.problem import prepare
 
 pytestmark = pytest.mark.filterwarnings("ignore::fastcontact.errors.FastcontactWarning")
 RAMP = fc.linear_ramp(4)
+ELASTIC = fc.LinearElastic(E=20_000.0, nu=0.3)
+PLASTIC = fc.ElasticPlastic(E=20_000.0, nu=0.3, yield_stress=400.0, hardening=[(0.0, 400.0), (0.1, 600.0)])
 
 
-def spheres(**options):
-    model = fc.Model(fc.generate.half_spheres(size=8.0), kinematics="axisymmetric")
-    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+def spheres(material=ELASTIC, strain="small", **options):
+    model = fc.Model(fc.generate.half_spheres(size=8.0), kinematics="axisymmetric", strain=strain)
+    model.add_material(material)
     model.fix("A1A2", "x")
     model.prescribe("A2B2", y=-2.0)
     model.prescribe("A1B1", y=+2.0)
@@ -51,6 +53,8 @@ CASES = {
     "mortar, friction": lambda: spheres(friction=0.3),
     "node_to_segment, friction": lambda: spheres(formulation="node_to_segment", friction=0.2),
     "continuous": lambda: spheres(formulation="continuous"),
+    "plastic, friction": lambda: spheres(PLASTIC, friction=0.1),
+    "finite strain": lambda: spheres(fc.NeoHookean(E=20_000.0, nu=0.3), "finite"),
     "held by contact": lying_block,
     "held by contact, friction": lambda: lying_block(friction=0.3),
     "space, friction": lambda: sphere_on_block(friction=0.2),
