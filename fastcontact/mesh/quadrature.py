@@ -5,6 +5,8 @@ A `Rule` consists of points (n_q, dim) and weights (n_q,), both without dimensio
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from fastcontact.arrays import Array
@@ -12,6 +14,7 @@ from fastcontact.arrays import Array
 Rule = tuple[Array, Array]
 
 
+@cache  # every pairing of mortar in the plane asks for it
 def gauss_line(n: int) -> Rule:
     """Gauss-Legendre rule with `n` points on [-1, 1], exact to degree 2n - 1."""
     points, weights = np.polynomial.legendre.leggauss(n)

@@ -72,8 +72,9 @@ def _cuts(
 ) -> tuple[Indices, Array, Array]:
     """Return (facet, begin, end) of the pieces of the facets of a block, in their reference coordinate."""
     n = len(block.facets)
-    between, along = _opposite_nodes(block, primary, deformed)
-    ending, place = _opposite_ends(block, primary, deformed, tolerance)
+    normals = nodal_normals(primary, deformed)
+    between, along = _opposite_nodes(block, primary, deformed, normals)
+    ending, place = _opposite_ends(block, primary, deformed, normals, tolerance)
     facet = np.concatenate([np.arange(n), np.arange(n), between, borders[0], ending])
     xi = np.concatenate([np.full(n, -1.0), np.full(n, 1.0), along, borders[1], place])
     order = np.lexsort((xi, facet))
@@ -89,7 +90,7 @@ def normals_at(block: FacetBlock, coordinates: Array, points: LinePoints) -> Arr
     return np.column_stack([tangent[:, 1], -tangent[:, 0]]) / np.linalg.norm(tangent, axis=1, keepdims=True)
 
 
-def _opposite_nodes(block: FacetBlock, primary: Surface, deformed: Array) -> tuple[Indices, Array]:
+def _opposite_nodes(block: FacetBlock, primary: Surface, deformed: Array, normals: Array) -> tuple[Indices, Array]:
     """Return (facet, xi) of the points of a block that lie opposite the ends of primary facets.
 
     Where two of these meet, that is on the line which halves the angle between them: beside it another facet is nearer. The
@@ -98,7 +99,6 @@ def _opposite_nodes(block: FacetBlock, primary: Surface, deformed: Array) -> tup
     ends, and at its corners, beside which the flank is not faced.
     """
     ends, own = np.unique(np.concatenate([other.local[:, :2].ravel() for other in primary.blocks]), return_index=True)
-    normals = nodal_normals(primary, deformed)
     foot, normal = deformed[primary.points[ends]], normals[ends]
     opposite = closest(foot, deformed[block.facets])
     along = opposite.xi[:, 0]
@@ -136,11 +136,13 @@ def _neighbours(block: FacetBlock) -> Indices:
     return np.column_stack([ends[block.local[:, 0]], begins[block.local[:, 1]]])
 
 
-def _opposite_ends(block: FacetBlock, primary: Surface, deformed: Array, tolerance: float) -> tuple[Indices, Array]:
+def _opposite_ends(
+    block: FacetBlock, primary: Surface, deformed: Array, normals: Array, tolerance: float
+) -> tuple[Indices, Array]:
     """Return (facet, xi) of the points of a block that lie on the normals at the ends of the primary side."""
     # A tolerance for rounding errors alone is no part of the side: a cut there would leave a strip that faces it.
     ends = (1.0, 1.0 + 2.0 * tolerance) if tolerance > ROUNDING else (1.0,)
-    normals, first, facets, places = nodal_normals(primary, deformed), 0, [], []
+    first, facets, places = 0, [], []
     for other in primary.blocks:
         shape = elements.get(other.element).shape
         for end, s in [(end, sign * beyond) for end, sign in ((0, -1.0), (1, 1.0)) for beyond in ends]:
