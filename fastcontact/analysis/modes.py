@@ -65,7 +65,7 @@ class Modes(Sequence[StepResult]):
 
     @property
     def effective_mass(self) -> Array:
-        """Effective modal masses (n, dim) [mass]: squares of the participation, which add up to all of the mass."""
+        """Effective modal masses (n, dim) [mass], the squares of the participation factors, which add up to the total mass."""
         return np.asarray(self.participation**2)
 
     def __len__(self) -> int:
