@@ -323,10 +323,3 @@ def test_units_do_not_matter():
     for stress, iterations in results[1:]:
         assert np.abs(stress - results[0][0]).max() < 1e-9 * np.abs(results[0][0]).max()
         assert iterations == results[0][1]
-
-
-def test_an_unknown_kind_of_multipliers_is_told():
-    with pytest.raises(fc.ContactError, match=r"kind of multipliers 'dul'.*dual"):
-        pair_of(two_squares("quad4", "quad4"), "plane_strain", False).add_contact(
-            "other", secondary="U_BOTTOM", primary="L_TOP", formulation="mortar", multipliers="dul"
-        )

@@ -306,13 +306,6 @@ def test_a_prescribed_function_is_checked_too(model):
         model.check()
 
 
-def test_a_radial_total_force_is_refused():
-    model = model_on(block("quad4"), "axisymmetric")
-    with pytest.raises(fc.ModelError, match=r"radial forces cancel"):
-        model.add_force("RIGHT", x=1.0)
-    model.add_force("TOP_LEFT", x=1.0)  # a ring is loaded all around
-
-
 def test_a_pressure_inside_the_solid_is_refused():
     mesh = fc.generate.block((1.0, 1.0), (2, 1), "quad4")
     inner = np.flatnonzero(np.abs(mesh.points[:, 0] - 0.5) < 1e-12)

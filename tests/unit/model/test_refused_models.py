@@ -65,11 +65,6 @@ def test_a_moment_needs_points():
         cube().add_moment("none", z=1.0)
 
 
-def test_a_material_is_one():
-    with pytest.raises(fc.ModelError, match="material"):
-        cube().add_material("steel")
-
-
 def test_forces_on_the_primary_side_have_a_row_for_each_point(tmp_path):
     step = step_result(2)
     name, contact = next(iter(step.contact.items()))
