@@ -14,9 +14,12 @@ import fastcontact as fc
 from fastcontact.mesh.generate.box import SOLIDS
 
 # What multigrid leaves to factors is told, and is no other result.
-pytestmark = pytest.mark.filterwarnings(
-    "ignore:.*stand off their arcs", "ignore:.*raise its penalty", "ignore:multigrid gave up"
-)
+pytestmark = [
+    pytest.mark.pairwise,
+    pytest.mark.filterwarnings(
+        "ignore:.*stand off their arcs", "ignore:.*raise its penalty", "ignore:multigrid gave up"
+    ),
+]
 FORMULATIONS = {
     "node_to_segment": {"formulation": "node_to_segment"},
     "continuous": {"formulation": "continuous"},

@@ -8,6 +8,8 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.mesh import elements
 from fastcontact.mesh.generate import block, box, renamed, sphere_on_block, union
 
+pytestmark = pytest.mark.pairwise
+
 E, NU = 1000.0, 0.3
 FLAT = [(e, e) for e in ("tri3", "tri6", "quad4", "quad8", "quad9")]
 FLAT += [("quad4", "quad8"), ("tri6", "quad4"), ("quad8", "tri3"), ("tri6", "quad9")]

@@ -12,6 +12,8 @@ from fastcontact.elasticity.relations import eliminate
 from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.topology import outer_facets
 
+pytestmark = pytest.mark.pairwise
+
 PLANE = ("tri3", "tri6", "quad4", "quad8", "quad9")
 SOLID = ("tet4", "tet10", "hex8", "hex20", "hex27", "wedge6", "wedge15", "wedge18", "pyramid5", "pyramid13")
 
