@@ -87,7 +87,7 @@ def without(projectors: Array, vectors: Array, least: Array | float) -> Array:
     return projectors - inside[:, :, None] * inside[:, None, :]
 
 
-def alike(projectors: Array, places: Array) -> list[tuple[Array, NDArray[np.bool_]]]:
+def alike(projectors: Array, places: Array) -> list[tuple[Array, Mask]]:
     """Return directions (n, dim) that several nodes are held in, as round a curved rim, and which nodes those are (n,).
 
     Nodes held in a single direction come first, together where directions are nearly the same or others lie in between; nodes

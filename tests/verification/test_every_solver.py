@@ -14,9 +14,12 @@ import fastcontact as fc
 from fastcontact.mesh.generate.box import SOLIDS
 
 # What multigrid leaves to factors is told, and is no other result.
-pytestmark = pytest.mark.filterwarnings(
-    "ignore:.*stand off their arcs", "ignore:.*raise its penalty", "ignore:multigrid gave up"
-)
+pytestmark = [
+    pytest.mark.pairwise,
+    pytest.mark.filterwarnings(
+        "ignore:.*stand off their arcs", "ignore:.*raise its penalty", "ignore:multigrid gave up"
+    ),
+]
 FORMULATIONS = {
     "node_to_segment": {"formulation": "node_to_segment"},
     "continuous": {"formulation": "continuous"},
@@ -173,10 +176,3 @@ def test_multigrid_gives_what_factors_give_in_a_plane(kinematics, element, formu
 )  # fmt: skip
 def test_multigrid_gives_what_factors_give_on_obstacles(kinematics, element, formulation, friction, penalty):
     compare((kinematics, element, formulation, friction, penalty, False), obstacle=True)
-
-
-@pytest.mark.parametrize("multipliers", ["dual", "standard"])
-@pytest.mark.parametrize("solver", ["direct", "amg", "auto"])
-def test_mortar_on_obstacles_is_refused_with_what_does(multipliers, solver):
-    with pytest.raises(fc.ContactError, match="rigid obstacle 'mortar': known are continuous, node_to_segment"):
-        solved(model("3d", "hex8", multipliers, 0.0, None, obstacle=True), solver)
