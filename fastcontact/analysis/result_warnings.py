@@ -14,6 +14,7 @@ from fastcontact.analysis.seams import seam_warnings
 from fastcontact.analysis.state import State
 from fastcontact.analysis.stress_scatter import scatter_warnings
 from fastcontact.analysis.volumetric_locking import locking_warning
+from fastcontact.analysis.wavering_pressure import wavering
 from fastcontact.analysis.wear import too_fast
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.formulations import Formulation
@@ -62,7 +63,7 @@ def result_warnings(problem: Problem, state: State, last: StepResult) -> list[st
             continue
         found += [*_deep(pair, contact, state.u), *_lost(pair, contact, name in state.touched, loaded)]
         found += [sagging[name]] if name in sagging else _unresolved(name, pair, contact)
-        found += _too_fast(name, pair, state)
+        found += wavering(pair, contact) + _too_fast(name, pair, state)
     return [
         *found, *seam_warnings(problem, last), *_unsettled(state), *_loose(problem, last), *_unbalanced(state)
     ]  # fmt: skip

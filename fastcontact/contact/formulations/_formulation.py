@@ -94,6 +94,7 @@ class Formulation(ABC):
     name: ClassVar[str]
     # Pair again after every active-set iteration (True), or after the active set has settled (False).
     geometry_in_loop: ClassVar[bool]
+    against_obstacles: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         if self.normals is None:
