@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from fastcontact.contact.formulations import Formulation
@@ -15,22 +17,22 @@ WAVERING = 0.2
 MANY = 10
 
 
-def wavering(pair: Formulation, contact: ContactResult) -> list[str]:
-    """Return a warning where pressures of nodes whose neighbours are all closed waver by much of their mean."""
+def wavering(pair: Formulation, contact: ContactResult) -> Iterator[str]:
+    """Yield a warning where pressures of nodes whose neighbours are all closed waver by much of their mean."""
     beside = pair.secondary.beside
     # A node is among its own neighbours here: so many less one are the others.
     others = np.asarray(beside.sum(axis=1)).ravel() - 1.0
     inside = contact.active & (beside @ ~contact.active == 0) & (others > 0)
     if inside.sum() < MANY:
-        return []
+        return
     own = contact.pressure[inside]
     apart = own - ((beside @ contact.pressure)[inside] - own) / others[inside]
     size, mean = float(np.median(np.abs(apart))), float(own.mean())
     if not size > WAVERING * mean > 0.0:
-        return []
-    return [
+        return
+    yield (
         f"contact '{contact.name}': nodal pressures waver from node to node, by {0.5 * size:.3g} up and down about a mean of "
         f"{mean:.3g}: trust means over neighbouring nodes, or take quadrangles or hexahedra along "
         f"'{pair.secondary.group}', or triangles or tetrahedra there about as deep as wide"
         f"{'' if pair.name == 'mortar' else ', or formulation mortar'}"
-    ]
+    )

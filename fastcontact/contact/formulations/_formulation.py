@@ -128,6 +128,11 @@ class Formulation(ABC):
         return True
 
     @property
+    def faceted(self) -> bool:
+        """Whether normals are those of single facets, between which points may flip."""
+        return isinstance(self.primary, Surface) and self.normals == "facet" and not self.options.tied
+
+    @property
     def corner_functions(self) -> csr_array | None:
         """Values at mid nodes of functions that gaps are weighted with, where these are linear on quadratic facets.
 
@@ -212,7 +217,8 @@ class Formulation(ABC):
         beyond = self.projection_tolerance if tolerance is None else tolerance
         assert self.normals is not None
         assert beyond is not None
-        pairing = pair(candidates.positions(deformed), self.primary, deformed, beyond, self.normals, at.stance)
+        positions = candidates.positions(deformed)
+        pairing = pair(positions, self.primary, deformed, beyond, self.normals, at.stance, at.rounded)
         if self.normals != "secondary":
             return pairing
         return opposed(pairing, self._secondary_normals(candidates, deformed))
