@@ -158,6 +158,11 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
             iterate.begin_again(step.state)
             mixing.restart()
             watch.forget()
+        if update == max(plan.limit // 2, PATIENT_UPDATES) and any(pair.faceted for pair in problem.pairs.values()):
+            log.info("nodes flip between facets: from now on the edges of facets are rounded")
+            iterate.rounded = True
+            mixing.restart()
+            watch.forget()
     if plan.until_settled:
         changed = step.dofs.put(np.zeros_like(iterate.u), part - moved.before)
         raise ConvergenceError(geometry_moves(problem, iterate.history, changed, plan.limit), iterate.history)
@@ -205,6 +210,7 @@ def _move(
             "active": int(solution.active.sum()),
             "active_set_iterations": solution.iterations,
             "settled": solution.settled,
+            **({"rounded": True} if iterate.rounded else {}),
         }
     )
     return moved

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -36,6 +36,8 @@ class Iterate:
         The last position of unsupported bodies.
     history : list of dict
         An entry for each pairing.
+    rounded : bool
+        Whether edges between facets are rounded by now, since nodes flipped between facets.
     """
 
     u: Array
@@ -44,6 +46,7 @@ class Iterate:
     frictional: FrictionalEquilibrium | None = None
     rigid: RigidPosition | None = None
     history: list[dict[str, Any]] = field(default_factory=list)
+    rounded: bool = False
 
     @classmethod
     def of(cls, state: State) -> Iterate:
@@ -74,7 +77,7 @@ def pair_surfaces(problem: Problem, state: State, load: StepLoad, iterate: Itera
         at = problem.configuration(name, state, load, paired_at, u)
         turns = isinstance(pair.primary, RigidSide) and pair.primary.rotation is not None
         moved = at.obstacle - at.obstacle_start if turns else None
-        part = pair.constraints(at)
+        part = pair.constraints(replace(at, rounded=True) if iterate.rounded else at)
         parts[name] = problem.force_driven.constraints(name, part, positions.get(name, still), moved)
     return stacked(parts)
 

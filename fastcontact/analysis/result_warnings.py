@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from fastcontact.analysis.seams import seam_warnings
 from fastcontact.analysis.state import State
 from fastcontact.analysis.stress_scatter import scatter_warnings
 from fastcontact.analysis.volumetric_locking import locking_warning
+from fastcontact.analysis.wavering_pressure import wavering
 from fastcontact.analysis.wear import too_fast
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.formulations import Formulation
@@ -62,7 +64,7 @@ def result_warnings(problem: Problem, state: State, last: StepResult) -> list[st
             continue
         found += [*_deep(pair, contact, state.u), *_lost(pair, contact, name in state.touched, loaded)]
         found += [sagging[name]] if name in sagging else _unresolved(name, pair, contact)
-        found += _too_fast(name, pair, state)
+        found += [*wavering(pair, contact), *_too_fast(name, pair, state)]
     return [
         *found, *seam_warnings(problem, last), *_unsettled(state), *_loose(problem, last), *_unbalanced(state)
     ]  # fmt: skip
@@ -130,6 +132,13 @@ def _loose(problem: Problem, last: StepResult) -> Iterator[str]:
         yield (
             f"the contact geometry counts as settled although the displacement still changed by {change:.1e} of its largest "
             f"component (Criteria.geometry = {criteria.geometry:g}): results are no more accurate than that"
+        )
+    flipped = next((before for before, after in pairwise(history) if "rounded" in after), None)
+    if flipped is not None:
+        yield (
+            "nodes flipped between two facets of the primary side, which changed the displacement by "
+            f"{flipped['displacement_change']:.1e} of its largest component, until normals were made to turn from one to "
+            'the other over a tenth of either; normals="averaged" needs no such help'
         )
     if scatter is not None and scatter["force"] > criteria.relative:
         yield (

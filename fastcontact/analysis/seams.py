@@ -67,6 +67,6 @@ def seam_warnings(problem: Problem, last: StepResult) -> list[str]:
                     f"forces are split unevenly between the two nodes of one place, by {apart[worst]:.4g} in pressure "
                     f"(points {contact.points[a[worst]]} and {contact.points[b[worst]]}). Their pressure is the mean, but "
                     "that of neighbours may waver: let the period end where the contact is open, or use "
-                    'formulation="mortar", against an obstacle "node_to_segment"'
+                    'formulation="mortar" with multipliers="dual"'
                 )
     return found

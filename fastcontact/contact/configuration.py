@@ -34,6 +34,8 @@ class Configuration:
         By which a rigid obstacle has turned, likewise [radian].
     worn : ndarray (n_points,), optional
         Depth worn off at the secondary nodes before the load step [length]; None for nothing.
+    rounded : bool
+        Whether facet normals turn at rounded edges, see `pairing.pair`.
     """
 
     displacement: Array
@@ -46,6 +48,7 @@ class Configuration:
     angle: float = 0.0
     angle_start: float = 0.0
     worn: Array | None = None
+    rounded: bool = False
 
     @property
     def stance(self) -> Stance:

@@ -51,8 +51,8 @@ class Projection:
         if len(rows) > MOST_POINTS:
             raise ContactError(
                 f"the continuous formulation closes {len(rows)} integration points at once, whose compliance would be a "
-                f"dense matrix of {8e-9 * len(rows) ** 2:.1f} GB: use formulation='node_to_segment' (on cells with quadratic "
-                "facets: hex27 or linear ones) or, between bodies, 'mortar'"
+                f"dense matrix of {8e-9 * len(rows) ** 2:.1f} GB: use formulation='mortar' with "
+                "multipliers='dual'"
             )
         if self.mass is None:
             return np.zeros((len(rows), len(rows)))

@@ -18,6 +18,7 @@ from fastcontact.contact.projection import (
     Places,
     along_normals,
     at_nodes_of_facets,
+    facet_normals,
     interpolated,
     places,
     smooth_normals,
@@ -29,6 +30,8 @@ from fastcontact.mesh import elements
 # In facet lengths: how far beyond both facets at a node a point may lie and still face it; what is rounding.
 FOLDED = 0.5
 ROUNDING = 1e-10
+# Part of either facet at an edge over which rounded edges turn.
+ROUNDED = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,6 +133,7 @@ def pair(
     projection_tolerance: float,
     normals: str | Sequence[float] = "facet",
     obstacle: Stance | None = None,
+    rounded: bool = False,
 ) -> Pairing:
     """Project candidate positions (n, dim) on the closest facet of `primary` at nodal `coordinates` [length].
 
@@ -138,7 +142,7 @@ def pair(
     sides have one line of action; they balance in moment. Unless `normals` is ``"facet"``, the normal is interpolated
     between nodal means of the facets' normals, so that it does not jump where facets meet but for corners, and the
     candidates are projected along it; a unit vector (dim,) is the normal everywhere. A rigid obstacle stands
-    as `obstacle` says.
+    as `obstacle` says. Edges between facets are `rounded` or not.
 
     Raises
     ------
@@ -151,7 +155,7 @@ def pair(
         nowhere = np.zeros(len(candidates), np.intp)
         return Pairing(nowhere, np.zeros((len(candidates), candidates.shape[1] - 1)), normal, paired, offset)
     found = closest_of_kinds(candidates, primary.corners(coordinates))
-    if normals == "facet":
+    if normals == "facet" and not rounded:
         inner = _at_smooth_ends(primary, coordinates, found)
         paired = found.overhang <= np.where(inner, max(projection_tolerance, FOLDED), projection_tolerance)
         outside = paired & ~inner & (found.overhang > ROUNDING)
@@ -166,10 +170,28 @@ def pair(
     else:
         facet, xi, overhang = along_line_normals(candidates, primary, coordinates, at_nodes, found)
         normal = interpolated(at_nodes[facet], places(primary, facet, xi))
+    if normals == "facet":
+        normal = _round_edges(primary, coordinates, facet, xi, normal)
     paired = overhang <= projection_tolerance
     return _straight_on(
         Pairing(facet, xi, normal, paired), candidates, primary, coordinates, paired & (overhang > ROUNDING)
     )
+
+
+def _round_edges(primary: Surface, coordinates: Array, facet: Indices, xi: Array, mean: Array) -> Array:
+    """Return the normals (n, dim) of facets that turn to the `mean` (n, dim) at their edges over `ROUNDED` of each.
+
+    Where facets meet in an edge, contact forces of a node may have any direction between their normals, and the edge is where
+    equilibrium puts the node: with the normal of one or the other it flips between them. Here the direction follows from
+    where it stands on the rounded edge.
+    """
+    own = at_nodes_of_facets([facet_normals(block, coordinates) for block in primary.blocks])[facet]
+    own = interpolated(own, places(primary, facet, xi))
+    on_triangle = np.column_stack([xi, 1.0 - xi.sum(axis=1)]).min(axis=1)
+    inside = np.where(primary.triangular[facet], on_triangle, 0.5 * (1.0 - np.abs(xi).max(axis=1)))
+    share = np.clip(1.0 - inside / ROUNDED, 0.0, 1.0)[:, None]
+    normal = share * mean + (1.0 - share) * own
+    return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
 
 
 def _straight_on(pairing: Pairing, candidates: Array, primary: Surface, coordinates: Array, outside: Mask) -> Pairing:

@@ -96,13 +96,19 @@ class Surface:
         return np.asarray(np.bincount(ends.ravel())[ends] > 1)
 
     @cached_property
-    def near(self) -> csr_array:
-        """One (m, m) where two nodes lie in one facet or in two facets that share a node."""
+    def beside(self) -> csr_array:
+        """One (m, m) where two nodes lie in one facet."""
         rows = [np.repeat(block.local, block.local.shape[1], axis=1).ravel() for block in self.blocks]
         columns = [np.tile(block.local, block.local.shape[1]).ravel() for block in self.blocks]
         row, column, m = np.concatenate(rows), np.concatenate(columns), len(self.points)
-        beside = csr_array(coo_array((np.ones(len(row)), (row, column)), shape=(m, m)))
-        found = csr_array(beside @ beside)
+        found = csr_array(coo_array((np.ones(len(row)), (row, column)), shape=(m, m)))
+        found.data[:] = 1.0
+        return found
+
+    @cached_property
+    def near(self) -> csr_array:
+        """One (m, m) where two nodes lie in one facet or in two facets that share a node."""
+        found = csr_array(self.beside @ self.beside)
         found.data[:] = 1.0
         return found
 

@@ -24,7 +24,7 @@ CHUNK = 32
 # Newton's method factorises it several times for each pairing and it is not symmetric, ten seconds each.
 MOST_ROWS, MOST_ROWS_WITH_FRICTION = 20_000, 6_000
 # Formulations whose constraints no solver needs columns of the inverse for.
-CHEAP = 'formulation="mortar" with multipliers="dual", against rigid obstacles formulation="node_to_segment"'
+CHEAP = 'formulation="mortar" with multipliers="dual"'
 
 
 class TooManyColumnsError(ConvergenceError):

@@ -94,6 +94,7 @@ class Formulation(ABC):
     name: ClassVar[str]
     # Pair again after every active-set iteration (True), or after the active set has settled (False).
     geometry_in_loop: ClassVar[bool]
+    against_obstacles: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         if self.normals is None:
@@ -125,6 +126,11 @@ class Formulation(ABC):
     def eliminable(self) -> bool:
         """Whether iterative solvers can eliminate closed constraints; penalties, which are springs, do not prevent it."""
         return True
+
+    @property
+    def faceted(self) -> bool:
+        """Whether normals are those of single facets, between which points may flip."""
+        return isinstance(self.primary, Surface) and self.normals == "facet" and not self.options.tied
 
     @property
     def corner_functions(self) -> csr_array | None:
@@ -211,7 +217,8 @@ class Formulation(ABC):
         beyond = self.projection_tolerance if tolerance is None else tolerance
         assert self.normals is not None
         assert beyond is not None
-        pairing = pair(candidates.positions(deformed), self.primary, deformed, beyond, self.normals, at.stance)
+        positions = candidates.positions(deformed)
+        pairing = pair(positions, self.primary, deformed, beyond, self.normals, at.stance, at.rounded)
         if self.normals != "secondary":
             return pairing
         return opposed(pairing, self._secondary_normals(candidates, deformed))

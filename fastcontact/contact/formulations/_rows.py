@@ -26,6 +26,8 @@ class Entries:
 
     def matrix(self, size: tuple[int, int]) -> csr_array:
         """Return the sum of all entries."""
+        if not self._rows:
+            return csr_array(size)
         place = np.concatenate(self._rows), np.concatenate(self._columns)
         return csr_array(coo_array((np.concatenate(self._values), place), shape=size))
 

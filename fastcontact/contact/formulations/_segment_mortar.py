@@ -51,6 +51,7 @@ class SegmentMortar(PressureFieldFormulation):
     multipliers: str = "standard"
 
     name: ClassVar[str] = "mortar"
+    against_obstacles: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -8,6 +8,9 @@ of the node's share of the pressure; the normal is the mean of those of the prim
 node of that side, on quadratic facets also the ends of the edge in the middle of which it lies. So constraints are
 eliminated one by one, the corners first, and the matrix stays sparse and positive definite. ``"standard"`` functions are
 linear between the corners, also on quadratic facets; only corners have gaps.
+
+Against a rigid obstacle the integrals run over whole facets by Gauss points, and :math:`x_p` is the place on the obstacle
+nearest to each.
 """
 
 from __future__ import annotations
@@ -28,13 +31,13 @@ from fastcontact.contact.formulations._cut_faces import face_overlap
 from fastcontact.contact.formulations._cut_lines import line_overlap
 from fastcontact.contact.formulations._dual_basis import COVERED, dual_functions, positive
 from fastcontact.contact.formulations._formulation import Formulation
-from fastcontact.contact.formulations._overlap import Overlap
+from fastcontact.contact.formulations._overlap import Overlap, obstacle_overlap
 from fastcontact.contact.formulations._rows import Entries, rows_of
 from fastcontact.contact.integration import facet_measure, fine_rule, nodal_areas
+from fastcontact.contact.obstacles.rigid_side import RigidSide, Stance
 from fastcontact.contact.pairing import Candidates, tangents
 from fastcontact.contact.prescribed_normals import Normals
 from fastcontact.contact.projection import facet_normals, nodal_normals, smooth_normals
-from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError, unknown
 from fastcontact.linear.sparse_rows import scaled
 from fastcontact.mesh import elements
@@ -113,8 +116,9 @@ class WeightedMortar(Formulation):
         linear = elements.get(element.linear).shape(element.nodes)
         return np.vstack([linear.T, np.zeros((element.n_nodes - element.n_corners, element.n_nodes))])
 
-    def _overlap(self, deformed: Array) -> Overlap:
-        assert isinstance(self.primary, Surface)
+    def _overlap(self, deformed: Array, stance: Stance) -> Overlap:
+        if isinstance(self.primary, RigidSide):
+            return obstacle_overlap(self.secondary, self.primary, (self.points, deformed), self.axisymmetric, stance)
         if deformed.shape[1] == 3:
             return face_overlap(self.secondary, self.primary, self.points, deformed, self.smoothing)
         return line_overlap(
@@ -130,7 +134,7 @@ class WeightedMortar(Formulation):
     def unilateral(self, at: Configuration) -> Constraints:
         """Cut and pair on the displaced configuration and return one mean gap per node."""
         deformed = self.points + at.displacement
-        overlap = self._overlap(deformed)
+        overlap = self._overlap(deformed, at.stance)
         covered = [mass.sum(axis=2) @ T.T for T, mass in zip(self._test, overlap.mass, strict=True)]
         kept = self._taking_part(covered)
         own, across, closer = self._weighted(overlap, covered, kept)
@@ -138,7 +142,7 @@ class WeightedMortar(Formulation):
         sums = np.where(self.options.excluded_nodes(self.secondary), 0.0, np.asarray(own.sum(axis=1)).ravel())
         weight = np.where(sums > 0.0, sums, np.inf)
         mean = scaled(csr_array(own - across), 1.0 / weight)
-        normal = self._mean_normals(overlap, deformed)
+        normal = self._mean_normals(overlap, deformed, at.stance)
         B = rows_of(mean, normal)
         gap0 = B @ self.points.ravel() + at.clearance_factor * self._clearance(own, across, weight)
         gap0 -= np.einsum("nd,nd->n", closer, normal) / weight
@@ -157,8 +161,20 @@ class WeightedMortar(Formulation):
             tangents=slips,
             directions=directions,
             friction=self.options.coefficients(self.friction, candidates),
-            drift=self._closing_slip_of_nodes(apart, normal, rubbing, at) if self.slip == "symmetric" else None,
+            drift=self._drift(mean, apart, normal, rubbing, at),
         )
+
+    def _drift(
+        self, mean: csr_array, apart: Array, normal: Array, directions: tuple[Array, ...], at: Configuration
+    ) -> Array | None:
+        """Return the slip (k, m) beside that by displacements: by a rigid obstacle, or see `_closing_slip_of_nodes`."""
+        if not isinstance(self.primary, RigidSide):
+            return self._closing_slip_of_nodes(apart, normal, directions, at) if self.slip == "symmetric" else None
+        moved = np.tile(at.obstacle - at.obstacle_start, (len(normal), 1))
+        now, before = (mean @ (self.points + u) for u in (at.displacement, at.start))
+        turning = self.primary.turning(now, before, at.stance, at.stance_start)
+        moved = moved if turning is None else moved + turning
+        return -np.stack([np.einsum("nd,nd->n", t, moved) for t in directions])
 
     def _nodal(self, weight: Array) -> WeightedPressures:
         """Return the nodal interpretation of forces; `weight` (m,) are the areas of the gaps [area]."""
@@ -268,9 +284,14 @@ class WeightedMortar(Formulation):
             rescued[block.local[lost][np.arange(len(most)), most]] = True
         return (enough | rescued) & (whole > 0.0)
 
-    def _mean_normals(self, overlap: Overlap, deformed: Array) -> Array:
-        """Return unit means (m, dim) of the primary normals that the nodes face; the last axis for nodes without."""
-        assert isinstance(self.primary, Surface)
+    def _mean_normals(self, overlap: Overlap, deformed: Array, stance: Stance) -> Array:
+        """Return unit means (m, dim) of the primary normals that the nodes face; the last axis for nodes without.
+
+        Against an obstacle the normals at the nodes themselves, which lie in planes of symmetry.
+        """
+        if isinstance(self.primary, RigidSide):
+            _, normal, paired, _ = self.primary.facing(deformed[self.secondary.points], stance)
+            return np.where(paired[:, None], normal, -nodal_normals(self.secondary, deformed))
         if self.normals == "secondary":
             return -nodal_normals(self.secondary, deformed)
         if not isinstance(self.normals, str):
