@@ -65,7 +65,7 @@ class Modes(Sequence[StepResult]):
 
     @property
     def effective_mass(self) -> Array:
-        """Effective modal masses (n, dim) [mass], the squares of the participation factors, which add up to the total mass."""
+        """Effective modal masses (n, dim) [mass], the squares of the participation factors, whose sum is the total mass."""
         return np.asarray(self.participation**2)
 
     def __len__(self) -> int:
