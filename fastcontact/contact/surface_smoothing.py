@@ -27,11 +27,11 @@ from fastcontact.contact.search.closest import closest_of_kinds
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.mesh import elements
 
-# Heights below this part of the size of a facet are rounding errors of node positions.
+# Heights below this part of the size of a facet, and curvatures below this part of its inverse, are rounding errors.
 ROUND_OFF = 1e-10
-# Columns of a fit are scaled by this with each degree, and its squares damped: where nodes leave terms undetermined, as on a
-# strip one facet wide, those of low degree take all.
-LOWER, DAMPING = 0.1, 1e-13
+# Columns of a fit are scaled by this with each degree, and its squares damped by this part of the least column: where nodes
+# leave terms undetermined, as on a strip one facet wide, those of low degree take all.
+LOWER, DAMPING = 0.1, 1e-5
 # Circles, spheres and cylinders are matched to (L / R)^(2 PASSES).
 PASSES = 3
 
@@ -204,7 +204,8 @@ class _Fit:
         lower = LOWER ** (i + j) * np.sqrt(comb(i + j, i))  # no direction counts more than others (Bombieri's norm)
         columns = np.where(taken[..., None], lower * _terms(plane, i, j), 0.0)
         rest = np.where(taken, height - _conic(self.curvature, plane), 0.0)
-        damping = np.sqrt(DAMPING * (columns**2).sum(axis=(1, 2)))[:, None, None] * np.eye(len(i), len(i) + 1)
+        size = LOWER ** (i + j).max() * np.sqrt(DAMPING * (columns**2).sum(axis=(1, 2)))
+        damping = size[:, None, None] * np.eye(len(i), len(i) + 1)
         # By orthogonal factors: in normal equations what the damping determines would be known to 1e-3 only.
         rows = np.concatenate([np.concatenate([columns, rest[..., None]], axis=2), damping], axis=1)
         R: Array = np.asarray(np.linalg.qr(rows, mode="r"))
@@ -234,13 +235,20 @@ def _fit(block: FacetBlock, points: Array, around: Array, taken: Mask, degree: i
     size = np.linalg.norm(corners - origin[:, None], axis=2).max(axis=1)
     powers = _powers(points.shape[1] - 1, degree)
     curvature = np.zeros((len(corners), *2 * (points.shape[1] - 1,)))
-    fit = _Fit(np.empty(0), origin, size, curvature, powers, np.empty(0))
-    for _ in range(PASSES):
-        fit = replace(fit, axes=_axes(block, points, normal), curvature=curvature).fitted(around, taken)
+    fit = _Fit(_axes(block, points, normal), origin, size, curvature, powers, np.empty(0)).fitted(around, taken)
+    for _ in range(1, PASSES):
         slope, curvature = fit.in_the_middle()
-        normal = fit.axes[:, -1] - np.einsum("nj,njd->nd", slope, fit.axes[:, :-1])
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        fit = replace(fit, axes=_tilted(fit.axes, slope), curvature=curvature).fitted(around, taken)
     return fit
+
+
+def _tilted(axes: Array, slope: Array) -> Array:
+    """Return axes (n, dim, dim) after the smallest rotation to normals of surfaces with a `slope` (n, dim - 1) over them."""
+    normal = axes[:, -1] - np.einsum("nj,njd->nd", slope, axes[:, :-1])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    both = axes[:, -1] + normal
+    along = np.einsum("njd,nd->nj", axes[:, :-1], normal) / np.einsum("nd,nd->n", both, normal)[:, None]
+    return np.concatenate([axes[:, :-1] - along[:, :, None] * both[:, None], normal[:, None]], axis=1)
 
 
 def _heights(block: FacetBlock, points: Array, smooth: _Fit) -> tuple[Array, Array, Array]:
@@ -252,7 +260,9 @@ def _heights(block: FacetBlock, points: Array, smooth: _Fit) -> tuple[Array, Arr
     height = smooth.size[:, None] * np.where(np.abs(height) > ROUND_OFF, height, 0.0)
     heights = np.zeros((len(corners), k, k if element.dim == 2 else 1))
     heights[:, powers[0], powers[1]] = np.linalg.solve(_terms(xi, *powers), height.T).T
-    return heights, smooth.in_the_middle()[1] / smooth.size[:, None, None], smooth.axes[:, :-1]
+    curvature = smooth.in_the_middle()[1]
+    curvature = np.where(np.abs(curvature) > ROUND_OFF, curvature, 0.0) / smooth.size[:, None, None]
+    return heights, curvature, smooth.axes[:, :-1]
 
 
 def _conic(curvature: Array, plane: Array) -> Array:

@@ -49,9 +49,10 @@ def test_a_model_in_other_words_has_the_same_answer(words):
     assert np.abs(spoilt.back(other.displacement) - step.displacement).max() > 0.1 * largest
 
 
-# A plate on a ball that moves along no axis, a ball between planes of symmetry, a sector: all with friction where both
-# sides are held. Turned, they took other directions for held.
-@pytest.mark.parametrize("seed", [1107, 1514, 30224])
+# With friction where both sides are held, turned: a plate on a ball that moves along no axis, a ball between planes of
+# symmetry, a sector. A smoothed strip of single triangles, integrated from other corners on; a facet whose curvature is a
+# rounding error.
+@pytest.mark.parametrize("seed", [1107, 1514, 30224, 1474, 30004])
 def test_models_that_had_another_answer_in_other_words(seed):
     assert outcome(seed)["outcome"] == "result"
 
