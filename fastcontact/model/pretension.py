@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -226,7 +227,7 @@ def _across(normal: Array) -> Array:
 
 
 def locked_lengths(
-    sections: Sequence[Pretension], begin: float, displacement: Array, kept: Mapping[str, float]
+    sections: Sequence[Pretension], begin: float, displacement: Array, kept: Mapping[str, Any]
 ) -> dict[str, float]:
     """Return by name the shortenings of the sections that are locked at an instant [length].
 

@@ -155,7 +155,13 @@ class Assembled:
         """Return the elements of a surface and the place of each face among the facets of its element."""
         definition, scope = self.surface(name, place)
         if definition.of_nodes:
-            return self._faces_of_nodes(definition, scope)
+            whole, _, left = self.faces_of_nodes(definition, scope)
+            if left:
+                raise definition.place.refuse(
+                    f"the nodes of surface '{definition.name}' make up no whole faces: {len(left)} belong to none (first: "
+                    f"node {self.number_of(left[0])}), and *{place.keyword} in line {place.line} needs faces, TYPE=ELEMENT"
+                )
+            return whole
         found: dict[tuple[Key, int], None] = {}
         for face in definition.faces:
             given = face.of if not scope else f"{scope}.{face.of}"
@@ -210,21 +216,44 @@ class Assembled:
                 found.setdefault(corners, []).append((key, facet))
         return found
 
-    def _faces_of_nodes(self, definition: SurfaceDefinition, scope: str) -> list[tuple[Key, int]]:
-        """Return the outer faces all of whose nodes belong to a surface of nodes."""
-        chosen: set[int] = set()
-        for face in definition.faces:
-            chosen.update(self.nodes(face.of if not scope else f"{scope}.{face.of}", face.place))
-        found = [sides[0] for corners, sides in self.owners.items() if len(sides) == 1 and corners <= chosen]
-        carried = {p for key, facet in found for p in facet_points(self.solids[key], facet)}
-        if chosen - carried:
-            number = min(chosen - carried)
-            name = next(key for key, index in self.index.items() if index == number)
-            raise definition.place.refuse(
-                f"the nodes of surface '{definition.name}' make up no whole faces: {len(chosen - carried)} of {len(chosen)} "
-                f"belong to none (first: node {name[1]}); contact needs faces, TYPE=ELEMENT"
-            )
+    @cached_property
+    def outer(self) -> dict[int, list[tuple[tuple[Key, int], frozenset[int]]]]:
+        """Which outer faces the points have, each with its corners."""
+        found: dict[int, list[tuple[tuple[Key, int], frozenset[int]]]] = {}
+        for corners, sides in self.owners.items():
+            for point in self.facet_points(sides[0]) if len(sides) == 1 else ():
+                found.setdefault(point, []).append((sides[0], corners))
         return found
+
+    def surface_nodes(self, definition: SurfaceDefinition, scope: str) -> list[int]:
+        """Return the points of a surface of nodes, each once."""
+        given = [(face.of if not scope else f"{scope}.{face.of}", face.place) for face in definition.faces]
+        return list(dict.fromkeys(point for name, place in given for point in self.nodes(name, place)))
+
+    def number_of(self, point: int) -> str:
+        """Return how the deck names the node of a point."""
+        scope, number = next(key for key, index in self.index.items() if index == point)
+        return f"{self.content.instances[scope].name}.{number}" if scope else str(number)
+
+    def faces_of_nodes(
+        self, definition: SurfaceDefinition, scope: str
+    ) -> tuple[list[tuple[Key, int]], list[tuple[Key, int]], list[int]]:
+        """Return the outer faces all of whose corners a surface of nodes has, those with most for other nodes, and these."""
+        chosen = set(self.surface_nodes(definition, scope))
+        whole, others = [], []
+        for face, corners in dict.fromkeys(face for point in sorted(chosen) for face in self.outer.get(point, ())):
+            points = chosen.intersection(self.facet_points(face))
+            (whole if corners <= chosen else others).append((face, points))
+        left = chosen.difference(*(points for _, points in whole))
+        most: dict[int, int] = {}
+        for _, points in others:
+            most.update((point, max(len(points), most.get(point, 0))) for point in points & left)
+        further = [face for face, points in others if any(most[p] == len(points) for p in points & left)]
+        return [face for face, _ in whole], further, sorted(left)
+
+    def facet_points(self, face: tuple[Key, int]) -> tuple[int, ...]:
+        """Return the points of a face."""
+        return facet_points(self.solids[face[0]], face[1])
 
 
 def corners_of(solid: Solid) -> list[tuple[int, frozenset[int]]]:

@@ -3,34 +3,36 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, vstack
 from scipy.spatial import cKDTree
 
 from fastcontact.cases.decks.assembled import Assembled, assembled
 from fastcontact.cases.decks.blocks import Place, folded
-from fastcontact.cases.decks.conditions import Component, Conditions, Distributed
+from fastcontact.cases.decks.conditions import Acting, Component, Conditions, Distributed
 from fastcontact.cases.decks.content import Content, Material, Pair, Section, Step
 from fastcontact.cases.decks.cyclic_symmetry import add_sectors
 from fastcontact.cases.decks.initial_stresses import add_initial_stresses
 from fastcontact.cases.decks.local_axes import local_axes, orientation_of
-from fastcontact.cases.decks.meshing import DeckMesh, begun, group_of_surface
+from fastcontact.cases.decks.meshing import DeckMesh, begun, group_of_surface, secondary_group
 from fastcontact.cases.decks.nonlinear import strain_of
 from fastcontact.cases.decks.pretension import add_sections, cut_sections
 from fastcontact.cases.decks.relating import make_rotations, relations_of
 from fastcontact.cases.decks.stepping import MOST_PARTS
 from fastcontact.cases.decks.temperatures import add_temperatures
+from fastcontact.contact.integration import all_nodes_carry
 from fastcontact.contact.obstacles.shapes import HalfSpace
 from fastcontact.elasticity.anisotropic_materials import Orthotropic
 from fastcontact.elasticity.material_axes import CylindricalAxes
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.elasticity.nonlinear_materials import NonlinearElastic
-from fastcontact.elasticity.relations import Relation
+from fastcontact.elasticity.relations import Relation, TemporaryRelation
+from fastcontact.errors import FastcontactError
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, Table
 
@@ -50,7 +52,7 @@ class Building:
     thickness : float
         Of a plane model; forces of the model are those of a unit of it [length].
     local_supports : list of Relation
-        Relations that are supports along local axes.
+        Relations that are supports: those along local axes, and those that come or go between steps.
     linearised : str
         Why small strains are solved although a step has NLGEOM; empty where not.
     gap_ends : dict of str to dict of int to int
@@ -162,8 +164,8 @@ class Building:
         """Refuse pairs whose surfaces or interaction are not there."""
         seen: set[str] = set()
         for pair in self.content.pairs:
-            for name in (pair.secondary, pair.primary):
-                self.made.surface(name, pair.place)
+            secondary_group(self.found, pair.secondary, pair.place)
+            self.made.faces(pair.primary, pair.place)
             if not pair.tied and folded(pair.interaction) not in self.content.interactions:
                 known = ", ".join(i.name for i in self.content.interactions.values()) or "none"
                 raise pair.place.refuse(
@@ -194,7 +196,10 @@ class Building:
 
     def _supports(self, conditions: Conditions) -> None:
         mesh, alike = self.model.mesh, {}  # type: tuple[Any, dict[tuple[int, Table], list[int]]]
-        for name in conditions.supports.tracks:
+        temporary = conditions.temporary()
+        self._temporary_supports(conditions, temporary)
+        at_times = {name for name, _ in temporary}
+        for name in (name for name in conditions.supports.tracks if name not in at_times):
             point, axis, local = name
             table = conditions.supports.table(name)
             if local:
@@ -211,15 +216,36 @@ class Building:
         if mesh.dim == 2 and self.found.rotations:
             self.model.fix(self._point_group("rotation", self.found.rotations.values()), "y")
 
+    def _temporary_supports(self, conditions: Conditions, temporary: Sequence[tuple[Component, Acting]]) -> None:
+        """Add the supports that come or go between steps: those alike as one relation."""
+        alike: dict[tuple[Acting, Table], list[Component]] = {}
+        for name, acting in (entry for entry in temporary if entry[1].begins < entry[1].ends):
+            alike.setdefault((acting, conditions.supports.table(name)), []).append(name)
+        for (acting, table), names in alike.items():
+            ends = "" if acting.ends == np.inf else f" to {acting.ends:g}"
+            label = (
+                f"the support of {conditions.named(names[0])}, line {acting.place.line}, from {acting.begins:g}{ends}"
+            )
+            rows = csr_array(vstack([self._support_row(conditions, name) for name in names]))
+            self._relate_support(
+                TemporaryRelation(label, rows, 1.0, table, acting.begins, acting.ends, keeps=acting.keeps)
+            )
+
     def _local_support(self, conditions: Conditions, name: Component, table: Table) -> None:
-        point, axis, _ = name
-        dim = self.found.dim
-        direction = conditions.directions[point][axis][:dim]
-        columns = point * dim + np.arange(dim)
-        rows = csr_array((direction, (np.zeros(dim, int), columns)), shape=(1, self.model.n_dofs))
-        made = Relation(f"the support of {conditions.named(name)} on local axes", rows, 1.0, table)
+        label = f"the support of {conditions.named(name)} on local axes"
+        self._relate_support(Relation(label, self._support_row(conditions, name), 1.0, table))
+
+    def _relate_support(self, made: Relation) -> None:
         self.local_supports.append(made)
         self.model.relations.append(made)
+
+    def _support_row(self, conditions: Conditions, name: Component) -> csr_array:
+        """Return the row (1, n_dofs) of the displacement that a support prescribes [-]."""
+        point, axis, local = name
+        dim = self.found.dim
+        direction = (conditions.directions[point] if local else np.eye(3))[axis][:dim]
+        columns = point * dim + np.arange(dim)
+        return csr_array((direction, (np.zeros(dim, int), columns)), shape=(1, self.model.n_dofs))
 
     def _forces(self, conditions: Conditions) -> None:
         alike: dict[tuple[int, Table], list[int]] = {}
@@ -290,7 +316,24 @@ class Building:
         for pair in self.content.pairs:
             secondary, primary = (group_of_surface(self.found, name) for name in (pair.secondary, pair.primary))
             options = {"kind": "tied"} if pair.tied else self._options(pair)
-            self.model.add_contact(f"{secondary}/{primary}", secondary=secondary, primary=primary, **options)
+            if secondary in self.found.loose:
+                options.update(self._at_nodes(pair, secondary))
+            try:
+                self.model.add_contact(f"{secondary}/{primary}", secondary=secondary, primary=primary, **options)
+            except FastcontactError as error:
+                raise pair.place.refuse(str(error)) from error
+
+    def _at_nodes(self, pair: Pair, secondary: str) -> dict[str, Any]:
+        """Return the options by which some nodes alone of the facets around them are in contact."""
+        options: dict[str, Any] = {"excluded": self._point_group("without contact", self.found.loose[secondary])}
+        kinds = {name for name, _ in self.found.groups[secondary]}
+        if all(map(all_nodes_carry, kinds)):
+            options["formulation"] = "node_to_segment"
+        self.content.note(
+            pair.place, f"the nodes of surface '{pair.secondary}' make up no whole faces: they alone of the facets around "
+            "them are in contact"
+        )  # fmt: skip
+        return options
 
     def _options(self, pair: Pair) -> dict[str, Any]:
         law = self.content.interactions[folded(pair.interaction)]
@@ -312,7 +355,7 @@ class Building:
     def _fitted(self, pair: Pair) -> dict[str, Any]:
         """Return the clearance that brings the sides to where ADJUST or *CLEARANCE say; refused where no number does."""
         secondary, primary = (group_of_surface(self.found, name) for name in (pair.secondary, pair.primary))
-        gaps, places = nodal_gaps(self.model, secondary, primary)
+        gaps, places = nodal_gaps(self.model, secondary, primary, self.found.loose.get(secondary, []))
         size = TOUCHING * float(np.ptp(self.model.mesh.points, axis=0).max())
         if pair.clearance is not None:
             if np.ptp(gaps) > size:
@@ -448,15 +491,18 @@ def _body_force(name: Distributed, density: float, dim: int) -> dict[str, Any]:
     return {"xyz"[k]: component(k) for k in range(dim) if abs(axis[k]) < 1.0}
 
 
-def nodal_gaps(model: Model, secondary: str, primary: str) -> tuple[Array, Array]:
-    """Return how far nodes of one side that face the other are from it (n,), and where they are (n, dim) [length]."""
+def nodal_gaps(model: Model, secondary: str, primary: str, without: Sequence[int]) -> tuple[Array, Array]:
+    """Return how far nodes of one side that face the other are from it (n,), and where they are (n, dim) [length].
+
+    Those `without` contact are left out.
+    """
     from fastcontact.contact.configuration import Configuration
     from fastcontact.model.contact_pair import ContactPair
 
     pair = ContactPair("gaps", secondary, primary, "continuous", {})
     found, places = model.bind(pair), model.mesh.points
     gaps, _ = found.nodal_gap(Configuration.undeformed(places))
-    faced = np.isfinite(gaps)
+    faced = np.isfinite(gaps) & ~np.isin(found.secondary.points, without)
     return (gaps[faced], places[found.secondary.points[faced]]) if faced.any() else (np.zeros(1), places[:1])
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,16 @@ class Distributed:
     vector: tuple[float, ...] = ()
 
 
+@dataclass(frozen=True)
+class Acting:
+    """When a support acts, as load factors, and whether it keeps what it finds; its place where it begins."""
+
+    place: Place
+    begins: float
+    ends: float = np.inf
+    keeps: bool = False
+
+
 class Conditions:
     """Supports and loads of a deck with their histories."""
 
@@ -47,6 +57,9 @@ class Conditions:
         self.loads: Histories[Distributed] = Histories(content)
         initial = initial_temperatures(self.made, content.initial)
         self.temperatures: Histories[int] = Histories(content, rest=initial)
+        self.acting: dict[Component, Acting] = {}
+        self.over: list[tuple[Component, Acting]] = []
+        self.keeping: set[Component] = set()
         self.locks = Locks(self.made)
         self.directions = local_directions(self.made)
 
@@ -56,24 +69,13 @@ class Conditions:
         for given in content.supports:
             self._supports(given, before=True)
         self.supports.begin()
+        self.acting = {name: Acting(track.place, 0.0) for name, track in self.supports.tracks.items()}
         for number, step in enumerate(content.steps, start=1):
             self.locks.begin(number, [g for g in step.given if g.block.keyword == "BOUNDARY"], self.made)
             for given in step.given:
                 self._take(given)
-            held = {name for name, track in self.supports.tracks.items() if track.alive}
-            lost = [name for name in self.supports.tracks if name not in held and name not in self.supports.changing]
-            if lost:
-                raise self._new_list(step.given).refuse(
-                    f"step {number} leaves out {len(lost)} supports that were there before (first: {self.named(lost[0])}): "
-                    "supports must stay through all steps"
-                )
-            new = self.supports.advance(number, step)
-            if new and number > 1:
-                place = self.supports.tracks[new[0]].place
-                raise place.refuse(
-                    f"step {number} has {len(new)} supports that were not there before (first: {self.named(new[0])}): "
-                    "supports must stay through all steps"
-                )
+            self._change(number)
+            self.supports.advance(number, step)
             self.forces.advance(number, step)
             self.loads.advance(number, step)
             self.temperatures.advance(number, step)
@@ -85,18 +87,30 @@ class Conditions:
         else:
             {"BOUNDARY": self._supports, "CLOAD": self._forces}.get(keyword, self._loads)(given)
 
-    @staticmethod
-    def _new_list(given: list[Given]) -> Place:
-        return next(g.block.place for g in given if g.block.keyword == "BOUNDARY" and g.new)
+    def _change(self, number: int) -> None:
+        """Take note of the supports that come and go at the beginning of step `number`."""
+        changing, tracks = self.supports.changing, self.supports.tracks
+        gone = [name for name in self.acting if not (tracks[name].alive or name in changing)]
+        moved = [
+            name for name in changing if name in self.acting and self.acting[name].keeps and name not in self.keeping
+        ]
+        for name in gone + moved:
+            self.over.append((name, replace(self.acting.pop(name), ends=number - 1.0)))
+        for name, (_, _, place) in changing.items():
+            begun = Acting(place, 0.0 if number == 1 else number - 1.0, keeps=name in self.keeping)
+            self.acting.setdefault(name, begun)
+        self.keeping.clear()
+
+    def temporary(self) -> list[tuple[Component, Acting]]:
+        """Return the supports that do not act in all steps, each with when it does."""
+        return [*self.over, *((name, acting) for name, acting in self.acting.items() if acting.begins > 0.0)]
 
     def named(self, component: Component) -> str:
         """Return a component of a point as the deck names it."""
         point, axis, _ = component
-        for key, index in self.made.index.items():
-            if index == point:
-                where = f"{self.made.content.instances[key[0]].name}." if key[0] else ""
-                return f"component {axis + 1} of node {where}{key[1]}"
-        return f"rotation {axis + 1} of a reference node"
+        if point >= len(self.made.index):
+            return f"rotation {axis + 1} of a reference node"
+        return f"component {axis + 1} of node {self.made.number_of(point)}"
 
     def _supports(self, given: Given, before: bool = False) -> None:
         block = given.block
@@ -134,8 +148,9 @@ class Conditions:
         if point in self.directions and component <= 3:
             name, sign = self._local(point, component)
         if "FIXED" in given.block.parameters:
-            self.supports.hold(name, row.place)
-            if name in self.supports.tracks:
+            self.keeping.add(name)
+            if name in self.acting:
+                self.supports.hold(name, row.place)
                 return
         self.supports.give(name, sign * value, given.amplitude, row.place)
 

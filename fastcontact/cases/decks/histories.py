@@ -82,14 +82,12 @@ class Histories(Generic[Name]):
         for name, track in self.tracks.items():
             track.alive = name in self.changing
 
-    def advance(self, number: int, step: Step) -> list[Name]:
-        """Go on to the end of step `number`, from 1; return what the step newly has, beyond those of before."""
+    def advance(self, number: int, step: Step) -> None:
+        """Go on to the end of step `number`, from 1."""
         begin, start = float(number - 1), sum(s.period for s in self.content.steps[: number - 1])
-        new: list[Name] = []
         self.changing, self.first = {**self.first, **self.changing}, {}
         for name, (value, amplitude, place) in self.changing.items():
             if name not in self.tracks:
-                new.append(name)
                 rest = self.rest.get(name, 0.0)
                 self.tracks[name] = Track([(0.0, rest)] + [(begin, rest)] * (number > 1), place)
             track = self.tracks[name]
@@ -108,7 +106,6 @@ class Histories(Generic[Name]):
             else:
                 track.add([(begin, track.last), (begin + 1, track.last if track.alive else self.rest.get(name, 0.0))])
         self.changing = {}
-        return new
 
     def table(self, name: Name) -> Table:
         """Return the whole history as a table of load factor and value."""

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fastcontact.cases.decks.assembled import Assembled, Key, facet_points
-from fastcontact.cases.decks.blocks import folded
+from fastcontact.cases.decks.blocks import Place, folded
+from fastcontact.cases.decks.content import SurfaceDefinition
 from fastcontact.errors import CaseError
 from fastcontact.mesh import topology
 from fastcontact.mesh.mesh import Mesh
@@ -33,6 +34,8 @@ class DeckMesh:
         Facets by element, each once.
     groups, point_groups : dict of str to list
         Groups of cells, as pairs (element, row), and of points.
+    loose : dict of str to list of int
+        By group of facets around nodes that make up no whole faces, the points that are none of these.
     """
 
     made: Assembled
@@ -44,6 +47,7 @@ class DeckMesh:
     solid_rows: dict[Key, tuple[str, int]] = field(default_factory=dict)
     groups: dict[str, list[tuple[str, int]]] = field(default_factory=dict)
     point_groups: dict[str, list[int]] = field(default_factory=dict)
+    loose: dict[str, list[int]] = field(default_factory=dict)
 
     def add_facets(self, group: str, faces: Iterable[tuple[Key, int]]) -> str:
         """Make a group of facets, given by element and place among its facets; return its name."""
@@ -139,12 +143,41 @@ def _name_sets(found: DeckMesh) -> None:
             points = [made.index[key] for key in made.members("node", scope, name, members[0].place)] if members else []
             found.point_groups[prefix + part.set_names[name]] = sorted(set(points))
         for name, definition in part.surfaces.items():
-            if definition.faces:  # one that nothing uses may be empty
+            if definition.of_nodes and definition.faces:
+                _name_nodes(found, prefix + definition.name, definition, scope)
+            elif definition.faces:  # one that nothing uses may be empty
                 faces = made.faces(f"{scope}.{name}" if scope else name, definition.place)
                 found.add_facets(prefix + definition.name, faces)
         for name, members in part.element_sets.items():
             if name not in part.surfaces and members:
                 found.add_solids(prefix + part.set_names[name], made.members("element", scope, name, members[0].place))
+
+
+def _name_nodes(found: DeckMesh, group: str, definition: SurfaceDefinition, scope: str) -> None:
+    """Name the facets around the nodes of a surface; where they make up no whole ones, its further points are `loose`."""
+    whole, further, left = found.made.faces_of_nodes(definition, scope)
+    if not (whole or further):  # nodes of no solid
+        return
+    found.add_facets(group, [*whole, *further])
+    if left:
+        points = {point for face in (*whole, *further) for point in found.made.facet_points(face)}
+        found.loose[group] = sorted(points.difference(found.made.surface_nodes(definition, scope)))
+
+
+def secondary_group(found: DeckMesh, name: str, place: Place) -> str:
+    """Return the group of a surface as the secondary side of a pair, which may be one of nodes; CaseError for lone nodes."""
+    definition, scope = found.made.surface(name, place)
+    if not definition.of_nodes:
+        return group_of_surface(found, name)
+    whole, further, _ = found.made.faces_of_nodes(definition, scope)
+    carried = {point for face in (*whole, *further) for point in found.made.facet_points(face)}
+    for point in found.made.surface_nodes(definition, scope):
+        if point not in carried:
+            raise definition.place.refuse(
+                f"node {found.made.number_of(point)} of surface '{definition.name}' is on no outer face of a solid: contact "
+                "needs nodes of bodies, so leave it out"
+            )
+    return group_of_surface(found, name)
 
 
 def group_of_surface(found: DeckMesh, name: str) -> str:

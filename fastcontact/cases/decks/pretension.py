@@ -76,7 +76,7 @@ def cut_sections(found: DeckMesh, mesh: Mesh) -> Mesh:
     """Return the mesh cut along all pretension sections."""
     sections: set[str] = set()
     for section in found.made.content.pretensions:
-        found.made.surface(section.surface, section.place)
+        found.made.faces(section.surface, section.place)
         group = group_of_surface(found, section.surface)
         if group in sections:
             raise section.place.refuse(f"surface '{group}' has a pretension section already")

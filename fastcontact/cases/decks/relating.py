@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.cases.decks.assembled import facet_points
 from fastcontact.cases.decks.content import Equation, Link, Pin
 from fastcontact.cases.decks.local_axes import local_axes, local_directions, orientation_of
 from fastcontact.cases.decks.meshing import DeckMesh
@@ -81,8 +80,11 @@ def _points(found: DeckMesh, link: Link) -> list[int]:
         keys = made.keys("element", link.group, link.place)
         points = [p for key in keys if key in made.solids for p in made.solids[key].points]
     else:
-        faces = made.faces(link.group, link.place)
-        points = [p for key, facet in faces for p in facet_points(made.solids[key], facet)]
+        definition, scope = made.surface(link.group, link.place)
+        if definition.of_nodes:
+            points = made.surface_nodes(definition, scope)
+        else:
+            points = [p for face in made.faces(link.group, link.place) for p in made.facet_points(face)]
     reference = made.node(link.reference, link.place)
     kept = sorted(set(points) - {reference, found.rotations[reference]})
     if not kept:
