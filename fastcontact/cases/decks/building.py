@@ -178,9 +178,10 @@ class Building:
     def _groups(self, conditions: Conditions) -> list[tuple[str, Table]]:
         """Make groups of the facets with the same history of pressure; return them."""
         by_table: dict[tuple[str, Table], list[Any]] = {}
-        for name in conditions.loads.tracks:
-            if name.face is not None:
-                by_table.setdefault((name.keyword, conditions.loads.table(name)), []).append(name.face)
+        for table, names in conditions.loads.alike():
+            for name in names:
+                if name.face is not None:
+                    by_table.setdefault((name.keyword, table), []).append(name.face)
         return [
             (self.found.add_facets(f"pressure {number}", faces), table)
             for number, ((_, table), faces) in enumerate(by_table.items(), start=1)
@@ -199,13 +200,13 @@ class Building:
         temporary = conditions.temporary()
         self._temporary_supports(conditions, temporary)
         at_times = {name for name, _ in temporary}
-        for name in (name for name in conditions.supports.tracks if name not in at_times):
-            point, axis, local = name
-            table = conditions.supports.table(name)
-            if local:
-                self._local_support(conditions, name, table)
-            else:
-                alike.setdefault((axis, table), []).append(point)
+        for table, names in conditions.supports.alike():
+            for name in (name for name in names if name not in at_times):
+                point, axis, local = name
+                if local:
+                    self._local_support(conditions, name, table)
+                else:
+                    alike.setdefault((axis, table), []).append(point)
         for (axis, table), points in alike.items():
             letter = "xyz"[axis]
             group = self._point_group("support", points)
@@ -249,14 +250,15 @@ class Building:
 
     def _forces(self, conditions: Conditions) -> None:
         alike: dict[tuple[int, Table], list[int]] = {}
-        for name in conditions.forces.tracks:
-            point, axis, local = name
-            table = conditions.forces.table(name)
-            direction = conditions.directions[point][axis] if local else np.eye(3)[axis]
-            for k in range(self.found.dim):
-                if abs(direction[k]) > 1e-12:
-                    scaled = tuple((t, v * float(direction[k]) / self.thickness) for t, v in table)
-                    alike.setdefault((k, scaled), []).append(point)
+        for table, names in conditions.forces.alike():
+            along: dict[tuple[int, float], list[int]] = {}
+            for point, axis, local in names:
+                direction = conditions.directions[point][axis] if local else np.eye(3)[axis]
+                for k in np.flatnonzero(np.abs(direction[: self.found.dim]) > 1e-12).tolist():
+                    along.setdefault((k, float(direction[k])), []).append(point)
+            for (k, cosine), points in along.items():
+                scaled = tuple((t, v * cosine / self.thickness) for t, v in table)
+                alike.setdefault((k, scaled), []).extend(points)
         for (axis, table), points in alike.items():
             if any(value for _, value in table):
                 group = self._point_group("force", points)
@@ -433,7 +435,7 @@ class Building:
             for number, step in enumerate(steps):
                 instants.update(number + part for part in _parts(step))
         for histories in (conditions.supports, conditions.forces, conditions.loads, conditions.temperatures):
-            for track in histories.tracks.values():
+            for track in histories.distinct():
                 instants.update(round(time, 12) for time, _ in track.points if abs(time - round(time)) > 1e-6)
         if len(instants) > LONGEST_RAMP:
             raise steps[0].place.refuse(f"the histories have {len(instants)} corners, more than {LONGEST_RAMP}")

@@ -69,7 +69,7 @@ class Conditions:
         for given in content.supports:
             self._supports(given, before=True)
         self.supports.begin()
-        self.acting = {name: Acting(track.place, 0.0) for name, track in self.supports.tracks.items()}
+        self.acting = {name: Acting(place, 0.0) for name, (_, _, place) in self.supports.first.items()}
         for number, step in enumerate(content.steps, start=1):
             self.locks.begin(number, [g for g in step.given if g.block.keyword == "BOUNDARY"], self.made)
             for given in step.given:
@@ -89,8 +89,8 @@ class Conditions:
 
     def _change(self, number: int) -> None:
         """Take note of the supports that come and go at the beginning of step `number`."""
-        changing, tracks = self.supports.changing, self.supports.tracks
-        gone = [name for name in self.acting if not (tracks[name].alive or name in changing)]
+        changing = self.supports.changing
+        gone = [name for name in self.supports.dying if name in self.acting]
         moved = [
             name for name in changing if name in self.acting and self.acting[name].keeps and name not in self.keeping
         ]
@@ -188,9 +188,7 @@ class Conditions:
     def _loads(self, given: Given) -> None:
         keyword = given.block.keyword
         if given.new:
-            kept = self.loads.changing
-            for name, track in self.loads.tracks.items():
-                track.alive = track.alive and (name.keyword != keyword or name in kept)
+            self.loads.forget(lambda name: name.keyword == keyword)
         for row in given.block.rows:
             for name, value in self._distributed(keyword, row):
                 self.loads.give(name, value, given.amplitude, row.place)
