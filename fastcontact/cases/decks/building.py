@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 from scipy.spatial import cKDTree
 
-from fastcontact.cases.decks.assembled import Assembled, assembled
+from fastcontact.cases.decks.assembled import Assembled, Element, assembled, facet_points
 from fastcontact.cases.decks.blocks import Place, folded
 from fastcontact.cases.decks.conditions import Acting, Component, Conditions, Distributed
 from fastcontact.cases.decks.content import Content, Material, Pair, Section, Step
@@ -93,11 +93,10 @@ class Building:
 
     def _materials(self) -> tuple[list[tuple[Any, str]], float]:
         """Return materials with groups of solids, and the thickness; every solid needs a section."""
-        owner: dict[Any, tuple[Section, Material]] = {}
         thickness: float | None = None
         for scope in self.made.scopes:
             for section in self.made.part(scope).sections:
-                material = self._material(section)
+                self._material(section)
                 if self.found.dim == 2 and self.found.kinematics != "axisymmetric":
                     own = 1.0 if section.thickness is None else section.thickness
                     if thickness is not None and own != thickness:
@@ -106,29 +105,28 @@ class Building:
                         )
                     thickness = own
                 name = f"{scope}.{section.elements}" if scope else section.elements
-                for key in self.made.keys("element", name, section.place):
-                    if key in owner and owner[key][0] is not section:
+                for element in self.made.elements_of(name, section.place):
+                    if element.section not in (None, section):
                         raise section.place.refuse(
-                            f"element {key[1]} has a section already, in line {owner[key][0].place.line}"
+                            f"element {element.number} has a section already, in line {element.section.place.line}"
                         )
-                    owner[key] = (section, material)
-        self._check_sections(owner)
+                    element.section = section
+        self._check_sections()
         by_material: dict[tuple[str, str, bool], list[Any]] = {}
-        for key in self.made.solids:
-            section, material = owner[key]
-            modes = self.made.solids[key].type.modes
-            by_material.setdefault((folded(material.name), folded(section.orientation), modes), []).append(key)
-        self.densities = {key: owner[key][1] for key in self.made.solids}
+        for element in self.made.solids:
+            section = element.section
+            key = (folded(section.material), folded(section.orientation), element.solid.modes)
+            by_material.setdefault(key, []).append(element)
         found = []
-        for (name, turned, modes), keys in by_material.items():
+        for (name, turned, modes), members in by_material.items():
             material = self.content.materials[name]
-            axes = self._axes(owner[keys[0]][0])
+            axes = self._axes(members[0].section)
             group = f"material {material.name}" + (f" along {turned.lower()}" if turned else "")
             group += " with incompatible modes" if modes else ""
             found.append(
                 (
                     _law(self.content, material, axes, modes),
-                    self.found.add_solids(group, keys),
+                    self.found.add_solids(group, members),
                 )
             )
         return found, thickness or 1.0
@@ -152,13 +150,13 @@ class Building:
             raise material.place.refuse(f"material '{material.name}' has no *ELASTIC")
         return material
 
-    def _check_sections(self, owner: Mapping[Any, Any]) -> None:
-        without = [key for key in self.made.solids if key not in owner]
+    def _check_sections(self) -> None:
+        without = [element for element in self.made.solids if element.section is None]
         if without:
-            cell = self.made.solids[without[0]].cell
+            cell = without[0].cell
             many = "1 element" if len(without) == 1 else f"{len(without)} elements"
             named = f" of set '{cell.set}'" if cell.set else ""
-            raise cell.place.refuse(f"{many} ({without[0][1]}){named} has no section, so no material")
+            raise cell.place.refuse(f"{many} ({without[0].number}){named} has no section, so no material")
 
     def _check_pairs(self) -> None:
         """Refuse pairs whose surfaces or interaction are not there."""
@@ -275,19 +273,19 @@ class Building:
                 continue
             track = conditions.loads.tracks[name]
             by_density: dict[float, list[Any]] = {}
-            for key in name.elements:
-                if key in self.made.solids:
-                    by_density.setdefault(self._density(key, name, track.place), []).append(key)
-            for density, keys in by_density.items():
-                group = self.found.add_solids(f"load {number} of density {density:g}", keys)
+            for element in name.elements:
+                if element.type is not None:
+                    by_density.setdefault(self._density(element, name, track.place), []).append(element)
+            for density, members in by_density.items():
+                group = self.found.add_solids(f"load {number} of density {density:g}", members)
                 self._name_solids(group)
                 values = _body_force(name, density, self.found.dim)
                 self.model.add_body_force(group, ramp=conditions.loads.table(name), **values)
 
-    def _density(self, key: Any, name: Distributed, place: Place) -> float:
+    def _density(self, element: Element, name: Distributed, place: Place) -> float:
         if name.kind[0] == "B":
             return 1.0
-        material = self.densities[key]
+        material = self._material(element.section)
         if material.density is None:
             raise place.refuse(f"material '{material.name}' has no *DENSITY, so {name.kind} is no force")
         return material.density
@@ -295,24 +293,23 @@ class Building:
     def _name_solids(self, group: str) -> None:
         """Add a group of solids to the mesh that is made already; elements begin the numbers of cells."""
         offsets = self.model.mesh.offsets
-        numbers = [offsets[name] + row for name, row in self.found.groups[group]]
+        numbers = [offsets[name] + row for name, rows in self.found.groups[group].items() for row in rows]
         self.model.mesh = self.model.mesh.with_groups(cells={group: numbers})
 
     def _springs(self) -> None:
         for name, (place, stiffness) in self.content.springs.items():
-            for key in self.made.keys("element", name, place):
-                cell, points = self.made.discrete.get(key, (None, ()))
-                if cell is None or cell.type != "SPRINGA":
-                    raise place.refuse(f"element {key[1]} is no spring of type SPRINGA")
-                self.model.add_spring(points[0], points[1], axial=stiffness / self.thickness)
+            for element in self.made.elements_of(name, place):
+                if element.cell.type != "SPRINGA":
+                    raise place.refuse(f"element {element.number} is no spring of type SPRINGA")
+                self.model.add_spring(element.points[0], element.points[1], axial=stiffness / self.thickness)
         self._check_discrete("SPRINGA", self.content.springs, "*SPRING")
 
     def _check_discrete(self, kind: str, given: Mapping[str, Any], needed: str) -> None:
         """Refuse springs and gap elements without properties."""
-        with_one = {key for name, entry in given.items() for key in self.made.keys("element", name, entry[0])}
-        for key, (cell, _) in self.made.discrete.items():
-            if cell.type == kind and key not in with_one:
-                raise cell.place.refuse(f"element {key[1]} of type {kind} has no {needed}")
+        with_one = {own for name, entry in given.items() for own in self.made.elements_of(name, entry[0])}
+        for element in self.made.discrete:
+            if element.cell.type == kind and element not in with_one:
+                raise element.cell.place.refuse(f"element {element.number} of type {kind} has no {needed}")
 
     def _contact(self) -> None:
         for pair in self.content.pairs:
@@ -328,8 +325,7 @@ class Building:
     def _at_nodes(self, pair: Pair, secondary: str) -> dict[str, Any]:
         """Return the options by which some nodes alone of the facets around them are in contact."""
         options: dict[str, Any] = {"excluded": self._point_group("without contact", self.found.loose[secondary])}
-        kinds = {name for name, _ in self.found.groups[secondary]}
-        if all(map(all_nodes_carry, kinds)):
+        if all(map(all_nodes_carry, self.found.groups[secondary])):
             options["formulation"] = "node_to_segment"
         self.content.note(
             pair.place, f"the nodes of surface '{pair.secondary}' make up no whole faces: they alone of the facets around "
@@ -389,14 +385,15 @@ class Building:
         found = {}
         self._check_discrete("GAPUNI", self.content.gaps, "*GAP")
         for name, (place, _, _) in self.content.gaps.items():
-            ends = [self.made.discrete.get(key, (None, ()))[1] for key in self.made.keys("element", name, place)]
-            if any(len(pair) != 2 for pair in ends):
+            own = self.made.elements_of(name, place)
+            if any(element.cell.type != "GAPUNI" for element in own):
                 raise place.refuse("acts on elements of type GAPUNI only")
+            ends = [element.points for element in own]
             chosen = {pair[0] for pair in ends}
-            faces = [sides[0] for corners, sides in self.made.owners.items() if len(sides) == 1 and corners <= chosen]
+            faces = self.made.faces_within(chosen)
             shown = self.content.root.set_names.get(name, name)
             group = self.found.add_facets(f"{shown} facets", faces)
-            covered = {p for element, row in self.found.groups[group] for p in self.found.facets[element][row]}
+            covered = {p for face in faces for p in facet_points(*face)}
             if covered != chosen:
                 raise place.refuse(
                     "gap elements are supported on all nodes of whole faces only, from the body to nodes that are held"

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.cases.decks.assembled import Key
+from fastcontact.cases.decks.assembled import Element, Face
 from fastcontact.cases.decks.blocks import Place, Row
 from fastcontact.cases.decks.content import Given
 from fastcontact.cases.decks.histories import Histories
@@ -30,8 +30,8 @@ class Distributed:
 
     keyword: str
     kind: str
-    face: tuple[Key, int] | None = None
-    elements: tuple[Key, ...] = ()
+    face: Face | None = None
+    elements: tuple[Element, ...] = ()
     vector: tuple[float, ...] = ()
 
 
@@ -108,7 +108,7 @@ class Conditions:
     def named(self, component: Component) -> str:
         """Return a component of a point as the deck names it."""
         point, axis, _ = component
-        if point >= len(self.made.index):
+        if point >= sum(map(len, self.made.index.values())):
             return f"rotation {axis + 1} of a reference node"
         return f"component {axis + 1} of node {self.made.number_of(point)}"
 
@@ -200,9 +200,9 @@ class Conditions:
                 raise row.place.refuse(f"load {label[:40]} on a surface is not supported, only P")
             faces, value = self.made.faces(row.text(0), row.place), row.number(2)
             return [(Distributed(keyword, "P", face), value) for face in faces]
-        keys = self.made.keys("element", row.text(0), row.place) if row.text(0) else list(self.made.solids)
+        own = self.made.elements_of(row.text(0), row.place) if row.text(0) else self.made.solids
         if label[:1] == "P" and label[1:].isdigit():
-            facets = [(key, self.made.facet(key, int(label[1:]), row.place)) for key in keys]
+            facets = [(element, self.made.facet(element, int(label[1:]), row.place)) for element in own]
             return [(Distributed(keyword, "P", face), row.number(2)) for face in facets]
         size = {"GRAV": 3, "CENTRIF": 6, "BX": 0, "BY": 0, "BZ": 0}.get(label)
         if size is None:
@@ -212,4 +212,4 @@ class Conditions:
         vector = tuple(row.number(3 + i, 0.0) for i in range(size))
         if size and not any(vector[-3:]):
             raise row.place.refuse(f"the direction of {label} is missing")
-        return [(Distributed(keyword, label, None, tuple(keys), vector), row.number(2))]
+        return [(Distributed(keyword, label, None, tuple(own), vector), row.number(2))]

@@ -2,37 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from fastcontact.cases.decks.blocks import Block, Place, folded
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Cell:
-    """An element: its type, the numbers of its nodes, and its line."""
+    """An element: its type, the numbers of its nodes, the place of its keyword, and its line."""
 
     type: str
-    nodes: tuple[int, ...]
-    place: Place
+    nodes: Sequence[int]
+    within: Place
+    line: int
     set: str = ""
 
+    @property
+    def place(self) -> Place:
+        """Its place."""
+        return replace(self.within, line=self.line)
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, slots=True)
 class Members:
-    """One entry of a set: a number, a range or the name of another set, in an instance (empty: where it is defined)."""
+    """Entries of a set: numbers, or the name of another set, in an instance (empty: where it is defined)."""
 
     place: Place
-    first: int = 0
-    last: int = 0
-    increment: int = 1
+    numbers: Sequence[int] = ()
     name: str = ""
     instance: str = ""
-    generated: bool = False
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Face:
     """One entry of a surface: an element set or number, or for nodes a node set or number, and the label of the face."""
 
@@ -215,7 +218,7 @@ class Amplitude:
     total: bool
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Given:
     """Values of supports, loads or temperatures: their block, what remains of earlier steps, their amplitude."""
 
@@ -224,7 +227,7 @@ class Given:
     amplitude: str = ""
 
 
-@dataclass
+@dataclass(slots=True)
 class Step:
     """A load step of the deck."""
 

@@ -104,9 +104,9 @@ class Deck:
         """
         made = self.building.made
         scope, rest = made.place_of(str(number))
-        if not rest.isdigit() or (scope, int(rest[:19])) not in made.index:
+        if not rest.isdecimal() or int(rest[:19]) not in made.index[scope]:
             raise MeshError(f"node '{number}' is not defined in '{self.path.name}'")
-        return made.index[scope, int(rest[:19])]
+        return made.index[scope][int(rest[:19])]
 
     def finished(self, step: StepResult) -> StepResult:
         """Return a step of the model with the reactions of supports alone and forces of the whole thickness."""

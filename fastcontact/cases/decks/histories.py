@@ -26,7 +26,7 @@ class Track:
     place: Place
     size: int
     alive: bool = True
-    lasting: tuple[float, Amplitude] | None = None
+    shape: tuple[float, Amplitude] | None = None
 
     @property
     def last(self) -> float:
@@ -50,7 +50,8 @@ class Histories(Generic[Name]):
 
     `changing` are those given in the current step, with the place of each, `dying` those that earlier steps gave and this one
     lets go; `rest` what quantities have before they are given, zero where it does not say; `first` what was given before all
-    steps for the first one, unless that says otherwise; `time` where the current step begins.
+    steps for the first one, unless that says otherwise; `time` where the current step begins; `lasting` the tracks whose
+    amplitudes go on in total time.
     """
 
     content: Content
@@ -60,6 +61,7 @@ class Histories(Generic[Name]):
     rest: Mapping[Name, float] = field(default_factory=dict)
     first: dict[Name, tuple[float, str, Place]] = field(default_factory=dict)
     time: float = 0.0
+    lasting: dict[int, Track] = field(default_factory=dict)
 
     def give(self, name: Name, value: float, amplitude: str, place: Place) -> None:
         """Give a value for the current step; CaseError if the step has another one for the same."""
@@ -106,17 +108,19 @@ class Histories(Generic[Name]):
         for (_, value, amplitude, rest, alive), names in alike.items():
             track = self._track(names, rest, given.get(names[0]))
             changed.add(id(track))
-            track.alive, track.lasting = alive, None
+            track.alive = alive
+            self.lasting.pop(id(track), None)
             track.add([(begin, track.last)])
             if amplitude:
                 shape = self.content.amplitudes[folded(amplitude)]
                 track.add(_shaped(value, shape, begin, start, step.period))
-                track.lasting = (value, shape) if shape.total else None
+                if shape.total:
+                    track.shape, self.lasting[id(track)] = (value, shape), track
             else:
                 track.add([(begin + 1, value)])
-        for track in self.distinct():
-            if track.lasting and id(track) not in changed:
-                track.add(_shaped(*track.lasting, begin, start, step.period))
+        for key, track in self.lasting.items():
+            if key not in changed and track.shape is not None:
+                track.add(_shaped(*track.shape, begin, start, step.period))
         self.changing, self.first, self.dying = {}, {}, {}
 
     def _track(self, names: list[Name], rest: float, given: tuple[float, str, Place] | None) -> Track:
