@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from fastcontact.cases.decks.blocks import Place, folded
 from fastcontact.cases.decks.conditions import Acting, Component, Conditions, Distributed
 from fastcontact.cases.decks.content import Content, Material, Pair, Section, Step
 from fastcontact.cases.decks.cyclic_symmetry import add_sectors
+from fastcontact.cases.decks.histories import shape_of
 from fastcontact.cases.decks.initial_stresses import add_initial_stresses
 from fastcontact.cases.decks.local_axes import local_axes, orientation_of
 from fastcontact.cases.decks.meshing import DeckMesh, begun, group_of_surface, secondary_group
@@ -205,13 +207,12 @@ class Building:
                     self._local_support(conditions, name, table)
                 else:
                     alike.setdefault((axis, table), []).append(point)
-        for (axis, table), points in alike.items():
-            letter = "xyz"[axis]
+        for axis, points, value, table in _by_shape(alike):
             group = self._point_group("support", points)
-            if any(value for _, value in table):
-                self.model.prescribe(group, ramp=table, **_along(axis))
+            if callable(value) or any(factor for _, factor in table):
+                self.model.prescribe(group, ramp=table, **{"xyz"[axis]: value})
             else:
-                self.model.fix(group, letter)
+                self.model.fix(group, "xyz"[axis])
         if mesh.dim == 2 and self.found.rotations:
             self.model.fix(self._point_group("rotation", self.found.rotations.values()), "y")
 
@@ -257,10 +258,10 @@ class Building:
             for (k, cosine), points in along.items():
                 scaled = tuple((t, v * cosine / self.thickness) for t, v in table)
                 alike.setdefault((k, scaled), []).extend(points)
-        for (axis, table), points in alike.items():
-            if any(value for _, value in table):
+        for axis, points, value, table in _by_shape(alike):
+            if any(factor for _, factor in table):
                 group = self._point_group("force", points)
-                self.model.add_force(group, distribute=False, ramp=table, **_along(axis))
+                self.model.add_force(group, distribute=False, ramp=table, **{"xyz"[axis]: value})
 
     def _pressures(self, groups: list[tuple[str, Table]]) -> None:
         for group, table in groups:
@@ -505,6 +506,28 @@ def nodal_gaps(model: Model, secondary: str, primary: str, without: Sequence[int
     return (gaps[faced], places[found.secondary.points[faced]]) if faced.any() else (np.zeros(1), places[:1])
 
 
-def _along(axis: int) -> dict[str, Any]:
-    """Return a unit force along an axis, as the model takes it."""
-    return {"xyz"[axis]: 1.0}
+def _by_shape(alike: Mapping[tuple[int, Table], list[int]]) -> Iterator[tuple[int, list[int], Any, Table]]:
+    """Yield axis, points, value and history of what points have by axis and history, once for histories of one shape.
+
+    The value is 1, or a function that returns those of the points, ascending, where they differ.
+    """
+    shapes: dict[tuple[int, Table], dict[Table, float]] = {}
+    for axis, table in alike:
+        size, shape = shape_of(table)
+        shapes.setdefault((axis, shape), {})[table] = size
+    for (axis, shape), sizes in shapes.items():
+        if len(sizes) == 1:
+            table = next(iter(sizes))
+            yield axis, alike[axis, table], 1.0, table
+            continue
+        values: dict[int, float] = {}
+        for table, size in sizes.items():
+            for point in alike[axis, table]:
+                values[point] = values.get(point, 0.0) + size
+        points = sorted(values)
+        yield axis, points, partial(_given, np.array([values[point] for point in points])), shape
+
+
+def _given(values: Array, positions: Array) -> Array:
+    """Return values (n,) that nodes have whatever their positions (n, dim)."""
+    return values

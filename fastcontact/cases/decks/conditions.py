@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,7 +25,7 @@ ROUND_OFF = 1e-9
 Component = tuple[int, int, bool]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Distributed:
     """What a distributed load acts on: its kind, facets or elements, and its direction or axis."""
 
@@ -35,7 +36,7 @@ class Distributed:
     vector: tuple[float, ...] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Acting:
     """When a support acts, as load factors, and whether it keeps what it finds; its place where it begins."""
 
@@ -69,7 +70,7 @@ class Conditions:
         for given in content.supports:
             self._supports(given, before=True)
         self.supports.begin()
-        self.acting = {name: Acting(place, 0.0) for name, (_, _, place) in self.supports.first.items()}
+        self._act(self.supports.first, 0.0)
         for number, step in enumerate(content.steps, start=1):
             self.locks.begin(number, [g for g in step.given if g.block.keyword == "BOUNDARY"], self.made)
             for given in step.given:
@@ -96,10 +97,16 @@ class Conditions:
         ]
         for name in gone + moved:
             self.over.append((name, replace(self.acting.pop(name), ends=number - 1.0)))
-        for name, (_, _, place) in changing.items():
-            begun = Acting(place, 0.0 if number == 1 else number - 1.0, keeps=name in self.keeping)
-            self.acting.setdefault(name, begun)
+        self._act(changing, number - 1.0)
         self.keeping.clear()
+
+    def _act(self, names: Mapping[Component, tuple[float, str, Place]], begin: float) -> None:
+        """Let supports act from the beginning of a step on, where they do not yet."""
+        begun: dict[tuple[Place, bool], Acting] = {}
+        for name, (_, _, place) in names.items():
+            if name not in self.acting:
+                key = place, name in self.keeping
+                self.acting[name] = begun.setdefault(key, Acting(place, begin, keeps=key[1]))
 
     def temporary(self) -> list[tuple[Component, Acting]]:
         """Return the supports that do not act in all steps, each with when it does."""

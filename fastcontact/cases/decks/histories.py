@@ -16,9 +16,11 @@ from fastcontact.model.ramp import Table
 Name = TypeVar("Name", bound=Hashable)
 # How long a jump lasts at the beginning of a step, of its length.
 JUMP = 1e-9
+# Digits to which histories must agree, up to a factor, to count as one.
+ALIKE = 12
 
 
-@dataclass
+@dataclass(slots=True)
 class Track:
     """The value of quantities that were always given together, through the steps, as points (load factor, value)."""
 
@@ -155,6 +157,12 @@ class Histories(Generic[Name]):
         for names in members.values():
             tables.setdefault(self.table(names[0]), []).extend(names)
         return list(tables.items())
+
+
+def shape_of(table: Table) -> tuple[float, Table]:
+    """Return the largest value of a history by size, and the history over it."""
+    size = max((value for _, value in table), key=abs)
+    return size, tuple((time, round(value / size, ALIKE)) for time, value in table) if size else table
 
 
 def _shaped(value: float, shape: Amplitude, begin: float, start: float, period: float) -> list[tuple[float, float]]:

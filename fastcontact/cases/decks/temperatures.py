@@ -10,15 +10,13 @@ from numpy.typing import NDArray
 from fastcontact.cases.decks.assembled import Assembled
 from fastcontact.cases.decks.blocks import Block, Row
 from fastcontact.cases.decks.content import Content, Given, Material
-from fastcontact.cases.decks.histories import Histories
+from fastcontact.cases.decks.histories import Histories, shape_of
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
 
 Array = NDArray[np.float64]
 # Coefficients of expansion by type.
 EXPANSIONS = {"ISO": 1, "ORTHO": 3}
-# Digits to which histories of two nodes must agree, up to a factor, to count as one.
-ALIKE = 12
 
 
 def expansion(content: Content, current: Material, block: Block) -> None:
@@ -86,9 +84,8 @@ def add_temperatures(model: Model, histories: Histories[int]) -> None:
     ]
     by_shape: dict[Table, list[tuple[int, float]]] = {}
     for table, points in rises:
-        size = max((value for _, value in table), key=abs)
+        size, shape = shape_of(table)
         if size:
-            shape = tuple((time, round(value / size, ALIKE)) for time, value in table)
             by_shape.setdefault(shape, []).extend((point, size) for point in points)
     times = sorted({time for table, _ in rises for time, _ in table})
     if len(by_shape) <= len(times):
