@@ -97,11 +97,11 @@ class Results(Sequence[StepResult]):
             raise FileError(f"'{path}' is no HDF5 file: name a result file that fastcontact wrote (.vtkhdf)")
         # A file object of our own: by its name HDF5 would return a file that this process has open, as it was then.
         self._raw: Any = open(path, "rb")  # noqa: SIM115
-        writes = journal.found(self._raw) if not is_being_written(self.path) or repeat else []
-        if writes:
-            self._raw = io.BufferedReader(journal.Repeated(self._raw, writes))
         self._file: Any = None
         try:
+            writes = journal.found(self._raw) if not is_being_written(self.path) or repeat else []
+            if writes:
+                self._raw = io.BufferedReader(journal.Repeated(self._raw, writes))
             with self._explained():
                 self._file = h5py.File(self._raw, "r")
                 self._read_header(self._checked())
@@ -171,6 +171,10 @@ class Results(Sequence[StepResult]):
         if not -self._n_steps <= number < self._n_steps:
             raise IndexError(f"'{self.path}' has {self._n_steps} steps, so there is no step at position {number}")
         return self._read_step(range(self._n_steps)[number])
+
+    def lacks(self, names: Sequence[str]) -> list[str]:
+        """Return which objects of HDF5, by their paths, the file does not hold."""
+        return [name for name in names if name not in self._file]
 
     def __enter__(self) -> Results:
         return self
