@@ -163,7 +163,7 @@ class Results(Sequence[StepResult]):
     def __getitem__(self, number: int | slice) -> StepResult | list[StepResult]:
         """Return a step by its position, from 0, or from the end if negative; a slice gives a list of steps."""
         if isinstance(number, slice):
-            return [self._read_step(position) for position in range(*number.indices(self._n_steps))]
+            return [self[position] for position in self._positions(number)]
         try:
             number = operator.index(number)
         except TypeError:
@@ -171,6 +171,14 @@ class Results(Sequence[StepResult]):
         if not -self._n_steps <= number < self._n_steps:
             raise IndexError(f"'{self.path}' has {self._n_steps} steps, so there is no step at position {number}")
         return self._read_step(range(self._n_steps)[number])
+
+    def _positions(self, part: slice) -> range:
+        try:
+            return range(*part.indices(self._n_steps))
+        except (TypeError, ValueError) as error:
+            raise FileError(
+                f"{part} of '{self.path}' needs whole numbers, and steps that are not 0 ({error})"
+            ) from None
 
     def lacks(self, names: Sequence[str]) -> list[str]:
         """Return which objects of HDF5, by their paths, the file does not hold."""
