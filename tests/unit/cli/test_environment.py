@@ -66,6 +66,6 @@ y = 0.0
 [[pressure]]
 group = "RIGHT"
 value = 0.01
-[steps]
-number = 1
+[ramp]
+steps = 1
 """
