@@ -37,6 +37,8 @@ class Configuration:
         By which a rigid obstacle has turned, likewise [radian].
     worn : ndarray (n_points,), optional
         Depth worn off at the secondary nodes before the load step [length]; None for nothing.
+    friction_factor : float
+        What the coefficient of friction is multiplied with [-].
     """
 
     displacement: Array
@@ -49,6 +51,7 @@ class Configuration:
     angle: float = 0.0
     angle_start: float = 0.0
     worn: Array | None = None
+    friction_factor: float = 1.0
 
     @property
     def stance(self) -> Stance:

@@ -96,6 +96,7 @@ class Model(ModelSupports):
             named = [(item.name, item.ramp) for item in items]
             named += [(f"the motion of obstacle '{p.name}'", p.ramp) for p in self.contact]
             named += [(f"the clearance of contact '{p.name}'", p.clearance_ramp) for p in self.contact]
+            named += [(f"the friction of contact '{p.name}'", p.friction_ramp) for p in self.contact]
             named += [(f"the rotation of obstacle '{p.name}'", p.rotation_ramp) for p in self.contact]
             check_ramps(named, ramp.instants)
             check_turns(self.contact, ramp)

@@ -284,7 +284,8 @@ class Assembled:
     def faces_of_nodes(self, definition: SurfaceDefinition, scope: str) -> tuple[list[Face], list[Face], list[int]]:
         """Return the outer faces all of whose corners a surface of nodes has, those with most for other nodes, and these."""
         chosen = set(self.surface_nodes(definition, scope))
-        whole, others = [], []
+        whole: list[tuple[Face, set[int]]] = []
+        others: list[tuple[Face, set[int]]] = []
         for face, corners in dict.fromkeys(face for point in sorted(chosen) for face in self.outer.get(point, ())):
             points = chosen.intersection(facet_points(*face))
             (whole if corners <= chosen else others).append((face, points))

@@ -16,9 +16,9 @@ from scipy.spatial import cKDTree
 from fastcontact.cases.decks.assembled import Assembled, Element, assembled, facet_points
 from fastcontact.cases.decks.blocks import Place, folded
 from fastcontact.cases.decks.conditions import Acting, Component, Conditions, Distributed
-from fastcontact.cases.decks.content import Content, Material, Pair, Section, Step
+from fastcontact.cases.decks.content import Content, Interaction, Material, Pair, Section, Step
 from fastcontact.cases.decks.cyclic_symmetry import add_sectors
-from fastcontact.cases.decks.histories import shape_of
+from fastcontact.cases.decks.histories import JUMP, shape_of
 from fastcontact.cases.decks.initial_stresses import add_initial_stresses
 from fastcontact.cases.decks.local_axes import local_axes, orientation_of
 from fastcontact.cases.decks.meshing import DeckMesh, begun, group_of_surface, secondary_group
@@ -338,15 +338,12 @@ class Building:
         law = self.content.interactions[folded(pair.interaction)]
         options: dict[str, Any] = {}
         if law.kind != "unilateral":
-            if law.friction:
+            if law.friction or law.changes:
                 raise law.place.refuse(f"friction with {law.kind} contact is not supported")
             options["kind"] = law.kind
         if law.penalty is not None and law.kind != "tied":
             options["penalty"] = law.penalty
-        if law.friction:
-            options["friction"] = law.friction
-            if law.stick is not None:
-                options["tangential_penalty"] = law.stick
+        options.update(_friction(law, len(self.content.steps)))
         if pair.adjust or pair.clearance is not None:
             options.update(self._fitted(pair))
         return options
@@ -438,6 +435,26 @@ class Building:
         if len(instants) > LONGEST_RAMP:
             raise steps[0].place.refuse(f"the histories have {len(instants)} corners, more than {LONGEST_RAMP}")
         return Ramp(tuple(sorted(instants)), ((0.0, 0.0), (float(len(steps)), 1.0)))
+
+
+def _friction(law: Interaction, n_steps: int) -> dict[str, Any]:
+    """Return the options of a pair for its friction, which *CHANGE FRICTION changes at the beginning of steps."""
+    table, sticks = [(0.0, law.friction)], {law.stick} if law.friction else set()
+    for before, changed in law.changes:
+        if changed.friction < 0.0 or changed.penalty is not None or changed.kind != law.kind:
+            raise changed.place.refuse("one *FRICTION must follow, and nothing else of the interaction changes")
+        table += [(float(before), table[-1][1]), (before + JUMP, changed.friction)]
+        sticks |= {changed.stick} if changed.friction else set()
+    largest = max(value for _, value in table)
+    if not largest:
+        return {}
+    if len(sticks) > 1:
+        raise law.changes[0][1].place.refuse("a stick slope that changes is not supported: give the same one")
+    options = {"friction": largest, "tangential_penalty": sticks.pop()}
+    if law.changes:
+        points = {**dict(table), float(n_steps): table[-1][1]}
+        options["friction_ramp"] = [(time, value / largest) for time, value in sorted(points.items())]
+    return options
 
 
 def _law(content: Content, material: Material, axes: Any, modes: bool) -> Any:

@@ -117,6 +117,7 @@ class Interaction:
     friction: float = 0.0
     stick: float | None = None
     kind: str = "unilateral"
+    changes: list[tuple[int, Interaction]] = field(default_factory=list)  # of friction, by the number of steps before
 
 
 @dataclass
@@ -172,6 +173,15 @@ class Pin:
     place: Place
     first: str
     second: str
+
+
+@dataclass(frozen=True)
+class MultiPoint:
+    """Nodes that stay in a plane or on a line, or, with a last one for it, have a mean rotation."""
+
+    place: Place
+    kind: str
+    nodes: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -256,6 +266,7 @@ class Content:
     sectors: list[Sectors] = field(default_factory=list)
     equations: list[Equation] = field(default_factory=list)
     pins: list[Pin] = field(default_factory=list)
+    multi_points: list[MultiPoint] = field(default_factory=list)
     links: list[Link] = field(default_factory=list)
     axes: list[Axes] = field(default_factory=list)
     pretensions: list[PretensionSection] = field(default_factory=list)

@@ -120,8 +120,8 @@ class Histories(Generic[Name]):
                     track.shape, self.lasting[id(track)] = (value, shape), track
             else:
                 track.add([(begin + 1, value)])
-        for key, track in self.lasting.items():
-            if key not in changed and track.shape is not None:
+        for number_of_track, track in self.lasting.items():
+            if number_of_track not in changed and track.shape is not None:
                 track.add(_shaped(*track.shape, begin, start, step.period))
         self.changing, self.first, self.dying = {}, {}, {}
 

@@ -11,6 +11,7 @@ from fastcontact.cases.decks.assembled import facet_points
 from fastcontact.cases.decks.content import Equation, Link, Pin
 from fastcontact.cases.decks.local_axes import local_axes, local_directions, orientation_of
 from fastcontact.cases.decks.meshing import DeckMesh
+from fastcontact.cases.decks.multi_points import multi_point_rows
 from fastcontact.elasticity.loads import Traction
 from fastcontact.elasticity.relations import Relation
 from fastcontact.errors import ModelError
@@ -38,6 +39,7 @@ def relations_of(found: DeckMesh, mesh: Mesh) -> list[Relation]:
     axes = local_directions(found.made)
     rows = [_equation(found, equation, axes) for equation in content.equations]
     rows += [row for pin in content.pins for row in _pinned(found, pin)]
+    rows += [row for own in content.multi_points for row in multi_point_rows(found, own)]
     made = [relation("the equations of the deck", rows, mesh.points.shape)] if rows else []
     for link in content.links:
         rows = _distributing(found, mesh, link) if link.distributing else _rigid(found, link)
