@@ -68,8 +68,11 @@ def _stage(
     That is `kept` from when they began, and follows from the displacements (n_points, dim) [length] for new ones: lengths by
     the names of sections, values (m,) by those of relations.
     """
-    found: dict[str, float | Array] = {**locked_lengths(model.pretensions, begin, displacement, kept)}
-    locks = [own.locked(model.mesh.points.size, found[own.label]) for own in model.pretensions if own.label in found]
+    lengths = locked_lengths(model.pretensions, begin, displacement, kept)
+    locks = [
+        own.locked(model.mesh.points.size, lengths[own.label]) for own in model.pretensions if own.label in lengths
+    ]
+    found: dict[str, float | Array] = {**lengths}
     relations: list[Relation] = []
     for own in model.relations:
         if not isinstance(own, TemporaryRelation):

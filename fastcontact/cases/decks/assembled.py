@@ -43,6 +43,12 @@ class Element:
         assert self.type is not None
         return self.type
 
+    @property
+    def given_section(self) -> Section:
+        """The section of a solid, which every one has once sections are checked."""
+        assert self.section is not None
+        return self.section
+
 
 Face = tuple[Element, int]
 

@@ -116,8 +116,8 @@ class Building:
         self._check_sections()
         by_material: dict[tuple[str, str, bool], list[Any]] = {}
         for element in self.made.solids:
-            section = element.section
-            key = (folded(section.material), folded(section.orientation), element.solid.modes)
+            given = element.given_section
+            key = (folded(given.material), folded(given.orientation), element.solid.modes)
             by_material.setdefault(key, []).append(element)
         found = []
         for (name, turned, modes), members in by_material.items():
@@ -286,7 +286,7 @@ class Building:
     def _density(self, element: Element, name: Distributed, place: Place) -> float:
         if name.kind[0] == "B":
             return 1.0
-        material = self._material(element.section)
+        material = self._material(element.given_section)
         if material.density is None:
             raise place.refuse(f"material '{material.name}' has no *DENSITY, so {name.kind} is no force")
         return material.density
@@ -450,7 +450,7 @@ def _friction(law: Interaction, n_steps: int) -> dict[str, Any]:
         return {}
     if len(sticks) > 1:
         raise law.changes[0][1].place.refuse("a stick slope that changes is not supported: give the same one")
-    options = {"friction": largest, "tangential_penalty": sticks.pop()}
+    options: dict[str, Any] = {"friction": largest, "tangential_penalty": sticks.pop()}
     if law.changes:
         points = {**dict(table), float(n_steps): table[-1][1]}
         options["friction_ramp"] = [(time, value / largest) for time, value in sorted(points.items())]
