@@ -8,17 +8,15 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
+from fastcontact.arrays import Array
 from fastcontact.elasticity.relations import Relation, TemporaryRelation
 from fastcontact.model.model import Model
 from fastcontact.model.pretension import locked_lengths
 from fastcontact.results.step import StepResult
-
-Array = NDArray[np.float64]
 
 
 def stage_of(model: Model, last: StepResult | None, begin: float = 0.0) -> Model:

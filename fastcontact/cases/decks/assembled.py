@@ -9,14 +9,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Mask
 from fastcontact.cases.decks.blocks import Place, folded
 from fastcontact.cases.decks.content import Cell, Content, Instance, Members, Part, Section, SurfaceDefinition
 from fastcontact.cases.decks.element_types import ElementType, element_type
 from fastcontact.mesh import elements
 
-Array = NDArray[np.float64]
 # Names of sets that a message lists, and characters that it shows of one.
 SHOWN = 12
 LONGEST = 80
@@ -232,7 +231,7 @@ class Assembled:
             yield element, facets[label]
 
     @cached_property
-    def free(self) -> dict[str, NDArray[np.bool_]]:
+    def free(self) -> dict[str, Mask]:
         """Which faces (n_elements, n_faces), by label, of the solids of each kind no other solid shares."""
         corners, shapes = [], {}
         for name, own in self.by_kind.items():

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.cases.decks.assembled import Element, Face
 from fastcontact.cases.decks.blocks import Place, Row
@@ -18,7 +17,6 @@ from fastcontact.cases.decks.pretension import Locks
 from fastcontact.cases.decks.temperatures import give as give_temperatures
 from fastcontact.cases.decks.temperatures import initial_temperatures
 
-Array = NDArray[np.float64]
 NAMED = {"XSYMM": (1,), "YSYMM": (2,), "ZSYMM": (3,), "ENCASTRE": (1, 2, 3, 4, 5, 6), "PINNED": (1, 2, 3)}
 ROUND_OFF = 1e-9
 # Point and component from 0; of supports on local axes component from 0 and True.

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.cases.decks.content import MultiPoint
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.model.couplings import Term
 
-Array = NDArray[np.float64]
 # Numbers of nodes that the kinds need.
 LEAST = {"PLANE": 4, "STRAIGHT": 3, "MEANROT": 3}
 # Points whose distance from a line or a point is less than this part of their size have no direction from it.

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.cases.decks.assembled import Assembled
 from fastcontact.cases.decks.blocks import Block, Row
@@ -14,7 +13,6 @@ from fastcontact.cases.decks.histories import Histories, shape_of
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
 
-Array = NDArray[np.float64]
 # Coefficients of expansion by type.
 EXPANSIONS = {"ISO": 1, "ORTHO": 3}
 
