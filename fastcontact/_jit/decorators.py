@@ -12,6 +12,7 @@ import os
 from collections.abc import Callable
 from typing import Any
 
+from fastcontact._jit import environment  # isort: skip # noqa: F401 (before Numba)
 import numba
 from numba.core import event
 

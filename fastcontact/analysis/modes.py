@@ -10,11 +10,11 @@ import numpy as np
 from scipy.sparse import bsr_array
 
 from fastcontact._jit import parallel
-from fastcontact.analysis.locked_sections import at_present_length
 from fastcontact.analysis.modal.eigenpairs import lowest
 from fastcontact.analysis.modal.held_contact import held_contact
 from fastcontact.analysis.modal.reduced import Reduced
 from fastcontact.analysis.problem import near_nullspace
+from fastcontact.analysis.stages import at_present_length, stage_of
 from fastcontact.arrays import Array
 from fastcontact.contact.held_motions import HeldMotions
 from fastcontact.elasticity import recovery
@@ -177,6 +177,7 @@ def modes(
             f"the step has displacements of shape {step.displacement.shape}, but the mesh points of shape "
             f"{model.mesh.points.shape}: take a step of this model"
         )
+    model = stage_of(model, step)
     density = Densities([material for material, _ in model.materials], model.material_of_cells())
     field, driven = model.material_field(), model.force_driven
     K = _stiffness(model, step if stress_stiffening else None, field)

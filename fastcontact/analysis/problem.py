@@ -63,6 +63,8 @@ class StepLoad:
         By contact pair, by how much its rigid obstacle has turned, where one does [radian].
     following : tuple of float
         What pressures that follow the surface are multiplied with.
+    friction_factors : dict of str to float
+        By contact pair, what its coefficient of friction is multiplied with, where it changes.
     """
 
     lift: Array
@@ -71,6 +73,7 @@ class StepLoad:
     clearance_factors: Mapping[str, float]
     angles: Mapping[str, float] = field(default_factory=dict)
     following: tuple[float, ...] = ()
+    friction_factors: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +149,7 @@ class Problem:
         prescribed = combined(self.prescribed, self.ramp, instant, self.shape)
         factors = [multiplier(relation.ramp, self.ramp, instant) for relation in self.model.relations]
         lift = self.system.lift(prescribed.ravel(), self.system.values(factors))
-        obstacles, clearances, angles = {}, {}, {}
+        obstacles, clearances, angles, frictions = {}, {}, {}, {}
         for pair in self.model.contact:
             side = self.pairs[pair.name].primary
             if isinstance(side, RigidSide):
@@ -155,9 +158,11 @@ class Problem:
                 angles[pair.name] = angle_at(pair, self.ramp, instant)
             if pair.clearance_ramp is not None:
                 clearances[pair.name] = multiplier(pair.clearance_ramp, self.ramp, instant)
+            if pair.friction_ramp is not None:
+                frictions[pair.name] = multiplier(pair.friction_ramp, self.ramp, instant)
         force = combined(self.forces, self.ramp, instant, self.shape).ravel()
         following = tuple(multiplier(table, self.ramp, instant) for _, table in self.following)
-        return StepLoad(lift, force, obstacles, clearances, angles, following)
+        return StepLoad(lift, force, obstacles, clearances, angles, following, frictions)
 
     def factors(self, histories: Iterable[Temperature | InitialState], instant: float) -> list[float]:
         """Return the load factors of temperatures or initial states at an instant of the ramp [-]."""
@@ -198,6 +203,7 @@ class Problem:
             load.angles.get(name, 0.0),
             state.angles.get(name, 0.0),
             self._worn(name, state),
+            friction_factor=load.friction_factors.get(name, 1.0),
         )
 
     def _worn(self, name: str, state: State) -> Array | None:

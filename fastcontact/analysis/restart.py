@@ -7,7 +7,8 @@ digits, so that an analysis that continues repeats an uninterrupted one bit for 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
@@ -43,10 +44,11 @@ def check(step: StepResult, case: dict[str, Any], model: Model) -> None:
             f"step {step.index} does not hold what it takes to go on from it: resume from the last step that solve "
             "returned, or from a result file of this version of fastcontact; or start anew"
         )
-    then, end = state["case"], step.load_factor
-    parts = different(then["parts"], case["parts"])
-    if _history(then["table"], end, case["table"]) != _history(case["table"], end, then["table"]):
-        parts.append(f"the load history up to {end:g}")
+    with _whole(step):
+        then, end = state["case"], step.load_factor
+        parts = different(then["parts"], case["parts"])
+        if _history(then["table"], end, case["table"]) != _history(case["table"], end, then["table"]):
+            parts.append(f"the load history up to {end:g}")
     if parts:
         raise ModelError(
             f"the steps so far belong to another case; changed since: {', '.join(parts)}. Go on with what they "
@@ -80,12 +82,25 @@ def put_back(problem: Problem, step: StepResult, touched: frozenset[str]) -> Sta
     """
     kept = step.restart
     assert kept is not None
-    if kept["solver"]["kind"] == _kind(problem.solver):
-        problem.solver.put_back(kept["solver"]["memory"])
-    state = State.from_dict(kept, step.displacement, touched)
+    with _whole(step):
+        if kept["solver"]["kind"] == _kind(problem.solver):
+            problem.solver.put_back(kept["solver"]["memory"])
+        state = State.from_dict(kept, step.displacement, touched)
     if not _extrapolates(problem):
         state = replace(state, extrapolation=Extrapolation())
     return replace(state, solver=problem.solver.snapshot())
+
+
+@contextmanager
+def _whole(step: StepResult) -> Iterator[None]:
+    """Turn what restart data that lack a part, or have one of another kind, raise into one sentence."""
+    try:
+        yield
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
+        raise ModelError(
+            f"the restart data of step {step.index} are damaged ({type(error).__name__}: {error}): resume from another file, "
+            "or start anew without resuming"
+        ) from error
 
 
 def _extrapolates(problem: Problem) -> bool:

@@ -9,10 +9,10 @@ from typing import Any
 
 from fastcontact.analysis import restart, step_halving
 from fastcontact.analysis.criteria import Criteria
-from fastcontact.analysis.locked_sections import go_on, locked_before
 from fastcontact.analysis.problem import Problem, prepare
 from fastcontact.analysis.progress import Progress
 from fastcontact.analysis.result_warnings import result_warnings
+from fastcontact.analysis.stages import go_on, stage_of
 from fastcontact.errors import ModelError, warn
 from fastcontact.linear.choice import check_tolerance
 from fastcontact.mesh.argument_types import typed
@@ -165,7 +165,7 @@ def _marched(
     doubtful = model_warnings(model, ramp)
     for text in doubtful if last is None else ():
         warn(text)
-    problem = prepared(locked_before(model, last))
+    problem = prepared(stage_of(model, last, ramp.table[0][0]))
     for text in problem.doubtful if last is None else ():  # now: it may be the reason for an error to come
         warn(text)
     doubtful += problem.doubtful

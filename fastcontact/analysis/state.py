@@ -46,8 +46,9 @@ class State:
         there [pressure].
     first_contact : dict of str to (ndarray (dim,), ndarray (dim,))
         By contact pair in space, where the bodies met first [length] and the normal there [-].
-    locked : dict of str to float
-        By locked pretension section, its shortening from when it was locked [length].
+    locked : dict of str to float or ndarray (m,)
+        By locked pretension section, its shortening from when it was locked [length]; by temporary relation, the values that
+        it began with.
     extrapolation : Extrapolation
         The last two converged steps.
     gap_round_off : float
@@ -81,7 +82,7 @@ class State:
     never_opening: Mapping[str, tuple[Array, Mask]] = field(default_factory=dict)
     first_contact: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
     traction: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
-    locked: Mapping[str, float] = field(default_factory=dict)
+    locked: Mapping[str, Any] = field(default_factory=dict)
     extrapolation: Extrapolation = field(default_factory=Extrapolation)
     largest_force: float = 0.0
     largest_rigid_force: float = 0.0

@@ -316,6 +316,8 @@ def _theories(
     for pair, entry in data.get("theory", {}).items():
         if pairs is not None and pair not in pairs:
             raise CaseError(unknown("contact pair in 'theory'", pair, pairs))
+        if not isinstance(entry, dict):
+            raise CaseError(f"'theory.{pair}' must be a table of keys, kind first, not {entry!r:.80}")
         own = {key: value for key, value in entry.items() if key not in ("mesh_converged", "share")}
         theories[pair] = {"theory": _theory(f"theory.{pair}", own), "share": _share(f"theory.{pair}", entry)}
         if "mesh_converged" in entry:

@@ -58,8 +58,10 @@ def _identity(path: Path) -> object:
 def _check_formats(paths: list[str]) -> None:
     try:
         from matplotlib.backend_bases import FigureCanvasBase
-    except ImportError as error:
-        raise FastcontactError("pictures need matplotlib: pip install 'fastcontact[plot]'") from error
+    except (ImportError, ValueError) as error:
+        from fastcontact.results.plot._axes import without_matplotlib
+
+        raise without_matplotlib(error) from error
     known = FigureCanvasBase.get_supported_filetypes()
     for path in paths:
         if Path(path).suffix[1:].lower() not in known:

@@ -36,6 +36,8 @@ class Configuration:
         Depth worn off at the secondary nodes before the load step [length]; None for nothing.
     rounded : bool
         Whether facet normals turn at rounded edges, see `pairing.pair`.
+    friction_factor : float
+        What the coefficient of friction is multiplied with [-].
     """
 
     displacement: Array
@@ -49,6 +51,7 @@ class Configuration:
     angle_start: float = 0.0
     worn: Array | None = None
     rounded: bool = False
+    friction_factor: float = 1.0
 
     @property
     def stance(self) -> Stance:

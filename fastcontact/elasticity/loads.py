@@ -211,9 +211,9 @@ class BodyForce(VolumeLoad):
 class NodalForce(Load):
     """Components of a force [force] on every node of a group."""
 
-    KIND, CONSTANT = "the nodal force", True
+    KIND = "the nodal force"
     group: str
-    components: Mapping[int, float]
+    components: Components
     ramp: Table | None = None
 
     def _check_place(self, mesh: Mesh, kinematics: str) -> None:
@@ -228,8 +228,9 @@ class NodalForce(Load):
                 )
 
     def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
+        nodes = mesh.points_of(self.group)
         for axis, value in self.components.items():
-            forces[mesh.points_of(self.group), axis] = value
+            forces[nodes, axis] = evaluated(value, mesh.points[nodes], self.name)
 
 
 @dataclass(frozen=True)

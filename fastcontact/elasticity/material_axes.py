@@ -122,7 +122,10 @@ def frames(axes: Axes, points: Array, kinematics: str) -> Array:
             "(0, 1, 0)"
         )
     returned = values_at(axes, points, "the axes of a material", ModelError)
-    found = np.asarray(returned, complex if np.iscomplexobj(returned) else float)
+    try:
+        found = np.asarray(returned, complex if np.iscomplexobj(returned) else float)
+    except (TypeError, ValueError):
+        raise ModelError(f"the function of a material's axes returned {returned!r:.80}, which are no numbers") from None
     if found.shape != (len(points), 3, 3):
         raise ModelError(
             f"the function of a material's axes returned numbers of shape {found.shape} for {len(points)} points: it must "

@@ -39,6 +39,39 @@ class Relation:
 
 
 @dataclass(frozen=True, eq=False)
+class TemporaryRelation(Relation):
+    """A relation of the load steps between two instants, from the values that it finds when it begins.
+
+    Parameters
+    ----------
+    begins, ends : float
+        Ends of load steps [-].
+    keeps : bool
+        Whether it keeps the values that it finds, whatever `value` and `ramp` say; otherwise it goes from there to the next
+        point of its history.
+    """
+
+    begins: float = -np.inf
+    ends: float = np.inf
+    keeps: bool = False
+
+    def acts_from(self, begin: float) -> bool:
+        """Return whether it holds in the load step that begins at an instant."""
+        return self.begins <= begin < self.ends
+
+    def after(self, reached: Array) -> list[Relation]:
+        """Return the relations that it comes to from ``rows @ u``, shape (m,), where it begins [unit of the value]."""
+        if self.keeps:
+            return [Relation(self.name, self.rows, reached, ((0.0, 1.0),))]
+        value, table = np.broadcast_to(self.value, reached.shape), self.ramp or ()
+        later = [[(t, v * factor) for t, factor in table if t > self.begins] for v in value.tolist()]
+        return [
+            Relation(self.name, self.rows[[row]], 1.0, ((self.begins, start), *points))
+            for row, (start, points) in enumerate(zip(reached.tolist(), later, strict=True))
+        ]
+
+
+@dataclass(frozen=True, eq=False)
 class Elimination:
     """``u = T w + S r``, with w zero at the pivots, satisfies ``R u = r`` for every w that meets the conditions.
 

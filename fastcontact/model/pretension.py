@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_array, vstack
@@ -224,7 +225,7 @@ def _across(normal: Array) -> Array:
 
 
 def locked_lengths(
-    sections: Sequence[Pretension], begin: float, displacement: Array, kept: Mapping[str, float]
+    sections: Sequence[Pretension], begin: float, displacement: Array, kept: Mapping[str, Any]
 ) -> dict[str, float]:
     """Return by name the shortenings of the sections that are locked at an instant [length].
 

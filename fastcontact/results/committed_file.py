@@ -69,8 +69,9 @@ class CommittedFile(DriverFile):
         return self._file.read(48)
 
     def intact(self) -> bool:
-        """Return whether the superblock, which changes with every flush, is still as it was written."""
-        self.ours = self.ours and self._read_head() == self._head
+        """Return whether the superblock, which changes with every flush, is as it was written, and nothing is cut off."""
+        cut = os.fstat(self.fileno()).st_size < self._ends[-1]
+        self.ours = self.ours and not cut and self._read_head() == self._head
         return self.ours
 
     @property

@@ -81,6 +81,13 @@ SIDES_STEP = np.dtype([("first", "<i8"), ("count", "<i8")])
 RUN_ROW = np.dtype([("n_steps", "<i8"), ("first", "<i8"), ("count", "<i8")])
 
 
+# What a file must hold beside its steps to be written on.
+CONTINUED = (
+    "fastcontact/runs", "fastcontact/notes", "fastcontact/contact", "VTKHDF/CellData", "VTKHDF/Types", "VTKHDF/Steps/Values",
+    "VTKHDF/Steps/PointDataOffsets", "VTKHDF/Steps/CellDataOffsets",
+)  # fmt: skip
+
+
 def restart_table(number: int) -> str:
     """Return the name of the table for the restart state of a step: two take turns, so that the last one stays whole."""
     return f"restart{number % 2}"

@@ -97,11 +97,11 @@ class Results(Sequence[StepResult]):
             raise FileError(f"'{path}' is no HDF5 file: name a result file that fastcontact wrote (.vtkhdf)")
         # A file object of our own: by its name HDF5 would return a file that this process has open, as it was then.
         self._raw: Any = open(path, "rb")  # noqa: SIM115
-        writes = journal.found(self._raw) if not is_being_written(self.path) or repeat else []
-        if writes:
-            self._raw = io.BufferedReader(journal.Repeated(self._raw, writes))
         self._file: Any = None
         try:
+            writes = journal.found(self._raw) if not is_being_written(self.path) or repeat else []
+            if writes:
+                self._raw = io.BufferedReader(journal.Repeated(self._raw, writes))
             with self._explained():
                 self._file = h5py.File(self._raw, "r")
                 self._read_header(self._checked())
@@ -163,7 +163,7 @@ class Results(Sequence[StepResult]):
     def __getitem__(self, number: int | slice) -> StepResult | list[StepResult]:
         """Return a step by its position, from 0, or from the end if negative; a slice gives a list of steps."""
         if isinstance(number, slice):
-            return [self._read_step(position) for position in range(*number.indices(self._n_steps))]
+            return [self[position] for position in self._positions(number)]
         try:
             number = operator.index(number)
         except TypeError:
@@ -171,6 +171,18 @@ class Results(Sequence[StepResult]):
         if not -self._n_steps <= number < self._n_steps:
             raise IndexError(f"'{self.path}' has {self._n_steps} steps, so there is no step at position {number}")
         return self._read_step(range(self._n_steps)[number])
+
+    def _positions(self, part: slice) -> range:
+        try:
+            return range(*part.indices(self._n_steps))
+        except (TypeError, ValueError) as error:
+            raise FileError(
+                f"{part} of '{self.path}' needs whole numbers, and steps that are not 0 ({error})"
+            ) from None
+
+    def lacks(self, names: Sequence[str]) -> list[str]:
+        """Return which objects of HDF5, by their paths, the file does not hold."""
+        return [name for name in names if name not in self._file]
 
     def __enter__(self) -> Results:
         return self

@@ -15,7 +15,7 @@ ROUND_OFF = 1e-9
 def local_directions(made: Assembled) -> dict[int, Array]:
     """Return the local axes (3, 3), in rows, of the points of all nodes with *TRANSFORM [-]."""
     return {
-        point: local_axes(axes, np.array(made.points[point]))
+        point: local_axes(axes, made.points[point])
         for axes in made.content.axes
         for point in made.nodes(axes.nodes, axes.place)
     }

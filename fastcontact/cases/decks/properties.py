@@ -132,6 +132,17 @@ def interaction(content: Content, block: Block) -> Interaction:
     return content.interactions[folded(name)]
 
 
+def changed_interaction(content: Content, block: Block) -> Interaction:
+    """*CHANGE FRICTION: begins what holds from the current step on, by the *FRICTION below it."""
+    name = block.required("INTERACTION")
+    if folded(name) not in content.interactions:
+        known = ", ".join(own.name for own in content.interactions.values()) or "none"
+        raise block.place.refuse(f"surface interaction '{name}' is not defined; interactions: {known}")
+    changed = Interaction(name, block.place, friction=-1.0)  # which it has to say
+    content.interactions[folded(name)].changes.append((len(content.steps) - 1, changed))
+    return changed
+
+
 def behaviour(content: Content, current: Interaction, block: Block) -> None:
     """*SURFACE BEHAVIOR: hard, or soft with a slope, a table or an exponential law."""
     law = block.choice("PRESSURE-OVERCLOSURE", ("HARD", "LINEAR", "EXPONENTIAL", "TABULAR", "TIED"))

@@ -160,6 +160,8 @@ class Formulation(ABC):
         if self.tied is not None:
             return self.tied.constraints()
         part = self._softened(self.unilateral(at), at)
+        if part.friction is not None and at.friction_factor != 1.0:
+            part = replace(part, friction=at.friction_factor * part.friction)
         if self.options.gap_only:
             return part.without(np.ones(len(part), bool))
         if self.options.search_distance is not None:

@@ -66,6 +66,7 @@ class ModelContact(ModelConnections):
               ``"gap_only"`` watches the gaps, negative where the sides penetrate, and has no forces.
             - ``clearance``: added to the gap, a number or a function from reference positions (n, dim) on the secondary
               side to lengths (n,); positive opens the gap, negative is an interference, as of a press fit [length].
+              ``friction_ramp``: history of the coefficient of friction, as multipliers.
               ``clearance_primary``: the same on the primary side, at the positions faced. ``clearance_ramp``: their
               history, as pairs (instant, multiplier); without one they are there from the beginning.
             - ``surface_smoothing``: whether gaps are those between the smooth surfaces that straight facets of curved sides

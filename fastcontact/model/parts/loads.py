@@ -154,9 +154,9 @@ class ModelLoads(ModelMaterials):
         self,
         group: str,
         *,
-        x: float | None = None,
-        y: float | None = None,
-        z: float | None = None,
+        x: Value | None = None,
+        y: Value | None = None,
+        z: Value | None = None,
         distribute: bool | None = None,
         at: Sequence[float] | None = None,
         weighting: str = "uniform",
@@ -168,8 +168,9 @@ class ModelLoads(ModelMaterials):
         Parameters
         ----------
         group : str
-        x, y, z : float
-            Components. In axisymmetry forces are those over the full circle; on facets a radial one is refused.
+        x, y, z : float or callable
+            Components: numbers, or for nodes functions of position, as in `prescribe`. In axisymmetry forces are those over
+            the full circle; on facets a radial one is refused.
         distribute : bool, optional
             True: the total force, spread as a uniform traction over the facets of the group. False: the force on every
             node of the group. By default True for a group of facets and False for a group of points.

@@ -8,6 +8,7 @@ import struct
 import subprocess
 import sys
 import zlib
+from pathlib import Path
 from types import SimpleNamespace
 
 import h5py
@@ -421,3 +422,14 @@ def test_cells_without_nodes_are_no_cells(shape):
         assert not fc.Mesh(np.zeros((8, 3)), {"hex8": np.empty(shape, int)}).cells
     with pytest.raises(MeshError):
         build_mesh(np.zeros((8, 3)), [Block("hex8", np.empty(shape, int))], {})
+
+
+def test_pages_tell_the_limits_of_meshio():
+    """Both pages that tell them: memory, and seconds for each megabyte."""
+    docs = Path(__file__).parents[4] / "docs" / "reference"
+    gib, times = meshio_process.MEMORY >> 30, meshio_process.MEMORY_PER_BYTE
+    assert f"at most {gib} GiB and {times} bytes for each of their own" in (docs / "promises.md").read_text("utf-8")
+    told = " ".join((docs / "io.md").read_text("utf-8").split())
+    assert f"may take {gib} GiB and {times} times the size of the file of memory" in told
+    each = meshio_process.SECONDS_PER_BYTE * 1e6
+    assert f"and {meshio_process.SECONDS:g} s and {each:g} s for each megabyte of computing time" in told
