@@ -41,6 +41,12 @@ def run(options: argparse.Namespace) -> int:
         deck = read_deck(options.file)
         say("\n".join([*_deck_lines(deck), *_mesh_lines(deck.model.mesh)]))
         return 0
+    if Path(options.file).suffix.lower() == ".toml":
+        from fastcontact.cases.case import read_case
+
+        case = read_case(options.file)
+        say("\n".join([f"{options.file}: {case.title}", repr(case.model), *_mesh_lines(case.mesh)]))
+        return 0
     from fastcontact.mesh.files.mesh_files import read_mesh_report
     from fastcontact.mesh.quality import quality
 
