@@ -14,7 +14,7 @@ HELP = "show what a mesh, deck or result file holds: groups, sizes, steps, itera
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
-    parser.add_argument("file", help="mesh file, deck (.inp), result file (.vtkhdf); with --contacts also a case file")
+    parser.add_argument("file", help="mesh file, case file (.toml), deck (.inp) or result file (.vtkhdf)")
     parser.add_argument("--contacts", action="store_true", help="the surfaces of bodies that face each other instead")
     parser.add_argument(
         "--distance", metavar="LENGTH", type=float, help="the largest gap for --contacts; the size of facets"
