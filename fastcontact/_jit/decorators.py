@@ -83,6 +83,7 @@ def innermost_kernel(function: Callable[..., Any]) -> Any:
 
 def _compile(function: Callable[..., Any], parallel: bool, fastmath: set[str] = AS_WRITTEN, **inlining: Any) -> Any:
     options: dict[str, Any] = {"fastmath": fastmath, "parallel": parallel, "nogil": True, "error_model": "numpy"}
+    options["no_cfunc_wrapper"] = True  # a second entry for C, which nobody calls
     options |= inlining
     try:
         cached = numba.njit(cache=True, **options)(function)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.sparse import bsr_array
@@ -32,6 +32,9 @@ from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.html_table import html_table
 from fastcontact.model.model import Model
 from fastcontact.results.step import StepResult
+
+if TYPE_CHECKING:
+    import pandas
 
 # The shift that makes free bodies regular, by the eigenvalue of a uniform deformation: below those of all but thin bodies.
 SHIFT = 1e-4
@@ -103,7 +106,7 @@ class Modes(Sequence[StepResult]):
             for k, (f, masses) in enumerate(zip(self.frequencies, self.effective_mass))
         ]
 
-    def to_pandas(self) -> Any:
+    def to_pandas(self) -> pandas.DataFrame:
         """Return frequencies and effective masses as a ``pandas.DataFrame``; FileError if pandas is not installed."""
         try:
             import pandas

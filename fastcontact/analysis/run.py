@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
+from fastcontact._jit import ahead
 from fastcontact.analysis import restart, step_halving
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.problem import Problem, prepare
@@ -14,7 +15,7 @@ from fastcontact.analysis.progress import Progress
 from fastcontact.analysis.result_warnings import result_warnings
 from fastcontact.analysis.stages import go_on, stage_of
 from fastcontact.errors import ModelError, warn
-from fastcontact.linear.choice import check_tolerance
+from fastcontact.linear.choice import DIRECT_UP_TO, check_tolerance
 from fastcontact.mesh.argument_types import typed
 from fastcontact.model.model import Model
 from fastcontact.model.model_warnings import model_warnings
@@ -138,6 +139,7 @@ def solve_steps(
     instants = restart.remaining(ramp, last)
     if not instants:
         return iter(())
+    ahead.expect(_kinds(model, linear_solver))
     model.check(ramp)
     prepared = partial(
         prepare, ramp=ramp, criteria=criteria, linear_solver=linear_solver, linear_tolerance=linear_tolerance,
@@ -145,6 +147,13 @@ def solve_steps(
     )  # fmt: skip
     touched = _touched(resume)
     return _marched(model, ramp, prepared, instants, case, last, touched)
+
+
+def _kinds(model: Model, linear_solver: str) -> list[str]:
+    """Return the kinds of runs, as in the table of `_jit.ahead`, whose kernels a model needs."""
+    dim = model.mesh.dim
+    multigrid = linear_solver == "amg" or (linear_solver == "auto" and model.mesh.n_points * dim > DIRECT_UP_TO[dim])
+    return [f"{dim}d", *([f"{dim}d amg"] if multigrid else [])]
 
 
 def _touched(steps: Sequence[StepResult]) -> frozenset[str]:

@@ -67,6 +67,8 @@ def check_keys(where: str, data: Any, known: Mapping[str, Any]) -> None:
             raise CaseError(unknown("key", label, [f"{where}.{k}" if where else k for k in known]))
         kinds = known[key] if isinstance(known[key], tuple | None) else (known[key],)
         if kinds is not None and (not isinstance(value, kinds) or (isinstance(value, bool) and bool not in kinds)):
+            if kinds == (list,) and isinstance(value, dict):
+                raise CaseError(f"there may be several of '{label}': write [[{label}]] in place of [{label}]")
             names = " or ".join(kind.__name__ for kind in kinds)
             raise CaseError(f"the value of '{label}' must be of type {names}, not {repr(value)}")
 

@@ -7,12 +7,14 @@ import os
 import warnings
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fastcontact.cli._results import load_multiplier, pressure_curves
 from fastcontact.cli._terminal import say
 from fastcontact.errors import FastcontactError, FileError
-from fastcontact.results.step import ContactResult, StepResult
+
+if TYPE_CHECKING:
+    from fastcontact.results.step import ContactResult, StepResult
 
 
 def check_outputs(

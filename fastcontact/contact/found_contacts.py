@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,6 +19,9 @@ from fastcontact.mesh.companion_groups import OPPOSITE
 from fastcontact.mesh.html_table import html_table
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import bodies
+
+if TYPE_CHECKING:
+    import pandas
 
 # Sides whose nodes, and bodies whose moduli, differ by less are alike.
 ALIKE = 0.1
@@ -93,7 +96,7 @@ class FoundContacts(Sequence[FoundContact]):
     def _repr_html_(self) -> str:
         return html_table(self._rows("{:.4g}"), _COLUMNS, "Contacts found")
 
-    def to_pandas(self) -> Any:
+    def to_pandas(self) -> pandas.DataFrame:
         """Return the table as a ``pandas.DataFrame``, lengths as numbers; FileError if pandas is not installed."""
         try:
             import pandas

@@ -15,11 +15,11 @@ from one facet to the next, heights are multiplied by the limiter of van Albada,
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csr_array
-from scipy.special import comb
 
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.projection import CORNER
@@ -201,7 +201,8 @@ class _Fit:
     def fitted(self, points: Array, taken: Mask) -> _Fit:
         """Return this one with polynomials fitted to those `points` (n, m, dim) that are `taken` (n, m)."""
         (plane, height), (i, j) = self.in_planes(points), self.powers
-        lower = LOWER ** (i + j) * np.sqrt(comb(i + j, i))  # no direction counts more than others (Bombieri's norm)
+        powers = [math.comb(*pair) for pair in zip(i + j, i)]
+        lower = LOWER ** (i + j) * np.sqrt(powers)  # no direction counts more than others (Bombieri's norm)
         columns = np.where(taken[..., None], lower * _terms(plane, i, j), 0.0)
         rest = np.where(taken, height - _conic(self.curvature, plane), 0.0)
         size = LOWER ** (i + j).max() * np.sqrt(DAMPING * (columns**2).sum(axis=(1, 2)))

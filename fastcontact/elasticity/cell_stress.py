@@ -87,7 +87,7 @@ class CellStress:
             N, dN, _ = element.tables
         else:
             N, dN = np.ascontiguousarray(element.shape(xi)), np.ascontiguousarray(element.gradient(xi))
-        loops, points = element_kernels.loops(self._mesh.dim), self._mesh.points
+        loops, points, cells = element_kernels.loops(self._mesh.dim), self._mesh.points, parallel.read_only(cells)
 
         def part(span: tuple[int, int]) -> None:
             own = slice(*span)

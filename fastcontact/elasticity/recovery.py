@@ -118,7 +118,7 @@ class NodalAverage:
 
         The matrix `extrapolation` (n_nodes, n_q) [-] leads from values at the points to values at the nodes.
         """
-        given = cells, extrapolation, values
+        given = parallel.read_only(cells), extrapolation, values
         into = self._total, self._count
         # For any dimension and number of components.
         parallel.shared(lambda part: element_2d_kernels.add_nodal(*given, *part, *into), self._parts(cells))

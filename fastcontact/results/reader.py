@@ -10,7 +10,7 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
@@ -28,6 +28,9 @@ from fastcontact.results.file_lock import is_being_written
 from fastcontact.results.material_stress import MaterialStress
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.results.texts import read_text
+
+if TYPE_CHECKING:
+    import pandas
 
 
 @typed(FileError)
@@ -239,7 +242,7 @@ class Results(Sequence[StepResult]):
             return conversions.series(self.mesh, self)
         return conversions.grid(self.mesh, step if isinstance(step, StepResult) else self[step])
 
-    def to_pandas(self) -> Any:
+    def to_pandas(self) -> pandas.DataFrame:
         """Return the contact tables of all steps as one ``pandas.DataFrame``.
 
         A row is a secondary node of a contact pair in a step: columns ``step``, ``load_factor``, ``contact``, then those of

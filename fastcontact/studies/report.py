@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from fastcontact.arrays import AnyArray
 from fastcontact.cases.case import Case
@@ -13,6 +13,9 @@ from fastcontact.results.conversions import library
 from fastcontact.results.units import units_of_results
 from fastcontact.studies.render import page
 from fastcontact.studies.render.table import Rows, aligned
+
+if TYPE_CHECKING:
+    import pandas
 
 
 def of_case(case: Case) -> dict[str, Any]:
@@ -85,7 +88,7 @@ class Report:
         """Return the numbers as a structured array (n_rows,)."""
         raise NotImplementedError
 
-    def to_pandas(self) -> Any:
+    def to_pandas(self) -> pandas.DataFrame:
         """Return `table` as a ``pandas.DataFrame``; FileError if pandas is not installed."""
         return library("pandas", "pandas", "pandas").DataFrame(self.table())
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fastcontact._jit import parallel
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.formulations import _cut_faces_kernels
 from fastcontact.contact.formulations._overlap import Coupling, Overlap
@@ -25,6 +26,8 @@ from fastcontact.mesh import elements, quadrature
 FACING = -0.1
 # How far off what faces a facet may be: in distances of the closest primary facet, and radii of the facet itself.
 DISTANCES, RADII = 2.0, 3.0
+# Work on a secondary facet beside that on a node of a cell, for threads.
+EFFORT = 400
 # Highest degree in s and t together of what the mapped shape functions of a facet contain.
 DEGREE = {3: 1, 4: 2, 6: 2, 8: 3, 9: 4}
 
@@ -113,7 +116,7 @@ class _Polygons:
 
 def _facing(ours: _Polygons, theirs: _Polygons, reach: Array) -> Indices:
     """Return the pairs of facets (n, 2) that face each other with a part, in ascending order."""
-    numbers = tree_order(theirs.origin)
+    numbers = tree_order(theirs.origin, 1)
     tree = build(theirs.low[numbers], theirs.high[numbers])
     room = 8 * (len(ours.nodes) + len(theirs.nodes))
     while True:
@@ -138,14 +141,15 @@ def _integrated(
     degree = DEGREE[one.n_nodes] + max(DEGREE[one.n_nodes], DEGREE[other.n_nodes])
     if one.n_nodes == other.n_nodes == 3:  # integrated without error, whichever the first corner
         degree = max(degree, heights[0].shape[1])
-    wrong = _cut_faces_kernels.integrate(
-        ours.nodes, ours.count, ours.origin, ours.axes,
+    given = (
+        np.searchsorted(pairs[:, 0], np.arange(n + 1)), ours.nodes, ours.count, ours.origin, ours.axes,
         to_terms @ ours.nodes, to_terms @ reference[ours.block.facets], to_terms, _middle(one),
         theirs.nodes, theirs.count, other_to_terms @ theirs.nodes, other_to_terms, _middle(other),
         pairs, *quadrature.triangle(min(degree + degree % 2, 8)), *heights, mass, integrals, closer,
     )  # fmt: skip
-    if wrong >= 0:
-        first, second = (side.origin[row] for side, row in zip((ours, theirs), pairs[wrong], strict=True))
+    failed = parallel.shared(lambda part: _cut_faces_kernels.integrate(*part, *given), parallel.portions(n, EFFORT))
+    if max(failed) >= 0:
+        first, second = (side.origin[row] for side, row in zip((ours, theirs), pairs[max(failed)], strict=True))
         raise ContactError(f"the facets near {first} and {second} are too distorted to be cut: improve the mesh there")
     return Coupling(ours.block, theirs.block, pairs, integrals), mass, closer
 

@@ -66,7 +66,7 @@ def closest_of_kinds(points: Array, kinds: Sequence[Array]) -> Closest:
 
 
 def _on_lines(points: Array, corners: Array, found: Closest) -> None:
-    numbers, order = tree_order(corners[:, 0].copy()), tree_order(points, TOGETHER)
+    numbers, order = tree_order(corners[:, 0].copy(), 1), tree_order(points, TOGETHER)
     corners = corners[numbers]
     hull = corners
     if corners.shape[1] == 3:  # a parabola lies in the polygon of its ends and this point (Bezier)
@@ -81,7 +81,7 @@ def _on_lines(points: Array, corners: Array, found: Closest) -> None:
 
 def _on_faces(points: Array, corners: Array, found: Closest) -> None:
     n, kind = len(corners), tables(corners.shape[1])
-    numbers, order = tree_order(corners[:, 0].copy()), tree_order(points, TOGETHER)
+    numbers, order = tree_order(corners[:, 0].copy(), 1), tree_order(points, TOGETHER)
     midst = 0.5 * (corners.min(axis=0).min(axis=0) + corners.max(axis=0).max(axis=0))
     facets = Facets(corners[numbers], midst, np.empty(corners.shape), np.empty(n), np.empty(n))
     low, high = np.empty((n, 3)), np.empty((n, 3))

@@ -133,7 +133,8 @@ def _store(F: Array, low: int, width: int, begins: Offsets, L: Array, d: Array, 
         for k in range(j + 1, size):
             L[at + k - j] = F[j, k]
     for i in range(size - width):
-        rest[i, i:] = F[width + i, width + i :]
+        for k in range(i, size - width):
+            rest[i, k] = F[width + i, width + k]
 
 
 @kernel
