@@ -15,6 +15,7 @@ from scipy.sparse import bsr_array, csr_array, eye_array, kron
 from fastcontact._jit import parallel
 from fastcontact.analysis.active_dofs import ActiveDofs, SurfaceDofs
 from fastcontact.analysis.criteria import Criteria
+from fastcontact.analysis.heat import Heat, prepared_heat
 from fastcontact.analysis.state import State
 from fastcontact.analysis.unsupported_bodies import RigidPosition, UnsupportedBodies
 from fastcontact.analysis.work import Work
@@ -109,6 +110,8 @@ class Problem:
         The solid cells, where they are nonlinear; `system` and `solver` then hold their stiffness before any load.
     following : sequence of (FollowingPressure, ramp table)
         Pressures in finite strain; `forces` hold them as they are before any displacement.
+    heat : Heat, optional
+        Where heat is conducted.
     """
 
     model: Model
@@ -128,6 +131,7 @@ class Problem:
     doubtful: tuple[str, ...] = ()
     bodies: NonlinearBodies | None = None
     following: Sequence[tuple[FollowingPressure, Table | None]] = ()
+    heat: Heat | None = None
 
     @cached_property
     def material_of_cells(self) -> NDArray[np.int32]:
@@ -249,7 +253,13 @@ class Problem:
         """Return the state before the first load step."""
         # Gaps are differences of coordinates and no more accurate than those.
         round_off = 8 * np.finfo(float).eps * float(np.abs(self.model.mesh.points).max())
-        return State(np.zeros(self.force_driven.n_dofs), round_off, solver=self.solver.snapshot(), work=Work())
+        return State(
+            np.zeros(self.force_driven.n_dofs),
+            round_off,
+            solver=self.solver.snapshot(),
+            work=Work(),
+            instant=self.ramp.table[0][0],
+        )
 
 
 @parallel.on_one_blas_thread
@@ -301,6 +311,7 @@ def prepare(
         active_dofs(system, contact_dofs, involved, pairs, bodies, solver),
         contact_dofs, driven, driven.prescribed(prescribed), driven.forces(_forces(model)),
         tuple(doubtful), model.nonlinear_bodies(field), model.following_pressures(),
+        prepared_heat(model, ramp, criteria, linear_solver, solver.tolerance),
     )  # fmt: skip
 
 
