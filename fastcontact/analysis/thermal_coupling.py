@@ -33,6 +33,8 @@ Equilibrium = tuple[SettledContact | None, Array, Balance]
 Solve = Callable[[StepLoad, SettledContact | None], Equilibrium]
 # Exchanges after which heat and contact have no common solution that this finds, and temperatures that are mixed.
 MOST_EXCHANGES, MIXED = 60, 8
+# Sides that are nearer to each other than this touch, in sizes of the model: gaps of bodies at rest scatter by round-off.
+TOUCHING = 1e-9
 # Linear solutions leave temperatures to this many times their tolerance.
 SETTLED = 10.0
 
@@ -132,7 +134,7 @@ def _conducted(problem: Problem, start: State, load: StepLoad, instant: float, f
         if law is None and not pair.options.friction_heat:
             continue
         at = problem.configuration(name, start, load, problem.displacement(u), u)
-        part, force, gap = _pressed(problem, settled, name, rows, at, start.gap_round_off)
+        part, force, gap = _pressed(problem, settled, name, rows, at)
         own = crossing(part, pair.secondary, pair.primary, pair.points.shape)
         if law is not None:
             h, facing = np.zeros(len(gap)), own.area > 0.0
@@ -146,10 +148,11 @@ def _conducted(problem: Problem, start: State, load: StepLoad, instant: float, f
 
 
 def _pressed(
-    problem: Problem, settled: SettledContact, name: str, rows: slice, at: Configuration, touching: float
+    problem: Problem, settled: SettledContact, name: str, rows: slice, at: Configuration
 ) -> tuple[Constraints, Array, Array]:
     """Return the places where a pair touches, normal forces (m,) there [force] and gaps (m,), zero where it does [length]."""
     pair, part, solution = problem.pairs[name], settled.constraints.parts[name], settled.solution
+    touching = TOUCHING * float(np.ptp(pair.points, axis=0).max())
     forces = np.maximum(part.normal_forces(solution.multiplier[rows]), 0.0)
     if pair.options.tied:
         return pair.unilateral(Configuration.undeformed(pair.points)), forces, np.zeros(len(forces))
