@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,8 @@ from fastcontact.model.ramp import Ramp, Table, combined
 from fastcontact.model.rigid_motions import body_name
 
 Array = NDArray[np.float64]
+# Round-off of a sum of powers, in units of the sum of their sizes.
+ROUND_OFF = 16 * float(np.finfo(float).eps)
 ByRamp = Mapping[Table | None, Array]
 
 
@@ -34,13 +37,13 @@ class Temperatures:
         Over the reference [temperature].
     reaction : ndarray (n_points,)
         Heat that prescribed temperatures put into the nodes [power].
-    balance : dict of str to float
+    balance : dict
         See `StepResult.heat` [power].
     """
 
     rise: Array
     reaction: Array
-    balance: dict[str, float]
+    balance: dict[str, Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,14 +124,16 @@ class Heat:
         rise[free] = self._solved(csr_array(A[free][:, free]), f[free] - (A @ rise)[free])
         out = A @ rise - f
         reaction = np.where(self.fixed, out, 0.0)
+        round_off = ROUND_OFF * float((abs(A) @ np.abs(rise)).max())
         rise = P @ rise
         given_off = ambient - self.films @ rise
         largest = max(float(np.abs(part).max()) for part in (reaction, loads, given_off, rubbed, P.T @ (inner @ rise)))
         residual = float(np.abs(out[free]).max(initial=0.0))
-        if residual > self.criteria.relative * largest:
+        if residual > max(self.criteria.relative * largest, round_off):
             raise ConvergenceError(
                 f"the heat {residual:.3g} of a node is out of balance, above {self.criteria.relative:g} of the largest, "
-                f"{largest:.3g}: use the direct solver, or look for conductivities that differ by many orders of magnitude"
+                f"{largest:.3g}: use the direct solver, or look for conductivities that differ by many orders of magnitude",
+                smaller_steps_help=False,
             )
         sums = {"supports": reaction, "loads": loads, "films": given_off, "friction": rubbed}
         return Temperatures(rise, reaction, {**{k: float(v.sum()) for k, v in sums.items()}, "imbalance": residual})

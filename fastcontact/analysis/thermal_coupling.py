@@ -21,9 +21,10 @@ from fastcontact.analysis.heat import Temperatures
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import FrictionalEquilibrium
 from fastcontact.analysis.state import State
-from fastcontact.contact.conductance import Crossing, crossing
+from fastcontact.contact.conductance import crossing
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
+from fastcontact.contact.surface import Surface
 from fastcontact.errors import ConvergenceError
 from fastcontact.model.parts.heat import HEAT_FLUX
 from fastcontact.results.step import StepResult
@@ -126,7 +127,8 @@ def _conducted(problem: Problem, start: State, load: StepLoad, instant: float, f
     settled, u, _ = found
     assert problem.heat is not None
     if settled is None or not problem.heat.depends_on_contact:
-        return Heated(**vars(problem.heat.temperatures(instant)), fluxes={})
+        steady = problem.heat.temperatures(instant)
+        return Heated(steady.rise, steady.reaction, {**steady.balance, "contacts": {}}, {})
     n, solution, laws = problem.model.mesh.n_points, settled.solution, problem.model.conductances()
     matrix, rubbed, crossings = csr_array((n, n)), np.zeros(n), {}
     for name, rows in settled.constraints.rows().items():
@@ -135,16 +137,21 @@ def _conducted(problem: Problem, start: State, load: StepLoad, instant: float, f
             continue
         at = problem.configuration(name, start, load, problem.displacement(u), u)
         part, force, gap = _pressed(problem, settled, name, rows, at)
+        assert isinstance(pair.primary, Surface)
+        assert part.nodal is not None
         own = crossing(part, pair.secondary, pair.primary, pair.points.shape)
         if law is not None:
             h, facing = np.zeros(len(gap)), own.area > 0.0
             h[facing] = law(force[facing] / own.area[facing], gap[facing])
-            matrix, crossings[name] = csr_array(matrix + own.matrix(h)), (own, part, h)
+            matrix, crossings[name] = csr_array(matrix + own.matrix(h)), (own, part.nodal, h)
         if pair.options.friction_heat and isinstance(solution, FrictionalEquilibrium):
             work = np.maximum(-(solution.tangential[rows] * solution.slip[rows]).sum(axis=1), 0.0)
             rubbed += own.shared(pair.options.friction_heat * work / (instant - start.instant))
     steady = problem.heat.temperatures(instant, matrix, rubbed)
-    return Heated(**vars(steady), fluxes={name: _flux(*given, steady.rise) for name, given in crossings.items()})
+    powers = {name: h * own.area * (own.jump @ steady.rise) for name, (own, _, h) in crossings.items()}
+    fluxes = {name: crossings[name][1].over_whole_side(power) for name, power in powers.items()}
+    balance = {**steady.balance, "contacts": {name: float(power.sum()) for name, power in powers.items()}}
+    return Heated(steady.rise, steady.reaction, balance, fluxes)
 
 
 def _pressed(
@@ -162,9 +169,3 @@ def _pressed(
         return part, np.zeros(len(gap)), np.where(gap <= touching, 0.0, gap)
     gap = np.maximum(solution.gap[rows], 0.0)
     return part, forces, np.where(solution.active[rows] | (gap <= touching), 0.0, gap)
-
-
-def _flux(own: Crossing, part: Constraints, h: Array, rise: Array) -> Array:
-    """Return the heat flux at the secondary nodes (n_nodes,) by rises of the temperature (n_points,) [power / area]."""
-    assert part.nodal is not None
-    return part.nodal.over_whole_side(h * own.area * (own.jump @ rise))

@@ -335,12 +335,12 @@ class StepResult:
         return dict(self.iterations.get("work", {}))
 
     @property
-    def heat(self) -> dict[str, float]:
+    def heat(self) -> dict[str, Any]:
         """The balance of heat at the end of the step, positive into the bodies [power]; empty without conduction.
 
         ``supports``, of prescribed temperatures; ``loads``, of fluxes, sources and heat at nodes; ``films``; ``friction``;
-        ``imbalance``, the largest power of a node that nothing balances; ``exchanges``, how many times heat and contact were
-        solved in turn [-].
+        ``imbalance``, the largest power of a node that nothing balances; ``contacts``, what crosses each pair to its primary
+        side; ``exchanges``, how many times heat and contact were solved in turn [-].
         """
         return dict(self.iterations.get("heat", {}))
 

@@ -110,7 +110,8 @@ class ModelHeat(ModelMaterials):
 
         Of nodes that have the same temperature the first one of `same_temperature`. ModelError if two differ at a node.
         """
-        fixed, by_ramp, given = np.zeros(self.mesh.n_points, bool), {}, np.zeros(self.mesh.n_points)
+        fixed, given = np.zeros(self.mesh.n_points, bool), np.zeros(self.mesh.n_points)
+        by_ramp: dict[Table | None, Array] = {}
         owner = np.full(self.mesh.n_points, -1)
         supports = [load for load in self.heat_loads if isinstance(load, FixedTemperature)]
         same = self.same_temperature()
