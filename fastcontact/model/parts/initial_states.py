@@ -215,8 +215,8 @@ class ModelInitialStates(ModelLoads):
     ) -> StressOffset | None:  # fmt: skip
         """Return what stresses have beside those of the displacements, by temperatures and initial states; None without any.
 
-        The factors are those of a step result, `StepResult.iterations`, and so is the `temperature` (n_points,) of conduction
-        [temperature]; `field` is the `material_field`, where it is known.
+        The factors are those of a step result, `StepResult.iterations`; `field` is the `material_field`, where it is known;
+        `temperature` (n_points,) [temperature] that of the step result, where heat is conducted.
         """
         rise, states = self.temperature_rise(temperature_factors), []
         if temperature is not None and self.expands:
@@ -248,7 +248,10 @@ class ModelInitialStates(ModelLoads):
         return by_ramp
 
     def expansion_forces(self, field: MaterialField, rise: Array) -> Array:
-        """Return the nodal forces (n_points, dim) by which a rise of the temperature (n_points,) loads the cells [force]."""
+        """Return the nodal forces (n_points, dim) [force] by which a rise of the temperature expands the cells.
+
+        `rise` (n_points,) [temperature] is over the reference.
+        """
         return self._forces_of(field, field.offset(rise))
 
     def initial_forces_by_ramp(self) -> dict[Table | None, Array]:
