@@ -366,9 +366,9 @@ def cell_points(mesh: Mesh, element: str, cells: Indices, kinematics: str) -> tu
 
 
 def facet_points(mesh: Mesh, element: str, facets: Indices, kinematics: str) -> tuple[Array, Array, Array]:
-    """Return positions (f, q, dim), shape values (q, n) and area vectors (f, q, dim) of the quadrature of facets.
+    """Return positions (f, q, dim) [length], shape values (q, n) [-] and area vectors (f, q, dim) [length^2] of facets.
 
-    Of `facets` (f, n) of int of an element; in axisymmetry over the full circle.
+    At the quadrature points of `facets` (f, n) of int of an element; in axisymmetry over the full circle.
     """
     x, N, J, weights = _mapped(mesh, element, facets)
     if mesh.dim == 2:

@@ -369,7 +369,9 @@ def test_what_cannot_be_is_refused_by_its_name():
     with refused(fc.errors.ContactError, match="no friction that could make it"):
         joined(model, friction_heat=0.5)
     with refused(fc.errors.ContactError, match="a rigid obstacle has no temperature"):
-        model.add_obstacle("o", secondary="UPPER_TOP", obstacle=fc.obstacles.HalfSpace((0, 9), (0, -1)), conductance=1.0)
+        model.add_obstacle(
+            "o", secondary="UPPER_TOP", obstacle=fc.obstacles.HalfSpace((0, 9), (0, -1)), conductance=1.0
+        )
     with refused(fc.errors.ModelError, match="the conductivity"):
         fc.LinearElastic(E=1.0, nu=0.3, conductivity=0.0)
     with refused(fc.errors.ModelError, match="must not be negative"):
