@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import bsr_array, coo_array, csr_array
 
 from fastcontact.analysis.criteria import Criteria
+from fastcontact.arrays import Array, Mask, Numbers
 from fastcontact.errors import ConvergenceError
 from fastcontact.heat.conduction import Conduction
 from fastcontact.heat.loads import Film, Heating
@@ -21,7 +21,6 @@ from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, Table, combined
 from fastcontact.model.rigid_motions import body_name
 
-Array = NDArray[np.float64]
 # Round-off of a sum of powers, in units of the sum of their sizes.
 ROUND_OFF = 16 * float(np.finfo(float).eps)
 ByRamp = Mapping[Table | None, Array]
@@ -77,8 +76,8 @@ class Heat:
     matrix: csr_array
     films: csr_array
     merged: csr_array
-    body: NDArray[np.int32]
-    fixed: NDArray[np.bool_]
+    body: Numbers
+    fixed: Mask
     prescribed: ByRamp
     powers: ByRamp
     ambient: ByRamp

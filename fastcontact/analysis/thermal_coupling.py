@@ -10,7 +10,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from fastcontact._jit.norms_kernels import largest, largest_difference
@@ -21,6 +20,7 @@ from fastcontact.analysis.heat import Temperatures
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import FrictionalEquilibrium
 from fastcontact.analysis.state import State
+from fastcontact.arrays import Array
 from fastcontact.contact.conductance import crossing
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
@@ -29,7 +29,6 @@ from fastcontact.errors import ConvergenceError
 from fastcontact.model.parts.heat import HEAT_FLUX
 from fastcontact.results.step import StepResult
 
-Array = NDArray[np.float64]
 Equilibrium = tuple[SettledContact | None, Array, Balance]
 Solve = Callable[[StepLoad, SettledContact | None], Equilibrium]
 # Exchanges after which heat and contact have no common solution that this finds, and temperatures that are mixed.

@@ -12,16 +12,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 
+from fastcontact.arrays import Array
 from fastcontact.errors import ContactError
 
 if TYPE_CHECKING:
     from fastcontact.contact.constraints import Constraints
     from fastcontact.contact.surface import Surface
 
-Array = NDArray[np.float64]
 TABLES = ("pressure", "gap")
 
 

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.elasticity.energy import cell_volumes, integration_rule
 from fastcontact.elasticity.materials import Material
 from fastcontact.elasticity.stiffness import sparsity
@@ -17,7 +17,6 @@ from fastcontact.errors import ModelError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
-Array = NDArray[np.float64]
 # Numbers of local matrices that are formed at a time.
 AT_ONCE = 2_000_000
 
@@ -39,7 +38,7 @@ class Conduction:
     mesh: Mesh
     kinematics: str
     materials: Sequence[Material]
-    number: Mapping[str, NDArray[np.int32]]
+    number: Mapping[str, Numbers]
 
     def check(self) -> None:
         """Raise ModelError if some of the cells have no conductivity."""
@@ -74,7 +73,7 @@ class Conduction:
             found.append(total / volume.sum(axis=1)[:, None])
         return np.concatenate(found)
 
-    def _cells(self) -> Iterator[tuple[str, NDArray[np.intp]]]:
+    def _cells(self) -> Iterator[tuple[str, Indices]]:
         """Yield elements and numbers (n,) of cells, so many at a time as memory bears."""
         for name, cells in self.mesh.solids.items():
             n_q = len(integration_rule(elements.get(name))[1])
@@ -82,7 +81,7 @@ class Conduction:
             for first in range(0, len(cells), size):
                 yield name, np.arange(first, min(first + size, len(cells)))
 
-    def _at(self, name: str, rows: NDArray[np.intp]) -> tuple[Array, Array, Array]:
+    def _at(self, name: str, rows: Indices) -> tuple[Array, Array, Array]:
         """Return gradients (c, q, n, dim) [1 / length], conductivities (c, q, dim, dim) and volumes (c, q) at the points."""
         mesh, (xi, weights) = self.mesh, integration_rule(elements.get(name))
         N, dN = elements.get(name).shape(xi), elements.get(name).gradient(xi)

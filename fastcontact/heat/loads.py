@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
+from fastcontact.arrays import Array
 from fastcontact.elasticity.loads import (
     Load,
     Table,
@@ -26,8 +26,6 @@ from fastcontact.elasticity.loads import (
 )
 from fastcontact.errors import ModelError
 from fastcontact.mesh.mesh import Mesh
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from fastcontact.arrays import AnyArray, Indices, Mask
 
-def not_reached(body: NDArray[np.integer], held: NDArray[np.bool_], joined: NDArray[np.integer]) -> NDArray[np.intp]:
+
+def not_reached(body: AnyArray, held: Mask, joined: AnyArray) -> Indices:
     """Return the numbers of bodies whose steady temperature nothing determines, ascending.
 
     Parameters

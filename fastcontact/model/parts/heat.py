@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.conductance import Conductance
 from fastcontact.elasticity.loads import Value, check_number, evaluated
 from fastcontact.errors import ModelError
@@ -24,7 +24,6 @@ from fastcontact.model.periodicity import same_place
 from fastcontact.model.ramp import History, Table, table_of
 from fastcontact.model.rigid_motions import body_name
 
-Array = NDArray[np.float64]
 HEAT_FLUX = ("heat_flux_x", "heat_flux_y", "heat_flux_z")
 
 
@@ -99,13 +98,13 @@ class ModelHeat(ModelMaterials):
         """Return the solid cells as conductors of heat."""
         return Conduction(self.mesh, self.kinematics, [m for m, _ in self.materials], self.material_of_cells())
 
-    def same_temperature(self) -> NDArray[np.intp]:
+    def same_temperature(self) -> Indices:
         """Return for each node (n_points,) the first one of the same temperature: ends of periods, sides of sections."""
         cuts = [(cut.nodes, cut.opposite) for cut in self.pretensions]
         found = same_place([*self.seams, *cuts], self.mesh.n_points)  # type: ignore[list-item]
         return np.arange(self.mesh.n_points) if found is None else found
 
-    def fixed_temperatures(self) -> tuple[NDArray[np.bool_], dict[Table | None, Array]]:
+    def fixed_temperatures(self) -> tuple[Mask, dict[Table | None, Array]]:
         """Return which nodes (n_points,) have a prescribed temperature, and by history their rises at multiplier 1.
 
         Of nodes that have the same temperature the first one of `same_temperature`. ModelError if two differ at a node.
