@@ -24,6 +24,7 @@ from fastcontact.analysis.newton import newton
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
 from fastcontact.analysis.step_result import contact_results, counted, recover
+from fastcontact.analysis.thermal_coupling import Heated, expanded, first_rise, settle_heat
 from fastcontact.arrays import Array
 from fastcontact.elasticity.nonlinear_bodies import DeformedBodies
 from fastcontact.linear.protocol import Loaded
@@ -50,7 +51,9 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     ConvergenceError
         If the step does not converge.
     """
-    load = problem.load_at(instant)
+    cold = problem.load_at(instant)
+    rise = first_rise(problem, state, instant)
+    load = expanded(problem, cold, rise)
     problem.solver.put_back(state.solver)
     solved_before = problem.solver.counters.iterations
     loaded = with_loads(problem, load)
@@ -62,24 +65,42 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
         return _ended(
             problem, start, load, found.settled, (found.u, found.balance, iterations), (index, instant), found.bodies
         )
-    settled, u, balanced = equilibrium(problem, start, load, loaded, expected)
+
+    def solve(under: StepLoad, before: SettledContact | None) -> tuple[SettledContact | None, Array, Balance]:
+        right = loaded if under is load else with_loads(problem, under)
+        return _balanced(problem, start, under, right, expected, index, before)
+
+    heated, (settled, u, balanced) = None, solve(load, None)
+    if rise is not None:
+        heated, (settled, u, balanced) = settle_heat(problem, start, cold, instant, rise, (settled, u, balanced), solve)
+    iterations = counted(settled, problem.solver.counters.iterations - solved_before)
+    return _ended(problem, start, load, settled, (u, balanced, iterations), (index, instant), None, heated)
+
+
+def _balanced(
+    problem: Problem, start: State, load: StepLoad, loaded: Loaded, expected: float, index: int,
+    before: SettledContact | None,
+) -> tuple[SettledContact | None, Array, Balance]:  # fmt: skip
+    """Return `equilibrium`, whose balance of forces is within the criterion."""
+    settled, u, balanced = equilibrium(problem, start, load, loaded, expected, before)
     # An iterative solver was too inaccurate: it is asked for more, and goes on from the same contact.
     while balanced.excess > 1.0 and problem.solver.improve(balanced.wanting):
         settled, u, balanced = equilibrium(problem, start, load, with_loads(problem, load), expected, settled)
     balanced.check(index, problem, settled.iterate.history if settled is not None else ())
-    iterations = counted(settled, problem.solver.counters.iterations - solved_before)
-    return _ended(problem, start, load, settled, (u, balanced, iterations), (index, instant), None)
+    return settled, u, balanced
 
 
 def _ended(
     problem: Problem, start: State, load: StepLoad, settled: SettledContact | None,
     solution: tuple[Array, Balance, dict[str, Any]], place: tuple[int, float], bodies: DeformedBodies | None,
+    heated: Heated | None = None,
 ) -> tuple[State, StepResult]:  # fmt: skip
     """Return state and result of a load step, from its displacements, the balance of forces and the iterations."""
     u, balanced, iterations = solution
     end = replace(
         start, u=u, largest_force=balanced.largest, obstacles=problem.obstacles_at(load, u), angles=load.angles,
-        history=start.history if bodies is None else bodies.history,
+        history=start.history if bodies is None else bodies.history, instant=place[1],
+        rise=None if heated is None else heated.rise,
     )  # fmt: skip
     contact: dict[str, ContactResult] = {}
     if settled is not None:
@@ -93,7 +114,8 @@ def _ended(
     if problem.unsupported_bodies is not None and end.rigid is not None:
         iterations["regularised"] = problem.unsupported_bodies.report(end.rigid, end.largest_rigid_force)
     end = replace(end, solver=problem.solver.snapshot())
-    return end, recover(problem, end, contact, balanced.reaction, iterations, place, bodies)
+    result = recover(problem, end, contact, balanced.reaction, iterations, place, bodies)
+    return end, result if heated is None else heated.told(problem, result)
 
 
 def prepare_start(problem: Problem, state: State, load: StepLoad, loaded: Loaded) -> tuple[State, float]:

@@ -216,7 +216,7 @@ def _stiffness(model: Model, step: StepResult | None, field: MaterialField) -> b
     if step is None:
         return K
     temperature, initial = (step.iterations.get(key, ()) for key in ("temperature_factors", "initial_factors"))
-    offset = model.stress_offset(temperature, initial, field)
+    offset = model.stress_offset(temperature, initial, field, step.temperature)
     stresses = CellStress(mesh, kinematics, field.moduli, step.displacement, field.treatment, offset)
     return bsr_array(K + stress_stiffness(mesh, stresses, field.loops, kinematics == "axisymmetric"))
 

@@ -14,6 +14,7 @@ from scipy.sparse import bsr_array, csr_array, eye_array, kron
 from fastcontact._jit import parallel
 from fastcontact.analysis.active_dofs import ActiveDofs, SurfaceDofs
 from fastcontact.analysis.criteria import Criteria
+from fastcontact.analysis.heat import Heat, prepared_heat
 from fastcontact.analysis.state import State
 from fastcontact.analysis.unsupported_bodies import RigidPosition, UnsupportedBodies
 from fastcontact.analysis.work import Work
@@ -113,6 +114,8 @@ class Problem:
         The solid cells, where they are nonlinear; `system` and `solver` then hold their stiffness before any load.
     following : sequence of (FollowingPressure, ramp table)
         Pressures in finite strain; `forces` hold them as they are before any displacement.
+    heat : Heat, optional
+        Where heat is conducted.
     """
 
     model: Model
@@ -133,6 +136,7 @@ class Problem:
     doubtful: tuple[str, ...] = ()
     bodies: NonlinearBodies | None = None
     following: Sequence[tuple[FollowingPressure, Table | None]] = ()
+    heat: Heat | None = None
 
     @cached_property
     def material_of_cells(self) -> Numbers:
@@ -257,7 +261,13 @@ class Problem:
         """Return the state before the first load step."""
         # Gaps are differences of coordinates and no more accurate than those.
         round_off = 8 * np.finfo(float).eps * float(np.abs(self.model.mesh.points).max())
-        return State(np.zeros(self.force_driven.n_dofs), round_off, solver=self.solver_at_rest, work=Work())
+        return State(
+            np.zeros(self.force_driven.n_dofs),
+            round_off,
+            solver=self.solver_at_rest,
+            work=Work(),
+            instant=self.ramp.table[0][0],
+        )
 
 
 @parallel.on_one_blas_thread
@@ -309,6 +319,7 @@ def prepare(
         active_dofs(system, contact_dofs, involved, pairs, bodies, solver),
         contact_dofs, driven, driven.prescribed(prescribed), driven.forces(_forces(model)),
         solver.snapshot(), tuple(doubtful), model.nonlinear_bodies(field), model.following_pressures(),
+        prepared_heat(model, ramp, criteria, linear_solver, solver.tolerance),
     )  # fmt: skip
 
 

@@ -191,7 +191,7 @@ def _large_strain(problem: Problem, last: StepResult) -> Iterator[str]:
 def _large_stress_free_strain(problem: Problem, last: StepResult) -> Iterator[str]:
     """Yield a warning where temperatures or initial states cause large strains, which stresses need not show."""
     model = problem.model
-    if not (model.temperatures or model.initial_states):
+    if not (model.temperatures or model.initial_states or model.conducts):
         return
     moduli = np.eye(problem.field.moduli.shape[1])[None]  # of which stresses are strains
     rows = {name: np.zeros(len(block), np.int32) for name, block in model.mesh.solids.items()}

@@ -122,6 +122,8 @@ def sensitivities(
 def check_asked(model: Model, quantity: Sequence[str | int], parameters: Sequence[Sequence[str | int]]) -> None:
     """Raise ModelError or MeshError if a model has no such quantity or parameter, see `sensitivities`."""
     model.refuse_nonlinear("sensitivities are")
+    if model.conducts:
+        raise ModelError("sensitivities are there without conduction of heat, which depends on the contact")
     check_quantity(model, tuple(quantity))
     for parameter in parameters:
         check_parameter(model, tuple(parameter))

@@ -67,6 +67,10 @@ class State:
         Rigid position of unsupported bodies in the last step.
     history : dict of str to ndarray (n_cells, n_q, 9)
         By solid element of nonlinear bodies, see `constitutive_kernels`; none before the first step.
+    rise : ndarray (n_points,), optional
+        Of the temperature over the reference, where heat is conducted [temperature].
+    instant : float
+        Pseudo-time.
     solver : dict
         All that later solutions owe to earlier ones, see `LinearSolver.snapshot`.
     """
@@ -92,6 +96,8 @@ class State:
     last_change: tuple[int, float] | None = None
     rigid: RigidPosition | None = None
     history: Mapping[str, Array] = field(default_factory=dict)
+    rise: Array | None = None
+    instant: float = 0.0
     solver: Mapping[str, Any] = field(default_factory=dict)
 
     def after_touching(self, pairs: Iterable[str]) -> State:
@@ -114,6 +120,7 @@ class State:
             "work": None if self.work is None else dataclasses.asdict(self.work),
             "forces": {name: vars(own) for name, own in self.forces.items()},
             "history": dict(self.history),
+            **({} if self.rise is None else {"rise": self.rise.copy(), "instant": self.instant}),
             "active": dict(self.active),
             "pressure": dict(self.pressure),
             "pairs": {
@@ -156,6 +163,8 @@ class State:
             u,
             numbers["round_off"],
             history=dict(kept.get("history", {})),
+            rise=kept.get("rise"),
+            instant=kept.get("instant", 0.0),
             active=dict(kept["active"]),
             pressure=dict(kept["pressure"]),
             obstacles={name: now.copy() for name, now in found["now"].items()},

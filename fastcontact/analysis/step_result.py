@@ -48,6 +48,7 @@ def recover(
     )
     factors = {"temperature_factors": temperature, "initial_factors": initial}
     iterations = {**iterations, **{key: found for key, found in factors.items() if found}}
+    heat = None if end.rise is None else problem.model.reference_temperature + end.rise
     sections = problem.model.pretensions
     if sections:
         pulls = [multiplier(own.ramp, problem.ramp, place[1]) for own in sections]
@@ -56,7 +57,7 @@ def recover(
     if bodies is None:
         at_places = recovery.nodal_stress(
             mesh, problem.model.kinematics, problem.field.moduli, problem.field.loops, u, problem.field.treatment,
-            problem.sides, problem.model.stress_offset(temperature, initial, problem.field),
+            problem.sides, problem.model.stress_offset(temperature, initial, problem.field, heat),
         )  # fmt: skip
     else:
         at_places = recovery.averaged_stress(bodies.stress, problem.sides)
@@ -66,6 +67,7 @@ def recover(
         *place, u.copy(), stress, von_mises, recovery.von_mises_signed(stress, von_mises), reaction.reshape(-1, mesh.dim),
         contact, iterations, material_stress=by_material,
         cell_fields={} if bodies is None or problem.bodies is None else problem.bodies.cell_fields(bodies, u),
+        temperature=heat,
     )  # fmt: skip
 
 

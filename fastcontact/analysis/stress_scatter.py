@@ -65,7 +65,7 @@ class StressScatter:
         self._nearly = (nu >= SUSPICIOUS) & (problem.model.kinematics != "plane_stress")
         self.nu = float(nu.max(initial=-1.0))
         heat, initial = (step.iterations.get(key, ()) for key in ("temperature_factors", "initial_factors"))
-        offset = problem.model.stress_offset(heat, initial, field)
+        offset = problem.model.stress_offset(heat, initial, field, step.temperature)
         if not self.elements or offset is not None:  # what heat strains freely has stresses of round-off alone
             return
         given = mesh, problem.model.kinematics, field

@@ -26,16 +26,24 @@ CHECK: dict[str, Any] = {
 LENGTHS = ("radius", "stick_radius", "displacement", "wear_max")
 MOMENTS = ("moment", "torque")
 OF_PAIRS = (
-    *("force", "pressure_max", "radius", "stick_radius", "torque", "wear_max"),
+    *("force", "pressure_max", "radius", "stick_radius", "torque", "wear_max", "heat"),
     *(f"{kind}.{axis}" for kind in ("force", "moment") for axis in _AXES),
 )
 ONLY_IN_SPACE = ("stress.yz", "stress.xz", "displacement.z", "force.z", "moment.x", "moment.y")
 # Quantities of a pair that has an option, and what to do without.
 NEEDED = {
     "torque": ("rotation", "only an obstacle with a 'rotation' has one"),
+    "heat": ("conductance", "only a contact with the option 'conductance' passes any"),
     "wear_max": ("wear", "only a contact with the option 'wear' has one"),
 }
-OF_PROBES = ("pressure", "shear", "von_mises", *(f"stress.{c}" for c in STRESS), *(f"displacement.{a}" for a in _AXES))
+OF_PROBES = (
+    "pressure",
+    "shear",
+    "von_mises",
+    "temperature",
+    *(f"stress.{c}" for c in STRESS),
+    *(f"displacement.{a}" for a in _AXES),
+)
 
 
 @dataclass(frozen=True)
@@ -49,7 +57,7 @@ class Check:
         ``"PROBE.displacement.x"``; or ``"PAIR.force"`` and its component ``"PAIR.force.x"``, on the secondary side;
         ``"PAIR.pressure_max"``; ``"PAIR.radius"`` or ``"PAIR.stick_radius"``, in the middle of their brackets;
         ``"PAIR.moment.z"`` about the middle of the contact; ``"PAIR.torque"`` of a turning obstacle about its axis;
-        ``"PAIR.wear_max"``, the deepest wear.
+        ``"PAIR.wear_max"``, the deepest wear; ``"PAIR.heat"`` that crosses to the primary side, and ``"PROBE.temperature"``.
     tolerance : float
         Of the relative deviation.
     theory : str
@@ -181,8 +189,9 @@ def measured(check: Check, step: StepResult, probes: Mapping[str, int]) -> float
     owner, _, what = check.quantity.partition(".")
     if owner in probes:
         return check.factor * _of_probe(step, probes[owner], what)
-    contact = step.contact[owner]
-    return check.factor * _of_pair(contact, what)
+    if what == "heat":
+        return check.factor * float(step.heat.get("contacts", {}).get(owner, math.nan))
+    return check.factor * _of_pair(step.contact[owner], what)
 
 
 def _of_pair(contact: ContactResult, what: str) -> float:
@@ -209,6 +218,8 @@ def _of_probe(step: StepResult, point: int, what: str) -> float:
         return float(step.displacement[point][_AXES[component]])
     if kind == "von_mises":
         return float(step.von_mises[point])
+    if kind == "temperature":
+        return math.nan if step.temperature is None else float(step.temperature[point])
     found = at_point(step, point)
     if found is None:
         return float("nan")

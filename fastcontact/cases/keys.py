@@ -49,6 +49,7 @@ TOP: dict[str, Any] = {
     "title": str,
     "kinematics": str,
     "strain": str,
+    "reference_temperature": NUMBER,
     "contact": (dict, str),
     **dict.fromkeys(
         ("units", "mesh", "contacts", "obstacle", "ramp", "solve", "probes", "theory", "study", "modes"), dict

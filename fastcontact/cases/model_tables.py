@@ -17,7 +17,7 @@ from fastcontact.contact.obstacles import SHAPES, MeshedSurface, Obstacle
 from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
 from fastcontact.elasticity.initial_states import COMPONENTS
 from fastcontact.elasticity.material_axes import CylindricalAxes
-from fastcontact.elasticity.materials import CONSTANTS, LinearElastic, Material, check_expansion
+from fastcontact.elasticity.materials import CONSTANTS, LinearElastic, Material, check_conductivity, check_expansion
 from fastcontact.elasticity.nonlinear_materials import ElasticPlastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
 from fastcontact.elasticity.varying_constants import Tabulated
 from fastcontact.errors import CaseError, unknown
@@ -32,7 +32,7 @@ from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
 
 # Keys whose values may depend on the position.
-VALUES = ("E", "nu", "G", "density", "expansion", "value", *COMPONENTS)
+VALUES = ("E", "nu", "G", "density", "expansion", "conductivity", "value", "coefficient", "ambient", *COMPONENTS)
 
 
 def _add_material(model: Model, groups: Any = None, **constants: Any) -> None:
@@ -42,6 +42,8 @@ def _add_material(model: Model, groups: Any = None, **constants: Any) -> None:
     if kind is LinearElastic:
         if isinstance(constants.get("expansion"), list):  # no array over cells: case files have tables for that
             check_expansion(constants["expansion"], 1)
+        if isinstance(constants.get("conductivity"), list):
+            check_conductivity(constants["conductivity"], 1)
         constants = {key: float(value) if type(value) is int else value for key, value in constants.items()}
     model.add_material(kind(**constants), groups)
 
@@ -126,6 +128,11 @@ _ADD: dict[str, Callable[..., None]] = {
     "gravity": Model.add_gravity,
     "centrifugal": Model.add_centrifugal,
     "temperature": _add_temperature,
+    "fixed_temperature": Model.fix_temperature,
+    "heat_flux": Model.add_heat_flux,
+    "heat_source": Model.add_heat_source,
+    "nodal_heat": Model.add_nodal_heat,
+    "film": Model.add_film,
     "initial_stress": Model.add_initial_stress,
     "initial_strain": Model.add_initial_strain,
     "force": Model.add_force,
@@ -182,7 +189,7 @@ LISTS: dict[str, tuple[dict[str, Any], Sequence[str]]] = {
     "coupling": _keys(_add_coupling, place=list),
     "material": (
         {
-            **dict.fromkeys(("E", "nu", "expansion"), (*NUMBER, list, dict)),
+            **dict.fromkeys(("E", "nu", "expansion", "conductivity"), (*NUMBER, list, dict)),
             **dict.fromkeys(("G", "D"), list),
             **{"groups": (list, str), "axes": (list, dict), "density": (*NUMBER, dict)},
             **{"volumetric": str, "incompatible_modes": bool, "law": str},
@@ -199,7 +206,13 @@ LISTS: dict[str, tuple[dict[str, Any], Sequence[str]]] = {
 def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Model:
     """Return the model that the parsed `data` of a case file describe; meshes of obstacles lie relative to `folder`."""
     mesh = _with_references(_cut(mesh, data.get("pretension", [])), data.get("coupling", []))
-    model = Model(mesh, data["kinematics"], case_text=text, strain=data.get("strain", "small"))
+    model = Model(
+        mesh,
+        data["kinematics"],
+        case_text=text,
+        strain=data.get("strain", "small"),
+        reference_temperature=float(data.get("reference_temperature", 0.0)),
+    )
     model.units = dict(data.get("units", {}))
     for kind, add in _ADD.items():
         known, needed = LISTS[kind]

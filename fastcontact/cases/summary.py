@@ -60,6 +60,7 @@ def summarise(
         "probes": {name: _probe(last, point) for name, point in case.probes.items()},
         "von_mises_max": {"value": float(last.von_mises[top]), "at": mesh.points[top].tolist()},
         **({"cell_fields": _extremes(last)} if last.cell_fields else {}),
+        **({} if last.temperature is None else {"heat": {**last.heat, "temperature": _range(last.temperature)}}),
         "theory": {
             pair: _against_theory(last.contact[pair], case.approach.get(pair), **theories)
             for pair, theories in case.theories.items()
@@ -147,7 +148,11 @@ def _finite(value: float) -> float | None:
 
 def _extremes(step: StepResult) -> dict[str, list[float]]:
     """Return the smallest and the largest number of the fields of cells."""
-    return {name: [float(values.min()), float(values.max())] for name, values in step.cell_fields.items()}
+    return {name: _range(values) for name, values in step.cell_fields.items()}
+
+
+def _range(values: Any) -> list[float]:
+    return [float(values.min()), float(values.max())]
 
 
 def _probe(step: StepResult, point: int) -> dict[str, Any]:
@@ -212,6 +217,11 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
     found.append(f"  largest von Mises stress {largest} at {with_unit(f'({where})', unit, 'length')}")
     for name, (low, high) in summary.get("cell_fields", {}).items():
         found.append(f"  {name.replace('_', ' ')} of cells from {low:.4g} to {high:.4g}")
+    if heat := summary.get("heat"):
+        powers = ", ".join(f"{name} {heat[name]:.4g}" for name in ("supports", "loads", "films", "friction"))
+        crossing = "".join(f"; across '{name}' {power:.6g}" for name, power in heat["contacts"].items())
+        low, high = heat["temperature"]
+        found.append(f"  temperatures from {low:.6g} to {high:.6g}; heat into the bodies by {powers}{crossing}")
     if summary["regularised"]:
         found.append(_regularised_line(summary["regularised"], unit))
     for name, theory in summary["theory"].items():

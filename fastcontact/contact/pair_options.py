@@ -9,6 +9,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array, diags_array, eye_array
 
 from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.contact.conductance import Conductance
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.contact.pairing import Candidates, Pairing, normals
 from fastcontact.contact.projection import places
@@ -46,6 +47,10 @@ class PairOptions:
     search_distance : float, optional
         What is farther off, or deeper inside, now and as the load step begins, is not faced [length]; None: at any
         distance.
+    conductance : Conductance, optional
+        Of heat that crosses the contact; None: none does.
+    friction_heat : float
+        What part of the work of friction becomes heat [-].
     same_place : ndarray of int (n_points,), optional
         For each node, the one whose multiplier it has, too, where the model repeats itself; None where it does not.
     """
@@ -60,6 +65,8 @@ class PairOptions:
     tangential_penalty: Field | None = None
     search_distance: float | None = None
     wear: float | None = None
+    conductance: Conductance | None = None
+    friction_heat: float = 0.0
     same_place: Indices | None = None
 
     @property

@@ -13,7 +13,14 @@ import numpy as np
 from fastcontact.arrays import Array
 from fastcontact.elasticity.loads import LARGEST
 from fastcontact.elasticity.material_axes import Axes, checked_axes
-from fastcontact.elasticity.materials import Constant, Material, check_density, check_expansion, check_positive
+from fastcontact.elasticity.materials import (
+    Constant,
+    Material,
+    check_conductivity,
+    check_density,
+    check_expansion,
+    check_positive,
+)
 from fastcontact.elasticity.varying_constants import Varying, wrapped
 from fastcontact.errors import ModelError
 from fastcontact.mesh.argument_types import check_type
@@ -53,6 +60,8 @@ class Orthotropic(Material):
         they vary.
     incompatible_modes : bool
         As of `LinearElastic`; by default cells have them.
+    conductivity : float, callable, ndarray (n,) or three of them, optional
+        Of heat, one for all or one along each axis [power / (length temperature)].
 
     Notes
     -----
@@ -73,9 +82,10 @@ class Orthotropic(Material):
     density: Constant | None = None
     expansion: Constant | Sequence[Constant] | None = None
     incompatible_modes: bool = False
+    conductivity: Constant | Sequence[Constant] | None = None
 
     def __post_init__(self) -> None:
-        for name in ("E", "nu", "G", "axes", "density", "expansion"):
+        for name in ("E", "nu", "G", "axes", "density", "expansion", "conductivity"):
             check_type(f"{name} of Orthotropic", getattr(self, name), Any, ModelError)
         for name in ("E", "nu", "G"):
             object.__setattr__(self, name, _three(name, getattr(self, name)))
@@ -181,6 +191,8 @@ class Anisotropic(Material):
         As of `Orthotropic` [1 / temperature].
     incompatible_modes : bool
         As of `LinearElastic`.
+    conductivity : float, callable, ndarray (n,) or three of them, optional
+        As of `Orthotropic` [power / (length temperature)].
     """
 
     D: Any
@@ -188,9 +200,10 @@ class Anisotropic(Material):
     density: Constant | None = None
     expansion: Constant | Sequence[Constant] | None = None
     incompatible_modes: bool = False
+    conductivity: Constant | Sequence[Constant] | None = None
 
     def __post_init__(self) -> None:
-        for name in ("D", "axes", "density", "expansion"):
+        for name in ("D", "axes", "density", "expansion", "conductivity"):
             check_type(f"{name} of Anisotropic", getattr(self, name), Any, ModelError)
         try:
             D = np.empty(0) if np.iscomplexobj(self.D) else np.asarray(self.D, float)
@@ -234,18 +247,21 @@ class Anisotropic(Material):
 
 
 def _take_rest(material: Orthotropic | Anisotropic) -> None:
-    """Check axes, density and expansion of a material, and put them into their form."""
-    expansion = material.expansion
-    if isinstance(expansion, np.ndarray) and expansion.shape == (3,):  # along the axes
-        expansion = tuple(expansion.tolist())
-    for name, value in (("density", wrapped(material.density)), ("expansion", wrapped(expansion, vector=True))):
-        object.__setattr__(material, name, value)
+    """Check axes, density, expansion and conductivity of a material, and put them into their form."""
+    object.__setattr__(material, "density", wrapped(material.density))
+    for name in ("expansion", "conductivity"):
+        value = getattr(material, name)
+        if isinstance(value, np.ndarray) and value.shape == (3,):  # along the axes
+            value = tuple(value.tolist())
+        object.__setattr__(material, name, wrapped(value, vector=True))
     object.__setattr__(material, "axes", checked_axes(material.axes))
     check_density(material.density)
     check_expansion(material.expansion, 3)
-    if isinstance(material.expansion, tuple):
-        own = tuple(v if isinstance(v, Varying) else float(v) for v in material.expansion)
-        object.__setattr__(material, "expansion", own)
+    check_conductivity(material.conductivity, 3)
+    for name in ("expansion", "conductivity"):
+        if isinstance(given := getattr(material, name), tuple):
+            own = tuple(v if isinstance(v, Varying) else float(v) for v in given)
+            object.__setattr__(material, name, own)
 
 
 def _check_modulus(name: str, value: Any) -> None:

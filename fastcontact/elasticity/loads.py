@@ -121,7 +121,7 @@ class Pressure(Load):
     def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
         for element, block in facets_of(mesh, self.group).items():
             facets = outward(mesh, self.group, element, block)
-            x, N, normal = _facet_points(mesh, element, facets, kinematics)
+            x, N, normal = facet_points(mesh, element, facets, kinematics)
             add_density(forces, facets, N, -evaluated(self.value, x, self.name)[:, :, None] * normal)
 
 
@@ -149,7 +149,7 @@ class Traction(Load):
 
     def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
         for element, facets in facets_of(mesh, self.group).items():
-            x, N, normal = _facet_points(mesh, element, facets, kinematics)
+            x, N, normal = facet_points(mesh, element, facets, kinematics)
             add_density(forces, facets, N, _density(self, x, np.linalg.norm(normal, axis=2)))
 
 
@@ -253,7 +253,7 @@ class TotalForce(Load):
     def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
         shares, area = np.zeros((mesh.n_points, 1)), 0.0
         for element, facets in facets_of(mesh, self.group).items():
-            _, N, normal = _facet_points(mesh, element, facets, kinematics)
+            _, N, normal = facet_points(mesh, element, facets, kinematics)
             measure = np.linalg.norm(normal, axis=2)
             add_density(shares, facets, N, measure[:, :, None])
             area += float(measure.sum())
@@ -364,8 +364,11 @@ def cell_points(mesh: Mesh, element: str, cells: Numbers, kinematics: str) -> tu
     return x, N, _turned(np.linalg.det(J) * weights, x, kinematics)
 
 
-def _facet_points(mesh: Mesh, element: str, facets: Numbers, kinematics: str) -> tuple[Array, Array, Array]:
-    """Return positions (f, q, dim), shape values (q, n) and area vectors (f, q, dim) of the quadrature of facets."""
+def facet_points(mesh: Mesh, element: str, facets: Numbers, kinematics: str) -> tuple[Array, Array, Array]:
+    """Return positions (f, q, dim) [length], shape values (q, n) [-] and area vectors (f, q, dim) [length^2] of facets.
+
+    At the quadrature points of `facets` (f, n) of int of an element; in axisymmetry over the full circle.
+    """
     x, N, J, weights = _mapped(mesh, element, facets)
     if mesh.dim == 2:
         normal = np.stack([J[:, :, 1, 0], -J[:, :, 0, 0]], axis=2)

@@ -31,7 +31,7 @@ NEARLY_INCOMPRESSIBLE = 0.49
 ROUND_OFF = 1e-12
 # Constants that may vary, those of the moduli first.
 MODULI = ("E", "nu", "G")
-CONSTANTS = (*MODULI, "density", "expansion")
+CONSTANTS = (*MODULI, "density", "expansion", "conductivity")
 
 
 class Material:
@@ -43,6 +43,8 @@ class Material:
         Mass per volume [mass / length^3].
     expansion : float, Varying, tuple or None
         Coefficients of thermal expansion [1 / temperature].
+    conductivity : float, Varying, tuple or None
+        Of heat, one or three along the axes [power / (length temperature)].
     axes : sequence, callable or None
         Unit vectors in rows (3, 3) [-], or a function, see `Orthotropic`; None: those of the mesh.
     averaged : bool
@@ -54,6 +56,7 @@ class Material:
 
     density: Any
     expansion: Any
+    conductivity: Any = None
     axes: Axes = None
     averaged: bool = False
     incompatible_modes: bool = False
@@ -158,6 +161,8 @@ class Material:
         wrong = np.array(np.broadcast_to(~np.asarray(self.admissible(found), bool), count))
         if found.density is not None:
             wrong |= np.asarray(found.density) < 0.0
+        for own in found.conductivity if isinstance(found.conductivity, tuple) else (found.conductivity,):
+            wrong |= own is not None and ~(np.asarray(own, float) > 0.0)
         if not wrong.any():
             return
         row = int(wrong.argmax())
@@ -229,6 +234,25 @@ class Material:
             )
         return np.asarray(strain[:, :size])
 
+    def conductivity_at(self, points: Array, kinematics: str, constants: Any) -> Array:
+        """Return the conductivity (n, dim, dim) [power / (length temperature)] at `points` (n, dim) [length].
+
+        `constants` are those of `constants_at` there. ModelError if axes that leave the plane turn heat out of it.
+        """
+        given, along, dim = constants.conductivity, np.empty((len(points), 3)), points.shape[1]
+        for axis in range(3):
+            along[:, axis] = given[axis] if isinstance(given, tuple) else given
+        if not isinstance(given, tuple):
+            return np.asarray(along[:, :1, None] * np.eye(dim))
+        axes = frames(self.axes, points, kinematics)
+        tensor = np.einsum("nai,na,naj->nij", axes, along, axes)
+        if np.abs(tensor[:, :dim, dim:]).max(initial=0.0) > ROUND_OFF * along.max(initial=0.0):
+            raise ModelError(
+                f"the conductivity of the material with {self.described} turns heat out of the plane: turn one axis along z, "
+                "or use a mesh in 3D"
+            )
+        return np.asarray(tensor[:, :dim, :dim])
+
     def _compliance6(self, points: Array, kinematics: str, constants: Any) -> Array:
         """Return the compliance (n, 6, 6) in the mesh's axes; ModelError where kinematics of the plane do not hold."""
         if kinematics not in KINEMATICS:
@@ -280,6 +304,16 @@ def check_expansion(value: Any, most: int) -> None:
         raise ModelError(f"the coefficient of thermal expansion = {value} must be {wanted}")
 
 
+def check_conductivity(value: Any, most: int) -> None:
+    """Raise ModelError if a conductivity is given and is neither a positive number nor `most` of them along the axes."""
+    numbers = [value] if not isinstance(value, (Sequence, np.ndarray)) or isinstance(value, str) else list(value)
+    if len(numbers) not in (1, most):
+        raise ModelError(f"the conductivity = {value} must be a number{', or three along the axes' * (most > 1)}")
+    for number in numbers:
+        if not (number is None or isinstance(number, Varying)):
+            check_positive("the conductivity", number)
+
+
 # A number, a function of the position, or numbers for each cell or point; type checkers take what is read for a number.
 if TYPE_CHECKING:
     Constant = Any
@@ -315,6 +349,8 @@ class LinearElastic(Material):
         Whether linear quadrangles and hexahedra have incompatible modes, so that thin parts of them bend without locking in
         shear, and do not lock in volume either; nothing changes in other elements and in axisymmetry. Where they have them
         they have no mean dilatation. They cost three times the assembly and ten times the recovery of stress.
+    conductivity : float, callable or ndarray (n,), optional
+        Of heat [power / (length temperature)], positive; as E.
     """
 
     E: Constant
@@ -323,9 +359,10 @@ class LinearElastic(Material):
     density: Constant | None = None
     expansion: Constant | None = None
     incompatible_modes: bool = False
+    conductivity: Constant | None = None
 
     def __post_init__(self) -> None:
-        for name in ("E", "nu", "density", "expansion"):
+        for name in ("E", "nu", "density", "expansion", "conductivity"):
             object.__setattr__(self, name, wrapped(getattr(self, name)))
         if not isinstance(self.E, Varying):
             check_positive("Young's modulus E", self.E)
@@ -339,6 +376,7 @@ class LinearElastic(Material):
             raise ModelError(unknown("volumetric", self.volumetric, VOLUMETRIC))
         check_density(self.density)
         check_expansion(self.expansion, 1)
+        check_conductivity(self.conductivity, 1)
 
     @property
     def described(self) -> str:

@@ -53,6 +53,9 @@ def sentences(model: Any) -> Iterator[str]:
             yield f"Temperature: {value} over {own.reference:g} in {where}{when}."
             continue
         yield f"Temperature: {value} over {own.reference:g} in {where}{_history(own.ramp)}."
+    for load in model.heat_loads:
+        history = _history(load.ramp)
+        yield f"Heat: {load.name.removeprefix('the ')}: {', '.join(map(_value, load.values))}{history}."
     for state in model.initial_states:
         parts = [f"{COMPONENTS[number]} = {value:g}" for number, value in state.components.items()]
         kind, where = state.name.removeprefix("the initial ").split(" of ", 1)

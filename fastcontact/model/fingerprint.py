@@ -45,12 +45,17 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
         "the loads": _unordered(model.loads, mesh),
         **({"the temperatures": _unordered(model.temperatures, mesh)} if model.temperatures else {}),
         **({"the initial states": _unordered(model.initial_states, mesh)} if model.initial_states else {}),
+        **({"the heat": [model.reference_temperature, _unordered(model.heat_loads, mesh)]} if model.conducts else {}),
+        **{f"the conductance of contact '{name}'": law.sampled for name, law in model.conductances().items()},
         **({"the incompatible modes": bends} if any(bends) else {}),
         "the relations": _unordered(model.relations, mesh),
         "the springs": _unordered(model.springs, mesh),
         **({"the pretension sections": _unordered(model.pretensions, mesh)} if model.pretensions else {}),
         "the list of contact pairs": [pair.name for pair in model.contact],
-        **{f"contact '{pair.name}'": _without(pair, "surface_smoothing") for pair in model.contact},
+        **{
+            f"contact '{pair.name}'": _without(_without(pair, "surface_smoothing"), "conductance")
+            for pair in model.contact
+        },
         **{f"{SMOOTHING} '{pair.name}'": True for pair in model.contact if model.bind(pair).smoothing},
         **{f"the option {name}": value for name, value in (options or {}).items()},
     }

@@ -51,6 +51,8 @@ class Model(ModelSupports):
         ``"finite"``: the bodies may stretch and turn (total Lagrangian): `NeoHookean` and its like, and `LinearElastic` as
         Saint Venant-Kirchhoff's law, for small strains under large rotations. Pressures follow the deformed surface, other
         loads keep their directions and reference areas; stresses are Cauchy's.
+    reference_temperature : float
+        Where heat is conducted: of the bodies before any load, without thermal strain [temperature].
 
     Examples
     --------
@@ -87,9 +89,11 @@ class Model(ModelSupports):
         self._tell_axis()
         forces = self.forces_by_ramp()
         self.thermal_forces_by_ramp()
+        self.check_heat()
         if ramp is not None:
             items: list[Support | Load | Relation | Temperature | InitialState] = [
-                *self.supports, *self.loads, *self.relations, *self.temperatures, *self.initial_states
+                *self.supports, *self.loads, *self.relations, *self.temperatures, *self.initial_states,
+                *self.heat_loads,
             ]  # fmt: skip
             named = [(item.name, item.ramp) for item in items]
             named += [(f"the motion of obstacle '{p.name}'", p.ramp) for p in self.contact]

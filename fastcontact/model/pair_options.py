@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact.contact.conductance import Conductance
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.contact.pair_options import KINDS, Array, Field, Mask, PairOptions
 from fastcontact.contact.surface import Surface
@@ -18,8 +19,8 @@ from fastcontact.model.ramp import Table, table_of
 
 # Options that every contact pair takes, beside those of its formulation.
 SHARED_OPTIONS = (
-    "clearance", "clearance_primary", "clearance_ramp", "excluded", "friction_ramp", "frictionless", "frictionless_along",
-    "kind", "penalty", "search_distance", "tangential_penalty", "wear",
+    "clearance", "clearance_primary", "clearance_ramp", "conductance", "excluded", "friction_ramp", "frictionless",
+    "frictionless_along", "kind", "penalty", "search_distance", "tangential_penalty", "wear",
 )  # fmt: skip
 
 
@@ -33,6 +34,11 @@ def pair_options(
     if against_obstacle and "clearance_primary" in options:
         raise ContactError(
             f"a rigid obstacle has no nodes to measure from: give contact '{name}' the option 'clearance'"
+        )
+    if against_obstacle and {"conductance", "friction_heat"} & set(options):
+        raise ContactError(
+            f"a rigid obstacle has no temperature: give '{side.group}' a film, and contact '{name}' no conductance or "
+            "friction_heat"
         )
     if "clearance_ramp" in options and not {"clearance", "clearance_primary"} & set(options):
         raise ContactError(f"contact '{name}' has a clearance_ramp, but no clearance that it could multiply")
@@ -51,6 +57,8 @@ def pair_options(
         tangential_penalty=_tangential_penalty(name, options.get("tangential_penalty")),
         search_distance=_positive(name, "search_distance", options, "any distance"),
         wear=_positive(name, "wear", options, "none"),
+        conductance=Conductance(name, options["conductance"]) if "conductance" in options else None,
+        friction_heat=_friction_heat(name, options),
     )
 
 
@@ -88,6 +96,17 @@ def _positive(name: str, option: str, options: Mapping[str, Any], without: str) 
     if not value > 0:
         raise ContactError(f"{option} = {value} of contact '{name}' must be positive; leave it out for {without}")
     return float(value)
+
+
+def _friction_heat(name: str, options: Mapping[str, Any]) -> float:
+    """Return what part of the work of friction becomes heat; zero where it is not given."""
+    part = options.get("friction_heat", 0.0)
+    check_number(f"the friction_heat of contact '{name}'", part)
+    if not 0.0 <= part <= 1.0:
+        raise ContactError(f"friction_heat = {part} of contact '{name}' must be a part of the work, between 0 and 1")
+    if part and not options.get("friction"):
+        raise ContactError(f"contact '{name}' has a friction_heat, but no friction that could make it")
+    return float(part)
 
 
 def _vector(name: str, option: str, options: Mapping[str, Any], dim: int) -> Array | None:

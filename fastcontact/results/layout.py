@@ -58,7 +58,13 @@ POINT_FIELDS = {
     "contact_pressure": 1,
     "contact_slip": 3,
     "contact_slip_total": 3,
+    "temperature": 1,
+    "heat_reaction": 1,
 }
+# Those of models that conduct heat alone.
+HEAT_FIELDS = ("temperature", "heat_reaction")
+# Columns of contact tables that only some pairs have.
+OPTIONAL_COLUMNS = ("wear", "heat_flux")
 
 # Cell data of models in which materials meet: the nodal stress on each cell's own side, averaged over its nodes.
 CELL_STRESS = "stress_in_cell"
@@ -93,9 +99,14 @@ def restart_table(number: int) -> str:
     return f"restart{number % 2}"
 
 
-def contact_row(dim: int, wears: bool = False) -> np.dtype[Any]:
-    """Return the type of one row of a contact table: one secondary node in one step; with depth where the pair `wears`."""
-    names = ("abscissa", "place", "gap", "pressure", "multiplier", *(("wear",) if wears else ()))
+def further_columns(contact: ContactResult) -> tuple[str, ...]:
+    """Return the `OPTIONAL_COLUMNS` that a pair has."""
+    return tuple(name for name in OPTIONAL_COLUMNS if getattr(contact, name) is not None)
+
+
+def contact_row(dim: int, further: Iterable[str] = ()) -> np.dtype[Any]:
+    """Return the type of one row of a contact table: one secondary node in one step; with `further_columns` of the pair."""
+    names = ("abscissa", "place", "gap", "pressure", "multiplier", *further)
     scalars = [(name, "<f8") for name in names]
     vectors = [
         (name, "<f8", (dim,)) for name in ("coordinates", "force_vectors", "normal", "shear", "slip", "slip_total")
@@ -192,9 +203,10 @@ def contact_slip(mesh: Mesh, step: StepResult, name: str) -> Array:
 def point_fields(mesh: Mesh, step: StepResult) -> dict[str, Array]:
     """Return the point data of a step by name, padded to the components of `POINT_FIELDS`."""
     values = {name: getattr(step, name) for name in POINT_FIELDS if not name.startswith("contact_")}
+    values = {name: own for name, own in values.items() if own is not None}
     values["contact_pressure"] = contact_pressure(mesh, step)
     values |= {f"contact_{name}": contact_slip(mesh, step, name) for name in ("slip", "slip_total")}
-    return {name: padded(values[name], width) for name, width in POINT_FIELDS.items()}
+    return {name: padded(values[name], width) for name, width in POINT_FIELDS.items() if name in values}
 
 
 def point_flags(mesh: Mesh) -> dict[str, Flags]:
@@ -244,8 +256,10 @@ def check_step(mesh: Mesh, step: StepResult, cell_fields: Iterable[str]) -> None
     """Refuse a step whose arrays do not fit the mesh, or that lacks one of the `cell_fields` that were announced."""
     n, dim = mesh.n_points, mesh.dim
     expected = {"displacement": (n, dim), "reaction": (n, dim), "stress": (n, 4 if dim == 2 else 6)}
-    for name, shape in {**expected, "von_mises": (n,), "von_mises_signed": (n,)}.items():
+    for name, shape in {**expected, **dict.fromkeys(("von_mises", "von_mises_signed", *HEAT_FIELDS), (n,))}.items():
         field = getattr(step, name)
+        if field is None and name in HEAT_FIELDS:
+            continue
         if np.ma.isMaskedArray(field):
             raise FileError(f"step {step.index}: {name} is a masked array, and files keep no masks: fill it first")
         found = np.shape(field)
@@ -265,7 +279,7 @@ def check_step(mesh: Mesh, step: StepResult, cell_fields: Iterable[str]) -> None
 
 def check_contact(where: str, contact: ContactResult, mesh: Mesh) -> None:
     """Refuse the state of a pair whose arrays do not fit one another or name points that are not in the mesh."""
-    row = contact_row(mesh.dim, contact.wear is not None)
+    row = contact_row(mesh.dim, further_columns(contact))
     for name in row.names or ():
         found, shape = np.shape(getattr(contact, name)), (len(contact.points), *row[name].shape)
         if found != shape:

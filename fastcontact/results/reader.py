@@ -304,6 +304,7 @@ class Results(Sequence[StepResult]):
                 cell_fields=self._cell_fields(number),
                 restart=self._restart(number) if number == self._n_steps - 1 else None,
                 material_stress=self._material_stress(number),
+                **{name: self._field(name, number) for name in layout.HEAT_FIELDS if name in self.point_field_names},
             )
 
     def _restart(self, number: int) -> dict[str, Any] | None:

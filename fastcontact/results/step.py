@@ -98,6 +98,9 @@ class ContactResult:
         axisymmetry, in 3D, and on a ring that is pressed all round.
     wear : ndarray (m,), optional
         Depth worn off so far, with the option ``wear`` [length]; the next load step begins with it. None without.
+    heat_flux : ndarray (m,), optional
+        Heat that crosses from the secondary to the primary side by reference area, with the option ``conductance``; its
+        integral over the side is the heat [power / area]. None without.
     slip, slip_total : ndarray (m, dim)
         Relative tangential displacement of closed nodes over what they face, in this step and the sum of all steps so far;
         zero at nodes that friction holds, and for the step at open ones [length]. NaN in files from before it was told.
@@ -134,6 +137,7 @@ class ContactResult:
     wear: Array | None = None
     slip: Array = None  # type: ignore[assignment]
     slip_total: Array = None  # type: ignore[assignment]
+    heat_flux: Array | None = None
 
     def __post_init__(self) -> None:
         if self.middle is None:
@@ -261,6 +265,10 @@ class StepResult:
         Further numbers of every solid cell, in the order of ``mesh.solids``, e.g. an estimated error [unit of the field].
     material_stress : MaterialStress, optional
         The stress of each side at the nodes where materials meet; None where none do.
+    temperature : ndarray (n_points,), optional
+        Where heat is conducted [temperature]; None where it is not.
+    heat_reaction : ndarray (n_points,), optional
+        Heat that prescribed temperatures put into the nodes, zero elsewhere; axisymmetric: over the full circle [power].
     restart : dict, optional
         Restart data for the next step: plain numbers, strings and arrays. Result files keep those of their last step.
     """
@@ -278,6 +286,8 @@ class StepResult:
     cell_fields: dict[str, Array] = field(default_factory=dict)
     restart: dict[str, Any] | None = field(default=None, repr=False)
     material_stress: MaterialStress | None = None
+    temperature: Array | None = None
+    heat_reaction: Array | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "contact", ContactsByName(self.contact))
@@ -322,6 +332,22 @@ class StepResult:
         ``imbalance``, the external work less all others. Empty in files from before it was told, and behind steps of these.
         """
         return dict(self.iterations.get("work", {}))
+
+    @property
+    def heat(self) -> dict[str, Any]:
+        """The balance of heat at the end of the step, positive into the bodies [power]; empty without conduction.
+
+        ``supports``, of prescribed temperatures; ``loads``, of fluxes, sources and heat at nodes; ``films``; ``friction``;
+        ``imbalance``, the largest power of a node that nothing balances; ``contacts``, what crosses each pair to its primary
+        side; ``exchanges``, how many times heat and contact were solved in turn [-].
+        """
+        return dict(self.iterations.get("heat", {}))
+
+    @property
+    def heat_flux(self) -> Array | None:
+        """Mean heat flux (n_solids, dim) of every solid cell [power / area]; None where heat is not conducted."""
+        own = [values for name, values in sorted(self.cell_fields.items()) if name.startswith("heat_flux_")]
+        return np.column_stack(own) if own else None
 
     def stress_of_material(self, number: int) -> Array:
         """Return the nodal stress (n_points, 4) or (n_points, 6) with the side of one material where several meet [pressure].

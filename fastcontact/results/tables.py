@@ -38,6 +38,7 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Any
         ``point``; ``x``, ``y`` (``z``), ``abscissa``, ``radius`` (distance from the middle of the contact), ``place`` (the
         same with a sign, see `ContactResult`), ``gap`` [length]; ``pressure`` [pressure]; ``multiplier`` [force or
         pressure]; ``force_x`` ... [force]; ``shear_x`` ... [pressure]; ``slip_x`` ..., ``slip_total_x`` ... [length];
+        where heat crosses ``heat_flux`` [power / area];
         ``active``, ``sticking`` (true or false). With `step` also ``displacement_x`` ... [length], ``stress_xx`` ...,
         ``normal_stress``, ``von_mises``, ``von_mises_signed`` [pressure].
     """
@@ -52,6 +53,7 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Any
         **_by_axis("shear_", contact.shear),
         **_by_axis("slip_", contact.slip),
         **_by_axis("slip_total_", contact.slip_total),
+        **({} if contact.heat_flux is None else {"heat_flux": contact.heat_flux}),
         "active": contact.active,
         "sticking": contact.sticking,
     }

@@ -28,10 +28,13 @@ ROWS, BYTES = 64, 4096
 SHARED = 4096
 
 
-def write_geometry(file: Any, mesh: Mesh, growing: Sequence[str] = (), material: AnyArray | None = None) -> None:
+def write_geometry(
+    file: Any, mesh: Mesh, growing: Sequence[str] = (), material: AnyArray | None = None, heat: bool = False
+) -> None:
     """Write /VTKHDF with the solid cells, the static arrays, and room for the steps and their `growing` cell fields.
 
-    Where materials meet, `material` (n_solids,) are those of the cells, and each step gets their stress.
+    Steps have `layout.HEAT_FIELDS` with `heat`. Where materials meet, `material` (n_solids,) are those of the cells, and each
+    step gets their stress.
     """
     root = file.create_group("VTKHDF")
     root.attrs["Version"] = np.array([2, 0], np.int64)
@@ -45,7 +48,9 @@ def write_geometry(file: Any, mesh: Mesh, growing: Sequence[str] = (), material:
     _packed(root, "Offsets", cells.offsets)
     _packed(root, "Types", cells.types)
     point_data, cell_data = root.create_group("PointData"), root.create_group("CellData")
-    for name, width in layout.POINT_FIELDS.items():
+    widths = {name: k for name, k in layout.POINT_FIELDS.items() if heat or name not in layout.HEAT_FIELDS}
+    names = tuple(widths)
+    for name, width in widths.items():
         _growing_field(point_data, name, mesh.n_points, width)
     point_flags, cell_fields = layout.point_flags(mesh), layout.cell_fields(mesh)
     for name, values in point_flags.items():
@@ -59,11 +64,11 @@ def write_geometry(file: Any, mesh: Mesh, growing: Sequence[str] = (), material:
         widths |= layout.MATERIAL_FIELDS
     for name, width in widths.items():
         _growing_field(cell_data, name, len(cells.types), width)
-    _write_steps_group(root, point_flags, cell_fields, widths)
+    _write_steps_group(root, names, point_flags, cell_fields, widths)
 
 
 def _write_steps_group(
-    root: Any, static_point: Iterable[str], static_cell: Iterable[str], growing: Iterable[str]
+    root: Any, point: Iterable[str], static_point: Iterable[str], static_cell: Iterable[str], growing: Iterable[str]
 ) -> None:
     """Write the empty step tables; equal ones are one data set under several names."""
     steps = root.create_group("Steps")
@@ -75,7 +80,7 @@ def _write_steps_group(
     steps["CellOffsets"] = growing_table(steps, "ConnectivityIdOffsets", np.int64, width=1)
     point_offsets, cell_offsets = steps.create_group("PointDataOffsets"), steps.create_group("CellDataOffsets")
     rows = growing_table(point_offsets, "displacement", np.int64)
-    for name in layout.POINT_FIELDS:
+    for name in point:
         if name != "displacement":
             point_offsets[name] = rows
     for name in static_point:
@@ -198,7 +203,7 @@ def append_tables(
     own = file["fastcontact"]
     for name in step.contact:
         if name not in pairs:
-            pairs[name] = _new_pair(own["contact"], name, mesh.dim, step.contact[name].wear is not None)
+            pairs[name] = _new_pair(own["contact"], name, mesh.dim, layout.further_columns(step.contact[name]))
     for name, pair in pairs.items():
         _append_contact(pair, number, step.contact.get(name))
     if step.material_stress is not None:
@@ -249,7 +254,7 @@ def header_size(mesh: Mesh) -> int:
 def step_size(mesh: Mesh, step: StepResult) -> int:
     """Return an upper bound for what a step takes in the file, but for its restart state [bytes]."""
     fields = 8 * (sum(layout.POINT_FIELDS.values()) * mesh.n_points + sum(map(np.size, step.cell_fields.values())))
-    row = layout.contact_row(mesh.dim, True).itemsize
+    row = layout.contact_row(mesh.dim, layout.OPTIONAL_COLUMNS).itemsize
     faced = layout.primary_row(mesh.dim).itemsize
     contact = sum(
         (len(pair.points) + 2 * ROWS) * row + (len(pair.primary_points) + 2 * ROWS) * faced + BYTES
@@ -262,10 +267,10 @@ def step_size(mesh: Mesh, step: StepResult) -> int:
     return int(1.01 * fields) + contact + len(as_json([step.iterations, step.warnings]))
 
 
-def _new_pair(parent: Any, name: str, dim: int, wears: bool) -> Any:
+def _new_pair(parent: Any, name: str, dim: int, further: Iterable[str]) -> Any:
     pair = parent.create_group(None)  # without a name until it is whole: the program may be interrupted
     pair["name"] = as_json(name)
-    growing_table(pair, "rows", layout.contact_row(dim, wears))
+    growing_table(pair, "rows", layout.contact_row(dim, further))
     growing_table(pair, "primary", layout.primary_row(dim))
     growing_table(pair, "steps", layout.contact_step(dim))
     parent[str(len(parent))] = pair

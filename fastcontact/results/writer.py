@@ -117,6 +117,7 @@ class ResultWriter:
         background: bool = False,
     ) -> None:
         self._material: Any = None
+        self._heat = bool(getattr(mesh, "conducts", False))
         cell_fields = dict.fromkeys((*getattr(mesh, "cell_fields", ()), *cell_fields))
         if not isinstance(mesh, Mesh):
             if not isinstance(getattr(mesh, "mesh", None), Mesh) or not hasattr(mesh, "kinematics"):
@@ -390,7 +391,7 @@ class ResultWriter:
                 size = write_arrays.header_size(self._mesh) + len(case_text) + MARGIN
                 reserve(probe.fileno(), temporary.parent, 0, size)
             with new_hdf5(temporary) as file:
-                write_arrays.write_geometry(file, self._mesh, self._cell_fields, self._material)
+                write_arrays.write_geometry(file, self._mesh, self._cell_fields, self._material, self._heat)
                 write_arrays.write_own(file, self._mesh, kinematics, case_text)
         # Closed in between because Windows renames no open file; without locks viewers may follow.
         self._open()

@@ -82,7 +82,8 @@ def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
     True
     """
     model.refuse_nonlinear("error estimates are")
-    offset = model.stress_offset(*(step.iterations.get(key, ()) for key in ("temperature_factors", "initial_factors")))
+    heat, initial = (step.iterations.get(key, ()) for key in ("temperature_factors", "initial_factors"))
+    offset = model.stress_offset(heat, initial, temperature=step.temperature)
     smooth = smoothed_stress(model.mesh, model.kinematics, model.material_field(), step.displacement, offset)
     squares, energy = [], 0.0
     for name in model.mesh.solids:

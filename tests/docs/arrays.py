@@ -29,7 +29,9 @@ PACKAGE = Path(fc.__file__).parent
 NAMESPACES = [fc.analytic, fc.generate, fc.obstacles, fc.plot, fc.recovery, fc.topology]
 SIZE = r"(?:\.\.\.|(?:[a-z]\w*|[1-9]\d?)(?: [+*-] (?:[a-z]\w*|[1-9]\d?))*)"
 SHAPE = re.compile(rf"\(\.\.\.\)|\({SIZE},\)|\({SIZE}(?:, {SIZE})+\)")
-UNIT = re.compile(r"\[(?:-|(?:length|force|pressure|energy|radian|degrees|mass|temperature|1 /|units? of)[^\]]*)\]")
+UNIT = re.compile(
+    r"\[(?:-|(?:length|force|pressure|energy|radian|degrees|mass|power|temperature|1 /|units? of)[^\]]*)\]"
+)
 TYPED = re.compile(r"ndarray|array_like|csr_array|bsr_array")
 AFTER = r"((?: \([^)]*\))?(?: of int| of bool|(?: \[[^\]]*\])?))"  # the name of an argument: its shape, its unit
 ROWS = re.compile(r"structured array, one row")  # the units of its columns are another matter

@@ -18,6 +18,7 @@ from fastcontact.elasticity.springs import Springs, stacked
 from fastcontact.elasticity.temperature import Temperature
 from fastcontact.elasticity.varying_constants import Cells
 from fastcontact.errors import ModelError, unknown
+from fastcontact.heat.loads import Film, FixedTemperature, Heating
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
@@ -59,7 +60,15 @@ class ModelBase:
     """Mesh, kinematics, and what was added to them."""
 
     @typed(ModelError)
-    def __init__(self, mesh: Mesh, kinematics: str, case_text: str = "", *, strain: str = "small") -> None:
+    def __init__(
+        self,
+        mesh: Mesh,
+        kinematics: str,
+        case_text: str = "",
+        *,
+        strain: str = "small",
+        reference_temperature: float = 0.0,
+    ) -> None:
         if kinematics not in KINEMATICS:
             raise ModelError(unknown("kinematics", kinematics, KINEMATICS))
         if strain not in STRAINS:
@@ -80,12 +89,14 @@ class ModelBase:
         self.mesh = mesh
         self.kinematics = kinematics
         self.strain = strain
+        self.reference_temperature = reference_temperature
         self.case_text = case_text
         self.units: dict[str, str] = {}  # names of the units of length, force, pressure where they are known
         self.materials: list[tuple[Material, tuple[str, ...] | None]] = []
         self.supports: list[Support] = []
         self.loads: list[Load] = []
         self.temperatures: list[Temperature] = []
+        self.heat_loads: list[FixedTemperature | Heating | Film] = []
         self.initial_states: list[InitialState] = []
         self.relations: list[Relation] = []
         self.related_supports: list[tuple[str, Relation]] = []  # those of the relations that support a group

@@ -84,6 +84,10 @@ class ModelContact(ModelConnections):
               ``"primary"``: all relative motion along the tangents to the primary side is, as in code_aster.
             - ``wear``: Archard's coefficient by hardness: ``coefficient * pressure * slip`` is worn off the secondary side in
               each load step, and the next one begins with it; depths are in the results [1 / pressure].
+            - ``conductance``: of heat that crosses, by area and difference of temperatures: a number, where the sides touch;
+              a function of pressures and gaps (m,); pairs (pressure, conductance); or a mapping of ``"pressure"``, ``"gap"``
+              to pairs. Without one none crosses. ``friction_heat``: what part of the work of friction becomes heat, half of
+              it on each side, with load factors as times [-].
             - ``search_distance``: what is farther off than this, or deeper inside, now and as the load step begins, is not
               faced [length].
             - ``normals``: ``"facet"`` or ``"averaged"`` between the facets that meet at a node at less than 45 degrees, which

@@ -209,13 +209,16 @@ class ModelInitialStates(ModelLoads):
     @typed(ModelError)
     def stress_offset(
         self, temperature_factors: Sequence[float] = (), initial_factors: Sequence[float] = (),
-        field: MaterialField | None = None,
+        field: MaterialField | None = None, temperature: Array | None = None,
     ) -> StressOffset | None:  # fmt: skip
         """Return what stresses have beside those of the displacements, by temperatures and initial states; None without any.
 
-        The factors are those of a step result, `StepResult.iterations`; `field` is the `material_field`, where it is known.
+        The factors are those of a step result, `StepResult.iterations`; `field` is the `material_field`, where it is known;
+        `temperature` (n_points,) [temperature] that of the step result, where heat is conducted.
         """
         rise, states = self.temperature_rise(temperature_factors), []
+        if temperature is not None and self.expands:
+            rise = temperature - self.reference_temperature
         if len(initial_factors):
             states = list(zip(initial_factors, self.initial_states, strict=True))
         if rise is None and not states:
@@ -241,6 +244,13 @@ class ModelInitialStates(ModelLoads):
                 )
             by_ramp[own.ramp] = by_ramp.get(own.ramp, 0.0) + self._forces_of(field, field.offset(rise))
         return by_ramp
+
+    def expansion_forces(self, field: MaterialField, rise: Array) -> Array:
+        """Return the nodal forces (n_points, dim) [force] by which a rise of the temperature expands the cells.
+
+        `rise` (n_points,) [temperature] is over the reference.
+        """
+        return self._forces_of(field, field.offset(rise))
 
     def initial_forces_by_ramp(self) -> dict[Table | None, Array]:
         """Return by history the nodal forces (n_points, dim) of initial stresses and strains at multiplier 1 [force]."""

@@ -27,12 +27,12 @@ from fastcontact.mesh.argument_types import typed
 from fastcontact.model.checks import check_forces
 from fastcontact.model.couplings import Moment
 from fastcontact.model.parts.base import group_names
-from fastcontact.model.parts.materials import ModelMaterials
+from fastcontact.model.parts.heat import ModelHeat
 from fastcontact.model.ramp import History, Table, table_of
 from fastcontact.model.spread_forces import SpreadForce, spread_of
 
 
-class ModelLoads(ModelMaterials):
+class ModelLoads(ModelHeat):
     """A model with loads."""
 
     @typed(ModelError)

@@ -78,6 +78,8 @@ def field_of(mesh: Mesh, step: StepResult, name: str) -> Field:
     if name in SLIPS:
         slip = np.linalg.norm(contact_slip(mesh, step, name.removeprefix("contact_")), axis=1)
         return Field(mesh, np.arange(mesh.n_points, dtype=np.int32), slip, SLIPS[name], "length")
+    if name == "temperature" and step.temperature is not None:
+        return Field(mesh, np.arange(mesh.n_points, dtype=np.int32), step.temperature, name, "")
     if name in step.cell_fields:
         kept, values = np.arange(mesh.n_points, dtype=np.int32), _of_cells(mesh, step.cell_fields[name])
         return Field(mesh, kept, values, CELLS.get(name, name), "")
@@ -85,7 +87,8 @@ def field_of(mesh: Mesh, step: StepResult, name: str) -> Field:
     if name == "von_mises" and apart is mesh:
         return Field(mesh, node, step.von_mises, CAPTIONS[name], "pressure")
     if name not in names(mesh):
-        raise FastcontactError(unknown("field", name, [*names(mesh), *step.cell_fields]))
+        further = [*step.cell_fields, *(["temperature"] if step.temperature is not None else [])]
+        raise FastcontactError(unknown("field", name, [*names(mesh), *further]))
     if name in CAPTIONS:
         return Field(apart, node, OF_STRESS[name](stress), CAPTIONS[name], "pressure")
     component = name.removeprefix("stress.")
@@ -144,6 +147,7 @@ OF_STRESS: dict[str, Callable[[Array], Array]] = {
 CELLS = {
     "plastic_strain": "equivalent plastic strain",
     "yield_ratio": "equivalent stress over yield stress",
+    **{f"heat_flux_{axis}": f"heat flux along {axis}" for axis in AXES},
     "J": "volume over reference volume",
     "logarithmic_strain": "principal logarithmic strain",
 }

@@ -1,0 +1,184 @@
+"""Steady heat of a model, prepared for analysis: temperatures for the conductances that its contacts have at the moment."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.sparse import bsr_array, coo_array, csr_array
+
+from fastcontact.analysis.criteria import Criteria
+from fastcontact.arrays import Array, Mask, Numbers
+from fastcontact.errors import ConvergenceError
+from fastcontact.heat.conduction import Conduction
+from fastcontact.heat.loads import Film, Heating
+from fastcontact.heat.reached import not_reached
+from fastcontact.linear import choice
+from fastcontact.mesh.topology import bodies
+from fastcontact.model.model import Model
+from fastcontact.model.ramp import Ramp, Table, combined
+from fastcontact.model.rigid_motions import body_name
+
+# Round-off of a sum of powers, in units of the sum of their sizes.
+ROUND_OFF = 16 * float(np.finfo(float).eps)
+ByRamp = Mapping[Table | None, Array]
+
+
+@dataclass(frozen=True, eq=False)
+class Temperatures:
+    """Steady temperatures.
+
+    Attributes
+    ----------
+    rise : ndarray (n_points,)
+        Over the reference [temperature].
+    reaction : ndarray (n_points,)
+        Heat that prescribed temperatures put into the nodes [power].
+    balance : dict
+        See `StepResult.heat` [power].
+    """
+
+    rise: Array
+    reaction: Array
+    balance: dict[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Heat:
+    """The conduction of heat of a model, prepared for analysis; temperatures are rises over the reference.
+
+    Attributes
+    ----------
+    model : Model
+    ramp : Ramp
+    criteria : Criteria
+    conduction : Conduction
+    matrix, films : csr_array (n_points, n_points)
+        Of conduction, and of films [power / temperature].
+    merged : csr_array (n_points, n_points)
+        From the temperatures of nodes to those of all that have the same [-].
+    body : ndarray of int (n_points,)
+        Body of each node, -1 for none.
+    fixed : ndarray of bool (n_points,)
+        Merged nodes with a prescribed temperature.
+    prescribed, powers, ambient : dict of ramp table to ndarray (n_points,)
+        By history, at multiplier 1: rises [temperature], powers of loads, and of films by their surroundings [power].
+    linear_solver : str
+    linear_tolerance : float
+    """
+
+    model: Model
+    ramp: Ramp
+    criteria: Criteria
+    conduction: Conduction
+    matrix: csr_array
+    films: csr_array
+    merged: csr_array
+    body: Numbers
+    fixed: Mask
+    prescribed: ByRamp
+    powers: ByRamp
+    ambient: ByRamp
+    linear_solver: str
+    linear_tolerance: float
+
+    @property
+    def depends_on_contact(self) -> bool:
+        """Whether temperatures depend on the contact, not the contact on temperatures alone."""
+        return any({"conductance", "friction_heat"} & set(pair.options) for pair in self.model.contact)
+
+    def temperatures(
+        self, instant: float, contact: csr_array | None = None, friction: Array | None = None
+    ) -> Temperatures:
+        """Return the temperatures at an instant of the ramp.
+
+        Parameters
+        ----------
+        instant : float
+        contact : csr_array (n_points, n_points), optional
+            Matrix of what contacts conduct [power / temperature].
+        friction : ndarray (n_points,), optional
+            Powers of nodes by friction [power].
+
+        Raises
+        ------
+        ConvergenceError
+            If a body is left alone by open contacts, so that nothing determines its temperature, or heat is not in balance.
+        """
+        n = (self.model.mesh.n_points,)
+        rise, loads, ambient = (
+            combined(own, self.ramp, instant, n) for own in (self.prescribed, self.powers, self.ambient)
+        )
+        rubbed = np.zeros(n) if friction is None else friction
+        inner = self.matrix if contact is None else csr_array(self.matrix + contact)
+        self._check_reached(contact)
+        P, power = self.merged, loads + ambient + rubbed
+        A, f = csr_array(P.T @ (inner + self.films) @ P), P.T @ power
+        used = np.zeros(n, bool)
+        used[P.indices] = self.body >= 0
+        free = np.flatnonzero(used & ~self.fixed)
+        rise = np.where(self.fixed, rise, 0.0)
+        rise[free] = self._solved(csr_array(A[free][:, free]), f[free] - (A @ rise)[free])
+        out = A @ rise - f
+        reaction = np.where(self.fixed, out, 0.0)
+        round_off = ROUND_OFF * float((abs(A) @ np.abs(rise)).max())
+        rise = P @ rise
+        given_off = ambient - self.films @ rise
+        largest = max(float(np.abs(part).max()) for part in (reaction, loads, given_off, rubbed, P.T @ (inner @ rise)))
+        residual = float(np.abs(out[free]).max(initial=0.0))
+        if residual > max(self.criteria.relative * largest, round_off):
+            raise ConvergenceError(
+                f"the heat {residual:.3g} of a node is out of balance, above {self.criteria.relative:g} of the largest, "
+                f"{largest:.3g}: use the direct solver, or look for conductivities that differ by many orders of magnitude",
+                smaller_steps_help=False,
+            )
+        sums = {"supports": reaction, "loads": loads, "films": given_off, "friction": rubbed}
+        return Temperatures(rise, reaction, {**{k: float(v.sum()) for k, v in sums.items()}, "imbalance": residual})
+
+    def _solved(self, A: csr_array, f: Array) -> Array:
+        """Return the solution (n,) of ``A x = f``, A symmetric and positive definite."""
+        if not len(f):
+            return f
+        dim = self.model.mesh.dim
+        solver = choice.make(self.linear_solver, dim=dim, n_dofs=len(f), tolerance=self.linear_tolerance)
+        A.sort_indices()
+        solver.prepare(bsr_array((A.data[:, None, None], A.indices, A.indptr), shape=A.shape), np.ones((len(f), 1)))
+        return solver.load(f).full_solution(np.zeros(len(f)))
+
+    def _check_reached(self, contact: csr_array | None) -> None:
+        """Raise ConvergenceError if nothing determines the temperature of a body."""
+        held = self.merged @ self.fixed + self.films.diagonal() > 0.0
+        pairs = coo_array(self.merged if contact is None else self.merged + contact)
+        joined = np.stack([pairs.row, pairs.col], axis=1)[pairs.data != 0.0]
+        alone = not_reached(self.body, held, joined)
+        if len(alone):
+            raise ConvergenceError(
+                f"no heat reaches body {body_name(self.model.mesh, self.body, alone[0])}: its contacts are open or conduct "
+                "nothing in this step, so that nothing determines its temperature; add a film, or a conductance by gap"
+            )
+
+
+def prepared_heat(
+    model: Model, ramp: Ramp, criteria: Criteria, linear_solver: str, linear_tolerance: float
+) -> Heat | None:
+    """Return the heat of a model that was checked before; None where it conducts none."""
+    if not model.conducts:
+        return None
+    mesh, kinematics = model.mesh, model.kinematics
+    conduction, same = model.conduction(), model.same_temperature()
+    n, films = mesh.n_points, csr_array((mesh.n_points,) * 2)
+    powers: dict[Table | None, Array] = {}
+    ambient: dict[Table | None, Array] = {}
+    for load in model.heat_loads:
+        if isinstance(load, Heating):
+            powers[load.ramp] = powers.get(load.ramp, 0.0) + load.power(mesh, kinematics)
+        elif isinstance(load, Film):
+            matrix, power = load.exchange(mesh, kinematics, model.reference_temperature)
+            films, ambient[load.ramp] = csr_array(films + matrix), ambient.get(load.ramp, 0.0) + power
+    merged = csr_array((np.ones(n), same, np.arange(n + 1)), shape=(n, n))
+    return Heat(
+        model, ramp, criteria, conduction, conduction.matrix(), films, merged, bodies(mesh)[1],
+        *model.fixed_temperatures(), powers, ambient, linear_solver, linear_tolerance,
+    )  # fmt: skip

@@ -1,0 +1,170 @@
+"""Heat and contact in turn: temperatures expand bodies, whose contact conducts by its pressures and gaps, until both settle.
+
+Each exchange solves the equilibrium at given temperatures, then the temperatures at the conductances of its contact; the
+temperatures are mixed (Anderson). Where they do not depend on the contact, they are solved once, before it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from fastcontact._jit.norms_kernels import largest, largest_difference
+from fastcontact.analysis.anderson import Anderson
+from fastcontact.analysis.balance import Balance
+from fastcontact.analysis.geometry_loop import SettledContact
+from fastcontact.analysis.heat import Temperatures
+from fastcontact.analysis.problem import Problem, StepLoad
+from fastcontact.analysis.solution import FrictionalEquilibrium
+from fastcontact.analysis.state import State
+from fastcontact.arrays import Array
+from fastcontact.contact.conductance import crossing
+from fastcontact.contact.configuration import Configuration
+from fastcontact.contact.constraints import Constraints
+from fastcontact.contact.surface import Surface
+from fastcontact.errors import ConvergenceError
+from fastcontact.model.parts.heat import HEAT_FLUX
+from fastcontact.results.step import StepResult
+
+Equilibrium = tuple[SettledContact | None, Array, Balance]
+Solve = Callable[[StepLoad, SettledContact | None], Equilibrium]
+# Exchanges after which heat and contact have no common solution that this finds, and temperatures that are mixed.
+MOST_EXCHANGES, MIXED = 60, 8
+# Sides that are nearer to each other than this touch, in sizes of the model: gaps of bodies at rest scatter by round-off.
+TOUCHING = 1e-9
+# Linear solutions leave temperatures to this many times their tolerance.
+SETTLED = 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class Heated(Temperatures):
+    """Temperatures with the heat flux (m,) of contact pairs by name [power / area]."""
+
+    fluxes: dict[str, Array]
+
+    def told(self, problem: Problem, step: StepResult) -> StepResult:
+        """Return the result of a load step with its heat."""
+        assert problem.heat is not None
+        flux = problem.heat.conduction.flux(self.rise)
+        contact = {
+            name: replace(pair, heat_flux=self.fluxes[name]) if name in self.fluxes else pair
+            for name, pair in step.contact.items()
+        }
+        return replace(
+            step, contact=contact, heat_reaction=self.reaction, iterations={**step.iterations, "heat": self.balance},
+            cell_fields={**step.cell_fields, **dict(zip(HEAT_FLUX, flux.T, strict=False))},
+        )  # fmt: skip
+
+
+def first_rise(problem: Problem, state: State, instant: float) -> Array | None:
+    """Return the rise of the temperature (n_points,) to begin a load step with [temperature]; None without heat."""
+    if problem.heat is None:
+        return None
+    if not problem.heat.depends_on_contact:
+        return problem.heat.temperatures(instant).rise
+    return np.zeros(problem.model.mesh.n_points) if state.rise is None else state.rise
+
+
+def settle_heat(
+    problem: Problem, start: State, load: StepLoad, instant: float, rise: Array, found: Equilibrium, solve: Solve
+) -> tuple[Heated, Equilibrium]:
+    """Return the temperatures and the equilibrium of a load step.
+
+    Parameters
+    ----------
+    problem : Problem
+    start : State
+        At the beginning of the step.
+    load : StepLoad
+        At its end, without what heat expands.
+    instant : float
+        Of its end.
+    rise : ndarray (n_points,)
+        Of the temperature, to begin with [temperature].
+    found : (SettledContact or None, ndarray (n_dofs,), Balance)
+        The equilibrium at that temperature.
+    solve : callable
+        From a load and the contact before to the equilibrium.
+
+    Raises
+    ------
+    ConvergenceError
+        If temperatures and contact do not settle.
+    """
+    heat, mixing = problem.heat, Anderson(MIXED, np.arange(len(rise)))
+    assert heat is not None
+    enough = max(problem.criteria.geometry, SETTLED * heat.linear_tolerance)
+    change = np.inf
+    for exchange in range(1, MOST_EXCHANGES + 1):
+        heated = _conducted(problem, start, load, instant, found)
+        change = largest_difference(heated.rise, rise)
+        if change <= enough * largest(heated.rise) or not problem.model.expands:
+            return replace(heated, balance={**heated.balance, "exchanges": exchange}), found
+        rise = mixing.mixed(rise, heated.rise)
+        found = solve(expanded(problem, load, rise), found[0])
+    raise ConvergenceError(
+        f"heat and contact do not settle: after {MOST_EXCHANGES} times temperatures still change by {change:.3g}, as where "
+        "a contact opens by its heat and closes without it; let its conductance fall gradually with the gap, or grow from "
+        "zero with the pressure",
+        found[0].iterate.history if found[0] is not None else (),
+    )
+
+
+def expanded(problem: Problem, load: StepLoad, rise: Array | None) -> StepLoad:
+    """Return a load with the forces by which a rise of the temperature (n_points,) expands the bodies [temperature]."""
+    if rise is None or not problem.model.expands:
+        return load
+    forces = problem.model.expansion_forces(problem.field, rise).ravel()
+    return replace(load, force=load.force + np.pad(forces, (0, len(load.force) - len(forces))))
+
+
+def _conducted(problem: Problem, start: State, load: StepLoad, instant: float, found: Equilibrium) -> Heated:
+    """Return the temperatures at the conductances of the contact."""
+    settled, u, _ = found
+    assert problem.heat is not None
+    if settled is None or not problem.heat.depends_on_contact:
+        steady = problem.heat.temperatures(instant)
+        return Heated(steady.rise, steady.reaction, {**steady.balance, "contacts": {}}, {})
+    n, solution, laws = problem.model.mesh.n_points, settled.solution, problem.model.conductances()
+    matrix, rubbed, crossings = csr_array((n, n)), np.zeros(n), {}
+    for name, rows in settled.constraints.rows().items():
+        pair, law = problem.pairs[name], laws.get(name)
+        if law is None and not pair.options.friction_heat:
+            continue
+        at = problem.configuration(name, start, load, problem.displacement(u), u)
+        part, force, gap = _pressed(problem, settled, name, rows, at)
+        assert isinstance(pair.primary, Surface)
+        assert part.nodal is not None
+        own = crossing(part, pair.secondary, pair.primary, pair.points.shape)
+        if law is not None:
+            h, facing = np.zeros(len(gap)), own.area > 0.0
+            h[facing] = law(force[facing] / own.area[facing], gap[facing])
+            matrix, crossings[name] = csr_array(matrix + own.matrix(h)), (own, part.nodal, h)
+        if pair.options.friction_heat and isinstance(solution, FrictionalEquilibrium):
+            work = np.maximum(-(solution.tangential[rows] * solution.slip[rows]).sum(axis=1), 0.0)
+            rubbed += own.shared(pair.options.friction_heat * work / (instant - start.instant))
+    steady = problem.heat.temperatures(instant, matrix, rubbed)
+    powers = {name: h * own.area * (own.jump @ steady.rise) for name, (own, _, h) in crossings.items()}
+    fluxes = {name: crossings[name][1].over_whole_side(power) for name, power in powers.items()}
+    balance = {**steady.balance, "contacts": {name: float(power.sum()) for name, power in powers.items()}}
+    return Heated(steady.rise, steady.reaction, balance, fluxes)
+
+
+def _pressed(
+    problem: Problem, settled: SettledContact, name: str, rows: slice, at: Configuration
+) -> tuple[Constraints, Array, Array]:
+    """Return the places where a pair touches, normal forces (m,) there [force] and gaps (m,), zero where it does [length]."""
+    pair, part, solution = problem.pairs[name], settled.constraints.parts[name], settled.solution
+    touching = TOUCHING * float(np.ptp(pair.points, axis=0).max())
+    forces = np.maximum(part.normal_forces(solution.multiplier[rows]), 0.0)
+    if pair.options.tied:
+        return pair.unilateral(Configuration.undeformed(pair.points)), forces, np.zeros(len(forces))
+    if pair.options.gap_only:
+        part = pair.unilateral(at)
+        gap = np.maximum(part.gaps(at.displacement), 0.0)
+        return part, np.zeros(len(gap)), np.where(gap <= touching, 0.0, gap)
+    gap = np.maximum(solution.gap[rows], 0.0)
+    return part, forces, np.where(solution.active[rows] | (gap <= touching), 0.0, gap)

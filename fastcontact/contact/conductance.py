@@ -1,0 +1,162 @@
+"""Conductance of a contact: how much heat crosses it by pressure and gap, and between which temperatures.
+
+The heat that crosses at a constraint is ``h * area * (T_secondary - T_primary)``, the temperatures weighted with the
+functions that the constraint weights gaps with: its transpose gives the powers of the nodes. Mortar functions sum to one, so
+that a uniform flux passes between meshes that do not match without error (Hueber and Wohlmuth, 2009, section 3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.sparse import csr_array, diags_array
+
+from fastcontact.arrays import Array
+from fastcontact.errors import ContactError
+
+if TYPE_CHECKING:
+    from fastcontact.contact.constraints import Constraints
+    from fastcontact.contact.surface import Surface
+
+TABLES = ("pressure", "gap")
+
+
+class Conductance:
+    """The heat that crosses a contact by area and difference of temperatures.
+
+    ContactError if it is none.
+
+    Parameters
+    ----------
+    name : str
+        Of the contact pair, for messages.
+    given : float, callable, sequence or mapping
+        A number, where the sides touch; a function of pressures and gaps (m,), also where they are open; pairs (pressure,
+        conductance), where they touch; or a mapping of ``"pressure"`` to such pairs, ``"gap"`` to pairs (gap, conductance)
+        for what is open, without pressures for all [power / (area temperature)].
+    """
+
+    def __init__(self, name: str, given: Any) -> None:
+        self.name, self.given = name, given
+        self._number = float(given) if isinstance(given, (int, float)) and not isinstance(given, bool) else None
+        self._tables: dict[str, Array] = {}
+        if self._number is not None:
+            if not 0.0 <= self._number < np.inf:
+                raise ContactError(f"the conductance {given} of contact '{name}' must be a number, zero or more")
+        elif not callable(given):
+            tables = given if isinstance(given, Mapping) else {"pressure": given}
+            if not tables or not set(tables) <= set(TABLES):
+                raise self._no_table()
+            self._tables = {key: self._table(rows) for key, rows in tables.items()}
+
+    def _table(self, rows: Any) -> Array:
+        try:
+            table = np.array([[float(value) for value in row] for row in rows]).reshape(-1, 2)
+        except (TypeError, ValueError):
+            raise self._no_table() from None
+        if (
+            not len(table)
+            or not np.isfinite(table).all()
+            or not (np.diff(table[:, 0]) > 0.0).all()
+            or table.min() < 0.0
+        ):
+            raise self._no_table()
+        return table
+
+    def _no_table(self) -> ContactError:
+        return ContactError(
+            f"the conductance of contact '{self.name}' must be a number, a function of pressures and gaps, or tables of "
+            "pairs that ascend, none of them negative: [(0.0, 100.0), (10.0, 5000.0)] by pressure, or "
+            '{"pressure": [...], "gap": [...]}'
+        )
+
+    @property
+    def sampled(self) -> Any:
+        """What tells it from others: a number or tables as they are given, values of a function."""
+        if not callable(self.given):
+            return self.given
+        scale = np.concatenate([[0.0], np.logspace(-9, 9, 37)])
+        return [self(scale, np.zeros(len(scale))), self(np.zeros(len(scale)), scale)]
+
+    def __call__(self, pressure: Array, gap: Array) -> Array:
+        """Return conductances (m,) at pressures (m,) [pressure] and gaps (m,), zero where the sides touch [length].
+
+        ContactError if a function returns what is none.
+        """
+        touching = gap == 0.0
+        if self._number is not None:
+            return np.where(touching, self._number, 0.0)
+        if not callable(self.given):
+            by = {
+                key: np.interp(at, *self._tables[key].T)
+                for key, at in zip(TABLES, (pressure, gap))
+                if key in self._tables
+            }
+            closed = by.get("pressure", by.get("gap", 0.0))
+            return np.where(touching, closed, by.get("gap", 0.0))
+        try:
+            found = np.asarray(self.given(pressure, gap), float)
+        except Exception as error:
+            raise ContactError(
+                f"the conductance of contact '{self.name}' fails: {type(error).__name__}: {error}"
+            ) from error
+        found = np.broadcast_to(found, gap.shape) if found.ndim == 0 else found
+        if found.shape != gap.shape or not (np.isfinite(found).all() and (found >= 0.0).all()):
+            raise ContactError(
+                f"the conductance of contact '{self.name}' must return a number from zero on for each pressure and gap, "
+                f"shape {gap.shape}, not shape {found.shape}{'' if found.shape != gap.shape else f', least {found.min():g}'}"
+            )
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Crossing:
+    """Where heat crosses a contact pair.
+
+    Attributes
+    ----------
+    secondary, primary : csr_array (m, n_points)
+        Weights of the temperatures on both sides of each constraint, which sum to one [-].
+    area : ndarray (m,)
+        That it stands for, zero where it faces nothing [area].
+    """
+
+    secondary: csr_array
+    primary: csr_array
+    area: Array
+
+    @property
+    def jump(self) -> csr_array:
+        """Rows (m, n_points) of temperatures of the secondary less those of the primary side [-]."""
+        return csr_array(self.secondary - self.primary)
+
+    def matrix(self, h: Array) -> csr_array:
+        """Return the matrix (n_points, n_points) of conductances `h` (m,) [power / temperature]."""
+        return csr_array(self.jump.T @ diags_array(h * self.area) @ self.jump)
+
+    def shared(self, power: Array) -> Array:
+        """Return the powers (n_points,) of nodes by heat (m,) that is made between the sides, half of it for each [power]."""
+        return np.asarray(0.5 * (self.secondary.T @ power + self.primary.T @ power))
+
+
+def crossing(part: Constraints, secondary: Surface, primary: Surface, shape: tuple[int, ...]) -> Crossing:
+    """Return where heat crosses between two sides by constraints, whose rows weight motions along one normal each.
+
+    `shape` is that of the points of the mesh, (n_points, dim).
+    """
+    n, dim = shape
+    mine = np.zeros(n, bool)
+    mine[secondary.points] = True
+    mine[primary.points] = False
+    by_axis = [csr_array(part.B[:, : n * dim][:, axis::dim]) for axis in range(dim)]
+    normal = np.stack([rows @ mine for rows in by_axis], axis=1)
+    length = np.einsum("md,md->m", normal, normal)
+    scale = normal / np.where(length > 0.0, length, np.inf)[:, None]
+    rows = sum(diags_array(scale[:, axis]) @ by_axis[axis] for axis in range(dim))
+    assert part.areas is not None
+    facing = np.isfinite(part.areas) & (length > 0.0)
+    own = csr_array(rows @ diags_array(mine.astype(float)))
+    return Crossing(own, csr_array(own - rows), np.where(facing, part.areas, 0.0))

@@ -1,0 +1,98 @@
+"""Steady conduction of heat in the solid cells: the matrix of Fourier's law, and the flux that temperatures drive."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from fastcontact.arrays import Array, Indices, Numbers
+from fastcontact.elasticity.energy import cell_volumes, integration_rule
+from fastcontact.elasticity.materials import Material
+from fastcontact.elasticity.stiffness import sparsity
+from fastcontact.elasticity.varying_constants import positions
+from fastcontact.errors import ModelError
+from fastcontact.mesh import elements
+from fastcontact.mesh.mesh import Mesh
+
+# Numbers of local matrices that are formed at a time.
+AT_ONCE = 2_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Conduction:
+    """Solid cells that conduct heat, in the reference configuration.
+
+    Attributes
+    ----------
+    mesh : Mesh
+    kinematics : str
+        In axisymmetry over the full circle, in the plane by unit thickness.
+    materials : sequence of Material
+    number : mapping of str to ndarray of int (n_cells,)
+        By solid element: every cell's material.
+    """
+
+    mesh: Mesh
+    kinematics: str
+    materials: Sequence[Material]
+    number: Mapping[str, Numbers]
+
+    def check(self) -> None:
+        """Raise ModelError if some of the cells have no conductivity."""
+        without = [material.conductivity is None for material in self.materials]
+        missing = sum(int(np.array(without)[numbers].sum()) for numbers in self.number.values())
+        if missing:
+            raise ModelError(
+                f"heat is conducted, but the materials of {missing} solid cells have no conductivity: give them "
+                "conductivity=..."
+            )
+
+    def matrix(self) -> csr_array:
+        """Return the conduction matrix (n_points, n_points): integrals of ``grad N_a . k . grad N_b`` [power / temperature].
+
+        By rules that are exact for constant conductivities on straight cells.
+        """
+        pattern = sparsity(self.mesh)
+        values = np.zeros(len(pattern.indices))
+        for name, rows in self._cells():
+            gradient, k, volume = self._at(name, rows)
+            local = np.einsum("cq,cqai,cqij,cqbj->cab", volume, gradient, k, gradient, optimize=True)
+            values += np.bincount(pattern.slots[name][rows].ravel(), local.ravel(), len(values))
+        return csr_array((values, pattern.indices, pattern.indptr), shape=(self.mesh.n_points,) * 2)
+
+    def flux(self, temperature: Array) -> Array:
+        """Return the mean heat flux (n_solids, dim) of every cell [power / area], by temperatures (n_points,)."""
+        found = []
+        for name, rows in self._cells():
+            gradient, k, volume = self._at(name, rows)
+            slope = np.einsum("cqai,ca->cqi", gradient, temperature[self.mesh.cells[name][rows]])
+            total = -np.einsum("cq,cqij,cqj->ci", volume, k, slope, optimize=True)
+            found.append(total / volume.sum(axis=1)[:, None])
+        return np.concatenate(found)
+
+    def _cells(self) -> Iterator[tuple[str, Indices]]:
+        """Yield elements and numbers (n,) of cells, so many at a time as memory bears."""
+        for name, cells in self.mesh.solids.items():
+            n_q = len(integration_rule(elements.get(name))[1])
+            size = max(1, AT_ONCE // (cells.shape[1] * max(n_q, cells.shape[1])))
+            for first in range(0, len(cells), size):
+                yield name, np.arange(first, min(first + size, len(cells)))
+
+    def _at(self, name: str, rows: Indices) -> tuple[Array, Array, Array]:
+        """Return gradients (c, q, n, dim) [1 / length], conductivities (c, q, dim, dim) and volumes (c, q) at the points."""
+        mesh, (xi, weights) = self.mesh, integration_rule(elements.get(name))
+        N, dN = elements.get(name).shape(xi), elements.get(name).gradient(xi)
+        nodes = mesh.cells[name][rows]
+        slopes = np.einsum("qak,cad->cqdk", dN, mesh.points[nodes], optimize=True)
+        gradient = np.einsum("qak,cqkd->cqad", dN, np.linalg.inv(slopes), optimize=True)
+        volume = cell_volumes(mesh.points[nodes], N, dN, self.kinematics == "axisymmetric") * weights
+        k, own = np.zeros((*volume.shape, mesh.dim, mesh.dim)), self.number[name][rows]
+        for index in np.unique(own):
+            cells = np.flatnonzero(own == index)
+            constants = self.materials[index].constants_at(name, rows[cells], N)
+            at = self.materials[index].conductivity_at(positions(mesh, nodes[cells], N), self.kinematics, constants)
+            k[cells] = at.reshape(len(cells), *k.shape[1:])
+        return gradient, k, volume

@@ -1,0 +1,159 @@
+"""What heats or cools solid cells: prescribed temperatures, fluxes, films, sources, heat at nodes.
+
+Powers of nodes are integrals with the shape functions, in axisymmetry over the full circle, in the plane by unit thickness.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from scipy.sparse import coo_array, csr_array
+
+from fastcontact.arrays import Array
+from fastcontact.elasticity.loads import (
+    Load,
+    Table,
+    Value,
+    VolumeLoad,
+    add_density,
+    cell_points,
+    evaluated,
+    facet_points,
+    facets_of,
+)
+from fastcontact.errors import ModelError
+from fastcontact.mesh.mesh import Mesh
+
+
+@dataclass(frozen=True)
+class FixedTemperature(Load):
+    """A prescribed temperature of the nodes of a group [temperature]; histories multiply its rise over the reference."""
+
+    KIND = "the temperature"
+    group: str
+    value: Value
+    ramp: Table | None = None
+
+    @property
+    def values(self) -> list[Value]:
+        """The temperature alone."""
+        return [self.value]
+
+    def _check_place(self, mesh: Mesh, kinematics: str) -> None:
+        if not len(mesh.points_of(self.group)):
+            raise ModelError(f"group '{self.group}' is empty: no temperature can be prescribed on it")
+
+
+class Heating(Load):
+    """A load of heat that does not depend on the temperature."""
+
+    value: Value
+
+    @property
+    def values(self) -> list[Value]:
+        """Its value alone."""
+        return [self.value]
+
+    def power(self, mesh: Mesh, kinematics: str) -> Array:
+        """Return the powers (n_points,) of the nodes at multiplier 1, positive into the body [power]."""
+        total = np.zeros((mesh.n_points, 1))
+        self._add_to(total, mesh, kinematics)
+        return total[:, 0]
+
+
+@dataclass(frozen=True)
+class HeatFlux(Heating):
+    """A heat flux [power / area] into the body through a group of facets."""
+
+    KIND = "the heat flux"
+    group: str
+    value: Value
+    ramp: Table | None = None
+
+    def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
+        for element, facets in facets_of(mesh, self.group).items():
+            x, N, normal = facet_points(mesh, element, facets, kinematics)
+            density = evaluated(self.value, x, self.name) * np.linalg.norm(normal, axis=2)
+            add_density(forces, facets, N, density[:, :, None])
+
+
+@dataclass(frozen=True)
+class HeatSource(VolumeLoad, Heating):
+    """Heat by volume [power / length^3] in groups of solid cells, or in all."""
+
+    KIND = "the heat source"
+    groups: tuple[str, ...] | None
+    value: Value
+    ramp: Table | None = None
+
+    def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
+        for element, cells in self.cells(mesh):
+            x, N, volume = cell_points(mesh, element, cells, kinematics)
+            add_density(forces, cells, N, (evaluated(self.value, x, self.name) * volume)[:, :, None])
+
+
+@dataclass(frozen=True)
+class NodalHeat(Heating):
+    """Heat [power] at every node of a group."""
+
+    KIND, CONSTANT = "the heat at nodes", True
+    group: str
+    value: float
+    ramp: Table | None = None
+
+    def _check_place(self, mesh: Mesh, kinematics: str) -> None:
+        if not len(mesh.points_of(self.group)):
+            raise ModelError(f"group '{self.group}' is empty: nothing can heat it")
+
+    def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
+        forces[mesh.points_of(self.group), 0] = self.value
+
+
+@dataclass(frozen=True)
+class Film(Load):
+    """Convection from a group of facets into surroundings: ``coefficient * (temperature - ambient)`` [power / area].
+
+    Attributes
+    ----------
+    group : str
+    coefficient : float or callable
+        [power / (area temperature)].
+    ambient : float or callable
+        Temperature of the surroundings [temperature]; histories multiply its rise over the reference.
+    """
+
+    KIND: ClassVar[str] = "the film"
+    group: str
+    coefficient: Value
+    ambient: Value
+    ramp: Table | None = None
+
+    @property
+    def values(self) -> Sequence[Value]:  # type: ignore[override]
+        """Coefficient and ambient temperature."""
+        return [self.coefficient, self.ambient]
+
+    def exchange(self, mesh: Mesh, kinematics: str, reference: float) -> tuple[csr_array, Array]:
+        """Return the matrix (n_points, n_points) [power / temperature] and the powers (n_points,) by the rise of the ambient.
+
+        The latter at multiplier 1 [power]; `reference` is the temperature that rises count from [temperature]. ModelError if
+        a coefficient is negative.
+        """
+        rows, columns, values, powers = [], [], [], np.zeros((mesh.n_points, 1))
+        for element, facets in facets_of(mesh, self.group).items():
+            x, N, normal = facet_points(mesh, element, facets, kinematics)
+            h = evaluated(self.coefficient, x, f"the coefficient of {self.name}")
+            if h.min(initial=0.0) < 0.0:
+                raise ModelError(f"the coefficient of {self.name} is {h.min():g}: it must not be negative")
+            h *= np.linalg.norm(normal, axis=2)
+            rise = evaluated(self.ambient, x, f"the ambient temperature of {self.name}") - reference
+            add_density(powers, facets, N, (h * rise)[:, :, None])
+            local = np.einsum("fq,qa,qb->fab", h, N, N)
+            rows.append(np.broadcast_to(facets[:, :, None], local.shape).ravel())
+            columns.append(np.broadcast_to(facets[:, None, :], local.shape).ravel())
+            values.append(local.ravel())
+        place = np.concatenate(rows), np.concatenate(columns)
+        return csr_array(coo_array((np.concatenate(values), place), shape=(mesh.n_points,) * 2)), powers[:, 0]

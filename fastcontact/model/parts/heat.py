@@ -1,0 +1,174 @@
+"""Conduction of heat in a model: prescribed temperatures, fluxes, films, sources, and what its checks ask.
+
+A `Value` is a number, or a function from reference positions (n, dim) [length] to numbers (n,) [unit of the quantity].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.contact.conductance import Conductance
+from fastcontact.elasticity.loads import Value, check_number, evaluated
+from fastcontact.errors import ModelError
+from fastcontact.heat.conduction import Conduction
+from fastcontact.heat.loads import Film, FixedTemperature, HeatFlux, Heating, HeatSource, NodalHeat
+from fastcontact.heat.reached import not_reached
+from fastcontact.mesh.argument_types import typed
+from fastcontact.mesh.topology import bodies
+from fastcontact.model.parts.base import group_names
+from fastcontact.model.parts.materials import ModelMaterials
+from fastcontact.model.periodicity import same_place
+from fastcontact.model.ramp import History, Table, table_of
+from fastcontact.model.rigid_motions import body_name
+
+HEAT_FLUX = ("heat_flux_x", "heat_flux_y", "heat_flux_z")
+
+
+class ModelHeat(ModelMaterials):
+    """A model that may conduct heat; steps then tell temperatures and fluxes, and materials with an expansion expand."""
+
+    @typed(ModelError)
+    def fix_temperature(self, group: str, value: Value, *, ramp: History = None) -> None:
+        """Prescribe the temperature of all nodes of a group.
+
+        Parameters
+        ----------
+        group : str
+        value : float or callable
+            A number, or a function from reference positions (n, dim) [length] to temperatures (n,) [temperature].
+        ramp : Ramp or iterable of (float, float), optional
+            History of the rise over `Model.reference_temperature`.
+        """
+        self._heat(FixedTemperature(group, value, table_of(ramp, f"the ramp of the temperature on '{group}'")))
+
+    @typed(ModelError)
+    def add_heat_flux(self, group: str, value: Value, *, ramp: History = None) -> None:
+        """Heat a group of facets by `value` [power / area], positive into the body; values as in `fix_temperature`."""
+        self._heat(HeatFlux(group, value, table_of(ramp, f"the ramp of the heat flux on '{group}'")))
+
+    @typed(ModelError)
+    def add_heat_source(self, value: Value, groups: Sequence[str] | str | None = None, *, ramp: History = None) -> None:
+        """Heat groups of solid cells, by default all, by `value` [power / length^3]; values as in `fix_temperature`."""
+        self._heat(HeatSource(group_names(groups), value, table_of(ramp, "the ramp of the heat source")))
+
+    @typed(ModelError)
+    def add_nodal_heat(self, group: str, value: float, *, ramp: History = None) -> None:
+        """Heat every node of a group by `value` [power]; in axisymmetry over the full circle."""
+        self._heat(NodalHeat(group, value, table_of(ramp, f"the ramp of the heat at nodes of '{group}'")))
+
+    @typed(ModelError)
+    def add_film(self, group: str, coefficient: Value, ambient: Value, *, ramp: History = None) -> None:
+        """Let a group of facets pass heat to its surroundings, ``coefficient * (temperature - ambient)`` by area.
+
+        Parameters
+        ----------
+        group : str
+        coefficient : float or callable
+            Of convection, zero or more [power / (area temperature)].
+        ambient : float or callable
+            Temperature of the surroundings [temperature].
+        ramp : Ramp or iterable of (float, float), optional
+            History of the ambient temperature's rise over `Model.reference_temperature`.
+        """
+        self._heat(Film(group, coefficient, ambient, table_of(ramp, f"the ramp of the film on '{group}'")))
+
+    def _heat(self, load: FixedTemperature | Heating | Film) -> None:
+        load.check(self.mesh, self.kinematics)
+        self.heat_loads.append(load)
+
+    @property
+    def conducts(self) -> bool:
+        """Whether heat is conducted: by a load of heat, a prescribed temperature, or a contact with a conductance."""
+        return bool(self.heat_loads) or any("conductance" in pair.options for pair in self.contact)
+
+    @property
+    def cell_fields(self) -> tuple[str, ...]:
+        """Names of the `StepResult.cell_fields` that steps of this model have: of nonlinear bodies, and of heat."""
+        return (*super().cell_fields, *(HEAT_FLUX[: self.mesh.dim] if self.conducts else ()))
+
+    @property
+    def expands(self) -> bool:
+        """Whether a material has a coefficient of thermal expansion."""
+        return any(material.expansion is not None for material, _ in self.materials)
+
+    def conduction(self) -> Conduction:
+        """Return the solid cells as conductors of heat."""
+        return Conduction(self.mesh, self.kinematics, [m for m, _ in self.materials], self.material_of_cells())
+
+    def same_temperature(self) -> Indices:
+        """Return for each node (n_points,) the first one of the same temperature: ends of periods, sides of sections."""
+        cuts = [(cut.nodes, cut.opposite) for cut in self.pretensions]
+        found = same_place([*self.seams, *cuts], self.mesh.n_points)  # type: ignore[list-item]
+        return np.arange(self.mesh.n_points) if found is None else found
+
+    def fixed_temperatures(self) -> tuple[Mask, dict[Table | None, Array]]:
+        """Return which nodes (n_points,) have a prescribed temperature, and by history their rises at multiplier 1.
+
+        Of nodes that have the same temperature the first one of `same_temperature`. ModelError if two differ at a node.
+        """
+        fixed, given = np.zeros(self.mesh.n_points, bool), np.zeros(self.mesh.n_points)
+        by_ramp: dict[Table | None, Array] = {}
+        owner = np.full(self.mesh.n_points, -1)
+        supports = [load for load in self.heat_loads if isinstance(load, FixedTemperature)]
+        same = self.same_temperature()
+        for number, support in enumerate(supports):
+            nodes = self.mesh.points_of(support.group)
+            rise = evaluated(support.value, self.mesh.points[nodes], support.name) - self.reference_temperature
+            nodes = same[nodes]
+            again = np.flatnonzero(fixed[nodes])
+            for row in again[(given[nodes[again]] != rise[again])][:1]:
+                other = supports[owner[nodes[row]]]
+                raise ModelError(
+                    f"'{support.group}' and '{other.group}' prescribe different temperatures at point {nodes[row]}"
+                )
+            new = nodes[~fixed[nodes]]
+            by_ramp.setdefault(support.ramp, np.zeros(self.mesh.n_points))[new] = rise[~fixed[nodes]]
+            fixed[nodes], given[nodes], owner[new] = True, rise, number
+        return fixed, by_ramp
+
+    def check_heat(self) -> None:
+        """Raise ModelError if the conduction of heat is not determined, or what it needs is not there."""
+        for pair in self.contact:
+            if "friction_heat" in pair.options and not self.conducts:
+                raise ModelError(
+                    f"contact '{pair.name}' has a friction_heat, but nothing conducts it: fix a temperature"
+                )
+        check_number("the reference_temperature", self.reference_temperature)
+        if not self.conducts:
+            return
+        if self.temperatures:
+            raise ModelError(
+                "temperatures are both given by add_temperature and conducted: prescribe them by fix_temperature"
+            )
+        self.refuse_nonlinear("conduction of heat is")
+        self.conduction().check()
+        lacking = [material for material, _ in self.materials if material.expansion is None]
+        if self.expands and lacking:
+            raise ModelError(
+                f"heat expands some materials, but that with {lacking[0].described} has no coefficient of thermal expansion: "
+                "give it expansion=..., 0.0 if it does not expand"
+            )
+        held, _ = self.fixed_temperatures()
+        for load in self.heat_loads:
+            if isinstance(load, Film):
+                held[self.mesh.points_of(load.group)] = True
+        _, body = bodies(self.mesh)
+        joined = [np.stack([np.arange(len(body)), self.same_temperature()], axis=1)]
+        for pair in self.contact:
+            if pair.options.get("conductance") is not None:
+                ends = np.concatenate([self.mesh.points_of(pair.secondary), self.mesh.points_of(pair.primary)])
+                joined.append(np.stack([np.full(len(ends), ends[0]), ends], axis=1))
+        alone = not_reached(body, held, np.concatenate(joined))
+        if len(alone):
+            raise ModelError(
+                f"nothing determines the temperature of body {body_name(self.mesh, body, alone[0])}: fix a temperature, "
+                "add a film, or give a contact with another body a conductance"
+            )
+
+    def conductances(self) -> dict[str, Conductance]:
+        """Return the laws of conductance by contact pair."""
+        given = {pair.name: pair.options.get("conductance") for pair in self.contact}
+        return {name: Conductance(name, value) for name, value in given.items() if value is not None}

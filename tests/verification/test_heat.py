@@ -1,0 +1,465 @@
+"""Steady heat: exact solutions, rates of convergence, conductance of contacts, exchange with contact and friction."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import fastcontact as fc
+from fastcontact.elasticity.loads import cell_points
+
+BARS = {"size_lower": (0.05, 0.1), "size_upper": (0.05, 0.1), "divisions_lower": (3, 4), "divisions_upper": (4, 3)}
+REST = "ignore:contact 'c' never closed"
+
+
+def two_bars(kinematics, element, **contact):
+    """Two bars of conductivities 50 and 20, 100 at one end and 0 at the other, whose meshes do not match."""
+    if kinematics == "3d":
+        parts = []
+        for name, divisions, base in (("LOWER", (2, 2, 2), -0.1), ("UPPER", (3, 3, 2), 0.0)):
+            part = fc.generate.box((0.05, 0.05, 0.1), divisions, element, name=name)
+            part = fc.generate.transformed(part, translate=(0.0, 0.0, base))
+            sides = {"ZMIN": "CONT_UPPER", "ZMAX": "UPPER_TOP"} if base == 0.0 else {}
+            sides = sides or {"ZMIN": "LOWER_BOTTOM", "ZMAX": "CONT_LOWER"}
+            new = {group: sides.get(group, f"{name}_{group}") for group in part.group_names if group != name}
+            parts.append(fc.generate.renamed(part, lambda group, new=new: new.get(group, group)))
+        mesh = fc.generate.union(*parts)
+    else:
+        mesh = fc.generate.block_on_block(element, **BARS)
+    model = fc.Model(mesh, kinematics)
+    model.add_material(fc.LinearElastic(E=1e9, nu=0.3, conductivity=50.0), "UPPER")
+    model.add_material(fc.LinearElastic(E=1e9, nu=0.3, conductivity=20.0), "LOWER")
+    for end, temperature in (("LOWER_BOTTOM", 0.0), ("UPPER_TOP", 100.0)):
+        model.fix(end, "xyz"[: mesh.dim])
+        model.fix_temperature(end, temperature)
+    model.add_contact("c", secondary="CONT_UPPER", primary="CONT_LOWER", conductance=1000.0, **contact)
+    return model
+
+
+def check_bars(model, tolerance):
+    step, mesh = fc.solve(model, 1)[-1], model.mesh
+    flux = np.zeros(mesh.dim)
+    flux[-1] = -12_500.0
+    assert step.heat_flux == pytest.approx(np.tile(flux, (len(step.heat_flux), 1)), abs=tolerance * 12_500.0)
+    assert step.contact["c"].heat_flux == pytest.approx(12_500.0, rel=tolerance)
+    assert step.temperature[mesh.points_of("CONT_UPPER")] == pytest.approx(75.0, rel=tolerance)
+    assert step.temperature[mesh.points_of("CONT_LOWER")] == pytest.approx(62.5, rel=tolerance)
+    power = step.heat["contacts"]["c"]
+    assert step.heat_reaction[mesh.points_of("UPPER_TOP")].sum() == pytest.approx(power, rel=tolerance)
+    assert step.heat_reaction.sum() == pytest.approx(0.0, abs=1e-10 * power)
+
+
+@pytest.mark.filterwarnings(REST)
+@pytest.mark.parametrize("element", ["tri3", "tri6", "quad4", "quad8", "quad9"])
+@pytest.mark.parametrize("kinematics", ["plane_strain", "plane_stress", "axisymmetric"])
+@pytest.mark.parametrize(
+    "contact", [{}, {"formulation": "mortar", "multipliers": "standard"}, {"kind": "tied"}], ids=str
+)
+def test_uniform_flux_passes_between_meshes_that_do_not_match(kinematics, element, contact):
+    check_bars(two_bars(kinematics, element, **contact), 1e-9)
+
+
+@pytest.mark.filterwarnings(REST)
+@pytest.mark.parametrize("element", ["tet4", "tet10", "hex8", "hex20", "hex27", "wedge6"])
+def test_uniform_flux_passes_between_faces_that_do_not_match(element):
+    check_bars(two_bars("3d", element), 1e-9)
+
+
+@pytest.mark.filterwarnings(REST)
+def test_uniform_flux_of_other_formulations_and_by_multigrid():
+    for formulation, off in (("continuous", 0.05), ("node_to_segment", 0.15)):  # quadrature; a row a node
+        step = fc.solve(two_bars("plane_strain", "quad4", formulation=formulation), 1)[-1]
+        assert step.contact["c"].heat_flux == pytest.approx(12_500.0, rel=off)
+        assert step.heat_reaction.sum() == pytest.approx(0.0, abs=1e-8)
+    step = fc.solve(two_bars("3d", "hex8"), 1, linear_solver="amg")[-1]
+    assert step.contact["c"].heat_flux == pytest.approx(12_500.0, rel=1e-7)
+
+
+def cylinder_wall(element, count, k=15.0):
+    mesh = fc.generate.block((1.0, 0.2), (count, 1), element, (1.0, 0.0))
+    model = fc.Model(mesh, "axisymmetric")
+    model.add_material(fc.LinearElastic(E=1.0, nu=0.3, conductivity=k))
+    model.fix("BOTTOM", "y")
+    return mesh, model
+
+
+def test_cylinder_wall_has_the_logarithmic_profile():
+    mesh, model = cylinder_wall("quad8", 16)
+    model.fix_temperature("LEFT", 200.0)
+    model.fix_temperature("RIGHT", 20.0)
+    step = fc.solve(model, 1)[-1]
+    exact = 200.0 - 180.0 * np.log(mesh.points[:, 0]) / np.log(2.0)
+    assert step.temperature == pytest.approx(exact, abs=1e-4)
+    power = 2.0 * np.pi * 15.0 * 0.2 * 180.0 / np.log(2.0)
+    assert step.heat_reaction[mesh.points_of("LEFT")].sum() == pytest.approx(power, rel=1e-6)
+
+
+def test_wall_between_films_with_a_flux_and_a_source():
+    mesh = fc.generate.block((1.0, 0.5), (4, 2), "quad8")
+    model = fc.Model(mesh, "plane_strain", reference_temperature=20.0)
+    model.add_material(fc.LinearElastic(E=1.0, nu=0.3, conductivity=2.0))
+    model.fix("LEFT", "xy")
+    model.add_film("LEFT", 10.0, 80.0)
+    model.add_heat_flux("RIGHT", 30.0)
+    model.add_heat_source(16.0)
+    step = fc.solve(model, 1)[-1]
+    x = mesh.points[:, 0]  # all heat leaves on the left: 30 + 16 = 10 (T(0) - 80)
+    assert step.temperature == pytest.approx(84.6 + (46.0 * x - 8.0 * x**2) / 2.0, rel=1e-12)
+    assert step.heat["loads"] == pytest.approx(0.5 * 46.0)
+    assert step.heat["films"] == pytest.approx(-0.5 * 46.0)
+
+
+def test_conductivity_by_axes_and_by_position():
+    mesh = fc.generate.block((1.0, 1.0), (3, 3), "quad4")
+    turned = fc.Model(mesh, "plane_strain")
+    axes = [[1, 1, 0], [-1, 1, 0]]
+    wood = {"E": (1.0, 1.0, 1.0), "nu": (0.3, 0.3, 0.3), "G": (0.4, 0.4, 0.4)}
+    turned.add_material(fc.Orthotropic(**wood, conductivity=(4.0, 2.0, 1.0), axes=axes))
+    turned.fix("LEFT", "xy")
+    for side in ("LEFT", "RIGHT", "TOP", "BOTTOM"):
+        turned.fix_temperature(side, lambda p: 10.0 * p[:, 0])
+    flux = fc.solve(turned, 1)[-1].heat_flux
+    assert flux == pytest.approx(np.tile([-30.0, -10.0], (9, 1)), rel=1e-12)  # k_xx = (4 + 2) / 2, k_xy = (4 - 2) / 2
+    graded = fc.Model(fc.generate.block((1.0, 1.0), (64, 1), "quad8"), "plane_strain")
+    graded.add_material(fc.LinearElastic(E=1.0, nu=0.3, conductivity=lambda p: 1.0 + p[:, 0]))
+    graded.fix("LEFT", "xy")
+    graded.fix_temperature("LEFT", 0.0)
+    graded.fix_temperature("RIGHT", 1.0)
+    step, x = fc.solve(graded, 1)[-1], graded.mesh.points[:, 0]
+    assert step.temperature == pytest.approx(np.log(1.0 + x) / np.log(2.0), abs=1e-8)
+
+
+MADE_UP = {
+    "plane_strain": (
+        lambda p: np.sin(2.0 * p[:, 0]) * np.exp(p[:, 1]),
+        lambda p: 3.0 * np.sin(2.0 * p[:, 0]) * np.exp(p[:, 1]),
+    ),
+    "axisymmetric": (  # T'' + T' / r + T_yy of cos(2 r) exp(y)
+        lambda p: np.cos(2.0 * p[:, 0]) * np.exp(p[:, 1]),
+        lambda p: np.exp(p[:, 1]) * (3.0 * np.cos(2.0 * p[:, 0]) + 2.0 * np.sin(2.0 * p[:, 0]) / p[:, 0]),
+    ),
+    "3d": (
+        lambda p: np.sin(2.0 * p[:, 0]) * np.exp(p[:, 1]) * np.cos(p[:, 2]),
+        lambda p: 4.0 * np.sin(2.0 * p[:, 0]) * np.exp(p[:, 1]) * np.cos(p[:, 2]),
+    ),
+}
+
+
+def error_of_manufactured(kinematics, element, count):
+    """The error in the mean square over the volume, relative."""
+    exact, source = MADE_UP[kinematics]
+    if kinematics == "3d":
+        mesh = fc.generate.box((1.0, 1.0, 1.0), (count,) * 3, element)
+        sides = ["XMIN", "XMAX", "YMIN", "YMAX", "ZMIN", "ZMAX"]
+    else:
+        mesh = fc.generate.block((1.0, 1.0), (count,) * 2, element, (0.5, 0.0), distortion=0.1)
+        sides = ["LEFT", "RIGHT", "TOP", "BOTTOM"]
+    model = fc.Model(mesh, kinematics)
+    model.add_material(fc.LinearElastic(E=1.0, nu=0.3, conductivity=7.0))
+    model.fix(sides[0], "xyz"[: mesh.dim])
+    for side in sides:
+        model.fix_temperature(side, exact)
+    model.add_heat_source(lambda p: 7.0 * source(p))
+    step, square, whole = fc.solve(model, 1)[-1], 0.0, 0.0
+    for name, cells in mesh.solids.items():
+        x, N, volume = cell_points(mesh, name, cells, kinematics)
+        wanted = exact(x.reshape(-1, mesh.dim)).reshape(volume.shape)
+        square += float((volume * (step.temperature[cells] @ N.T - wanted) ** 2).sum())
+        whole += float((volume * wanted**2).sum())
+    return np.sqrt(square / whole)
+
+
+@pytest.mark.parametrize(
+    ("kinematics", "element", "rate"),
+    [("plane_strain", "tri3", 1.8), ("plane_strain", "quad4", 1.8), ("plane_strain", "tri6", 2.7),
+     ("plane_strain", "quad8", 2.7), ("axisymmetric", "quad4", 1.8), ("axisymmetric", "tri6", 2.7),
+     ("3d", "hex8", 1.8), ("3d", "tet4", 1.6)],
+)  # fmt: skip
+def test_rates_on_manufactured_solutions(kinematics, element, rate):
+    counts = (4, 8) if kinematics == "3d" else (8, 16)
+    coarse, fine = (error_of_manufactured(kinematics, element, count) for count in counts)
+    assert np.log2(coarse / fine) > rate
+    assert fine < 0.02
+
+
+def column(conductance, gap, alpha=1e-5, k=(50.0, 20.0), E=2e11):
+    """Two bars that expand along y alone, with a gap between them, held at their outer ends."""
+    mesh = fc.generate.block_on_block("quad4", **BARS)
+    model = fc.Model(mesh, "plane_strain")
+    for body, own in zip(("UPPER", "LOWER"), k, strict=True):
+        model.add_material(fc.LinearElastic(E=E, nu=0.0, expansion=alpha, conductivity=own), body)
+    for group in ("LOWER_BOTTOM", "UPPER_TOP"):
+        model.fix(group, "y")
+    for group in ("LOWER", "UPPER"):
+        model.fix(group, "x")
+    model.fix_temperature("UPPER_TOP", 100.0)
+    model.fix_temperature("LOWER_BOTTOM", 0.0)
+    model.add_contact("c", secondary="CONT_UPPER", primary="CONT_LOWER", clearance=gap, conductance=conductance)
+    return model
+
+
+def column_exact(h, gap, alpha=1e-5, k=(50.0, 20.0), E=2e11, L=0.1):
+    """The flux and the pressure of `column`."""
+
+    def pressure_and_gap(q):
+        grown = alpha * L * (100.0 - 0.5 * q * L / k[0] + 0.5 * q * L / k[1]) - gap
+        return max(grown, 0.0) * E / (2.0 * L), max(-grown, 0.0)
+
+    q = brentq(
+        lambda q: q - h(*pressure_and_gap(q)) * (100.0 - q * L * (1 / k[0] + 1 / k[1])), 0.0, 14_285.0, xtol=1e-10
+    )
+    return q, pressure_and_gap(q)
+
+
+@pytest.mark.parametrize(
+    ("law", "gap"),
+    [(lambda p, g: 100.0 + 2e-5 * p, 5e-5), (lambda p, g: 3.0 / (0.003 + g / 1e-3) + 1e-5 * p, 1.2e-4)],
+    ids=["pressure", "gap"],
+)
+@pytest.mark.filterwarnings(REST)
+def test_conductance_by_pressure_and_gap_settles_with_the_expansion(law, gap):
+    step = fc.solve(column(law, gap), 1)[-1]
+    q, (pressure, open_by) = column_exact(law, gap)
+    contact = step.contact["c"]
+    assert contact.heat_flux == pytest.approx(q, rel=1e-7)
+    assert contact.pressure == pytest.approx(pressure, rel=1e-6)
+    assert contact.gap == pytest.approx(open_by, abs=1e-10)
+    assert (pressure == 0.0) == (open_by > 0.0)
+    assert step.heat["exchanges"] > 2
+
+
+def test_tables_are_their_functions_and_steps_begin_where_others_ended():
+    table = column({"pressure": [(0.0, 100.0), (1e9, 20_100.0)], "gap": [(0.0, 100.0), (1.0, 100.0)]}, 5e-5)
+    function = column(lambda p, g: 100.0 + 2e-5 * p, 5e-5)
+    one, other = fc.solve(table, 1)[-1], fc.solve(function, 3)[-1]
+    assert one.temperature == pytest.approx(other.temperature, rel=1e-8)
+    assert one.displacement == pytest.approx(other.displacement, abs=1e-8 * np.abs(other.displacement).max())
+
+
+def test_heat_of_friction_leaves_through_films():
+    mesh = fc.generate.block_on_block("quad4", size_lower=(20.0, 5.0), shift=2.0)
+    model = fc.Model(mesh, "plane_strain")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.0, conductivity=3.0))
+    model.fix("LOWER_BOTTOM", "xy")
+    model.prescribe("UPPER_TOP", y=-0.05, ramp=[(0.0, 0.0), (1.0, 1.0), (2.0, 1.0), (4.0, 1.0)])
+    model.prescribe("UPPER_TOP", x=1.0, ramp=[(0.0, 0.0), (1.0, 0.0), (2.0, 1.0), (4.0, 2.0)])
+    model.add_contact(
+        "c", secondary="CONT_UPPER", primary="CONT_LOWER", friction=0.3, friction_heat=0.9, conductance=1e3
+    )
+    model.add_film("UPPER_TOP", 1.0, 0.0)
+    model.add_film("LOWER_BOTTOM", 1.0, 0.0)
+    for step in fc.solve(model, fc.Ramp((1.0, 2.0, 4.0), ((0.0, 0.0), (4.0, 4.0))))[1:]:
+        contact = step.contact["c"]
+        shear = float(np.abs(contact.force[0]))
+        assert shear == pytest.approx(0.3 * np.abs(contact.force[1]), rel=0.01)
+        speed, elastic = (
+            (1.0, 0.05) if step.load_factor == 2.0 else (0.5, 2e-3)
+        )  # what blocks shear at first is no slip
+        assert step.heat["friction"] == pytest.approx(0.9 * shear * speed, rel=elastic)
+        assert step.heat["films"] == pytest.approx(-step.heat["friction"], rel=1e-10)
+        assert step.temperature.min() > 0.0
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_hot_hertz_contact_passes_conductance_times_force():
+    # Where bodies conduct much better than the contact each has one temperature, and by h = c p all heat is c F dT.
+    mesh = fc.generate.half_spheres(size=4.0)
+    model = fc.Model(mesh, "axisymmetric")
+    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3, expansion=1e-5, conductivity=1e7))
+    model.fix("A1A2", "x")
+    model.prescribe("A2B2", y=-1.0)
+    model.prescribe("A1B1", y=1.0)
+    model.fix_temperature("A2B2", 20.0)
+    model.fix_temperature("A1B1", 320.0)
+    model.add_contact("hertz", secondary="CONT1", primary="CONT2", conductance=lambda p, g: 0.02 * p)
+    step = fc.solve(model, 2)[-1]
+    heat = step.heat["contacts"]["hertz"]
+    side = 1.0 if step.temperature[mesh.points_of("CONT1")].mean() > 170.0 else -1.0
+    assert side * heat == pytest.approx(0.02 * step.contact["hertz"].normal_force * 300.0, rel=2e-4)
+    assert step.heat["exchanges"] >= 2
+
+
+def test_free_expansion_by_conduction_is_without_stress():
+    mesh = fc.generate.block((2.0, 1.0), (4, 2), "quad8")
+    model = fc.Model(mesh, "plane_stress", reference_temperature=20.0)
+    model.add_material(fc.LinearElastic(E=2e5, nu=0.3, expansion=1e-5, conductivity=40.0))
+    model.fix("LEFT", "x")
+    model.fix("BOTTOM_LEFT", "y")
+    model.fix_temperature("BLOCK", 120.0)
+    step = fc.solve(model, 2)[-1]
+    assert step.displacement[:, 0] == pytest.approx(1e-3 * mesh.points[:, 0], abs=1e-14)
+    assert np.abs(step.stress).max() < 1e-9
+    first = fc.solve(model, 2)[0]
+    assert first.temperature == pytest.approx(70.0)
+
+
+def test_ends_of_a_period_have_one_temperature():
+    mesh = fc.generate.block((1.0, 4.0), (2, 8), "quad4")
+    model = fc.Model(mesh, "plane_stress")
+    model.add_material(fc.LinearElastic(E=2e5, nu=0.3, conductivity=40.0))
+    model.fix("BOTTOM", "xy")
+    model.add_periodicity("LEFT", "RIGHT", x=0.0, y=0.0)
+    model.fix_temperature("BOTTOM", 0.0)
+    model.fix_temperature("TOP_LEFT", 10.0)
+    step = fc.solve(model, 1)[-1]
+    left, right = mesh.points_of("LEFT"), mesh.points_of("RIGHT")
+    ends = [side[np.argsort(mesh.points[side, 1])] for side in (left, right)]
+    assert step.temperature[ends[0]] == pytest.approx(step.temperature[ends[1]], rel=1e-12)
+    assert step.temperature[ends[0]][-1] == 10.0
+
+
+def test_result_files_and_restarts_hold_the_heat(tmp_path):
+    model = column(lambda p, g: 100.0 + 2e-5 * p, 5e-5)
+    steps = fc.solve(model, 4)
+    with fc.ResultWriter(tmp_path / "h.vtkhdf", model) as out:
+        fc.solve(model, fc.Ramp((0.25, 0.5)), on_step=out.write)
+    with fc.open_results(tmp_path / "h.vtkhdf") as half:
+        going_on = fc.solve(model, fc.linear_ramp(4), resume=half)
+        stored = half[-1]
+    assert np.array_equal(going_on[-1].temperature, steps[-1].temperature)
+    assert np.array_equal(stored.heat_flux, steps[1].heat_flux)
+    assert np.array_equal(stored.heat_reaction, steps[1].heat_reaction)
+    assert np.array_equal(stored.contact["c"].heat_flux, steps[1].contact["c"].heat_flux)
+    assert stored.heat == steps[1].heat
+    assert "heat_flux" in fc.contact_table(stored.contact["c"]).dtype.names
+    other = column(lambda p, g: 100.0 + 3e-5 * p, 5e-5)
+    with pytest.raises(fc.errors.ModelError, match="the conductance of contact 'c'"):
+        fc.solve(other, fc.Ramp((2.0,), ((0.0, 0.0), (2.0, 2.0))), resume=steps)
+
+
+def bar(**constants):
+    model = fc.Model(fc.generate.block_on_block("quad4"), "plane_strain")
+    model.add_material(fc.LinearElastic(E=1.0, nu=0.3, **constants))
+    model.fix("LOWER_BOTTOM", "xy")
+    model.fix("UPPER_TOP", "xy")
+    return model
+
+
+def joined(model, **options):
+    model.add_contact("c", secondary="CONT_UPPER", primary="CONT_LOWER", **options)
+    return model
+
+
+def test_what_cannot_be_is_refused_by_its_name():
+    refused = pytest.raises
+    model = bar()
+    model.fix_temperature("UPPER_TOP", 1.0)
+    with refused(fc.errors.ModelError, match="no conductivity: give them"):
+        model.check()
+    model = joined(bar(conductivity=1.0))
+    model.fix_temperature("UPPER_TOP", 1.0)
+    with refused(fc.errors.ModelError, match="nothing determines the temperature of body 'LOWER'"):
+        model.check()
+    model = joined(bar(conductivity=1.0), conductance=2.0)
+    model.fix_temperature("UPPER_TOP", 1.0)
+    model.check()
+    model.fix_temperature("UPPER_TOP_LEFT", 2.0)
+    with refused(fc.errors.ModelError, match="prescribe different temperatures at point"):
+        model.check()
+    model = joined(bar(conductivity=1.0, expansion=1.0), conductance=2.0)
+    model.fix_temperature("UPPER_TOP", 1.0)
+    model.add_temperature(3.0)
+    with refused(fc.errors.ModelError, match="both given by add_temperature and conducted"):
+        model.check()
+    model = bar(conductivity=1.0)
+    for wrong in ("much", [(1.0, 2.0), (0.0, 3.0)], {"force": [(0.0, 1.0)]}, [(0.0, -1.0)]):
+        with refused(fc.errors.ContactError, match="conductance of contact 'c' must be a number, a function"):
+            joined(model, conductance=wrong)
+    with refused(fc.errors.ContactError, match="zero or more"):
+        joined(model, conductance=-1.0)
+    with refused(fc.errors.ContactError, match="no friction that could make it"):
+        joined(model, friction_heat=0.5)
+    with refused(fc.errors.ContactError, match="a rigid obstacle has no temperature"):
+        model.add_obstacle(
+            "o", secondary="UPPER_TOP", obstacle=fc.obstacles.HalfSpace((0, 9), (0, -1)), conductance=1.0
+        )
+    with refused(fc.errors.ModelError, match="the conductivity"):
+        fc.LinearElastic(E=1.0, nu=0.3, conductivity=0.0)
+    with refused(fc.errors.ModelError, match="must not be negative"):
+        film = bar(conductivity=1.0)
+        film.add_film("UPPER_TOP", -1.0, 0.0)
+        joined(film, conductance=1.0).check()
+        fc.solve(film, 1)
+
+
+@pytest.mark.filterwarnings(REST)
+def test_functions_that_are_no_conductance_and_bodies_that_no_heat_reaches():
+    model = joined(bar(conductivity=1.0), conductance=lambda p, g: p - 1.0)
+    model.fix_temperature("UPPER_TOP", 1.0)
+    with pytest.raises(fc.errors.ContactError, match="must return a number from zero on"):
+        fc.solve(model, 1)
+    model = joined(bar(conductivity=1.0), conductance=5.0, clearance=0.1)
+    model.fix_temperature("UPPER_TOP", 1.0)
+    with pytest.raises(fc.errors.ConvergenceError, match="no heat reaches body 'LOWER'"):
+        fc.solve(model, 1)
+
+
+CASE = """
+title = "heat through two bars"
+kinematics = "plane_strain"
+reference_temperature = 20.0
+
+[mesh]
+generator = "block-on-block"
+size_lower = [0.05, 0.1]
+size_upper = [0.05, 0.1]
+
+[[material]]
+groups = ["UPPER"]
+E = 1e9
+nu = 0.3
+conductivity = 50
+
+[[material]]
+groups = ["LOWER"]
+E = 1e9
+nu = 0.3
+conductivity = {along = "y", table = [[-1.0, 20.0], [1.0, 20.0]]}
+
+[[support]]
+group = "LOWER_BOTTOM"
+x = 0.0
+y = 0.0
+
+[[support]]
+group = "UPPER_TOP"
+x = 0.0
+y = -1e-5
+
+[[fixed_temperature]]
+group = "LOWER_BOTTOM"
+value = 0.0
+
+[[film]]
+group = "UPPER_TOP"
+coefficient = 1e9
+ambient = 100.0
+
+[contact.joint]
+secondary = "CONT_UPPER"
+primary = "CONT_LOWER"
+conductance = {pressure = [[0.0, 1000.0], [1e9, 1000.0]]}
+
+[probes]
+corner = "UPPER_TOP_LEFT"
+
+[[check]]
+quantity = "joint.heat"
+value = 625.0
+source = "R = 0.1 / 50 + 1 / 1000 + 0.1 / 20"
+tolerance = 1e-6
+
+[[check]]
+quantity = "corner.temperature"
+value = 100.0
+source = "the ambient"
+tolerance = 1e-4
+"""
+
+
+def test_case_files_have_heat(tmp_path):
+    from fastcontact.cli import main
+
+    (tmp_path / "bars.toml").write_text(CASE, encoding="utf-8")
+    assert main(["run", str(tmp_path / "bars.toml"), "-o", str(tmp_path / "b.vtkhdf"), "--strict", "-q"]) == 0
+    with fc.open_results(tmp_path / "b.vtkhdf") as steps:
+        assert steps[-1].heat["contacts"]["joint"] == pytest.approx(625.0, rel=1e-6)
