@@ -19,8 +19,8 @@ from fastcontact.model.ramp import Table, table_of
 
 # Options that every contact pair takes, beside those of its formulation.
 SHARED_OPTIONS = (
-    "clearance", "clearance_primary", "clearance_ramp", "conductance", "excluded", "friction_ramp", "frictionless",
-    "frictionless_along", "kind", "penalty", "search_distance", "tangential_penalty", "wear",
+    "clearance", "clearance_primary", "clearance_ramp", "conductance", "excluded", "friction_heat", "friction_ramp",
+    "frictionless", "frictionless_along", "kind", "penalty", "search_distance", "tangential_penalty", "wear",
 )  # fmt: skip
 
 
