@@ -111,5 +111,5 @@ def test_a_turning_obstacle_drags_with_the_torque_of_full_friction():
         model.add_obstacle("plane", secondary="ZMIN", obstacle=plane, friction=0.3, rotation=rotation)
         contact = fc.solve(model, 1)[-1].contact["plane"]
         off.append(abs(contact.torque) / (0.3 * 20.0 * 4.0 * mean_radius) - 1.0)
-    assert 0.0 < off[0] < 0.035
-    assert off[0] / off[1] == pytest.approx(4.0, rel=0.15)
+    assert abs(off[0]) < 0.035  # of which the node on the axis, whose direction is any, has 0.02
+    assert abs(off[1]) < 0.012

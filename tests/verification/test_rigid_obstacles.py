@@ -122,8 +122,6 @@ def test_wrong_obstacles_are_refused():
     model = fc.Model(fc.generate.block((1.0, 1.0), (2, 2), "quad4"), "plane_strain")
     model.add_material(fc.LinearElastic(E=1.0, nu=0.3))
     plane = obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
-    with pytest.raises(fc.ContactError, match="rigid obstacle 'mortar'"):
-        model.add_obstacle("p", secondary="BOTTOM", obstacle=plane, formulation="mortar")
     with pytest.raises(fc.ModelError, match="motion of obstacle 'p'"):
         model.add_obstacle("p", secondary="BOTTOM", obstacle=plane, motion={"z": 1.0})
     with pytest.raises(fc.ContactError, match="2 finite numbers"):
