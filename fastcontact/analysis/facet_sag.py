@@ -79,7 +79,7 @@ def _standing_off(pair: Formulation, at: Configuration, active: Mask) -> Array:
     rows = np.flatnonzero(facing.paired & closed[points.nodes].any(axis=1))
     if smoothing is None or points.facet is None or points.xi is None:
         return np.empty(0)
-    axes = frames(pair.secondary, deformed), frames(pair.primary, deformed)
+    axes = [frames(side, pair.points, deformed) for side in (pair.secondary, pair.primary)]
     return smoothing.overlap((points.facet[rows], points.xi[rows]), (facing.facet[rows], facing.xi[rows]), axes)
 
 

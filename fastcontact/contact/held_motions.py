@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 from scipy.spatial.distance import cdist
 
 from fastcontact.arrays import Array, Indices, Mask
@@ -99,25 +99,25 @@ def alike(projectors: Array, places: Array) -> list[tuple[Array, Mask]]:
         seeds = seeds[rank[seeds] == least]
         seeds = seeds if least == 1 else seeds[:1]  # of several directions any are taken
         own = np.linalg.eigh(rest[seeds])[1][:, :, -1]
-        if least == 1:
-            together = connected_components(csr_array(np.abs(own @ own.T) >= TOGETHER))[1] == 0
-            seeds, own = seeds[together], own[together]
-        along = _from_nearest(own, places[seeds], places)
-        along[seeds] = own
+        away = np.where(np.abs(own @ own.T) >= TOGETHER, np.maximum(cdist(places[seeds], places[seeds]), 1e-300), 0.0)
+        order, before = breadth_first_order(minimum_spanning_tree(csr_array(away)), 0, directed=False)
+        for child in order[1:]:  # one sign for all, passed on from the nearest
+            own[child] *= np.sign(own[child] @ own[before[child]])
+        along = _from_nearest(own[order], places[seeds[order]], places)
+        along[seeds[order]] = own[order]
         held = np.einsum("nd,nde,ne->n", along, rest, along) >= TOGETHER**2
-        found.append((np.where(held[:, None], _unit(np.einsum("nde,ne->nd", rest, along)), along), held))
+        along[held] = _unit(np.einsum("nde,ne->nd", rest[held], along[held]))
+        found.append((along, held))
         rest[held] = without(rest[held], along[held], 0.0)
     return found
 
 
 def _from_nearest(directions: Array, origin: Array, places: Array) -> Array:
-    """Return means (n, dim) of `directions` (k, dim) at `origin` (k, dim), up to their signs, by the distance to `places`."""
-    first = directions[0]
-    if (np.abs(directions @ first) > 1.0 - 1e-12).all():
-        return np.tile(first, (len(places), 1))
+    """Return unit means (n, dim) of `directions` (k, dim) at `origin` (k, dim), by their distance to `places`."""
+    if (directions @ directions[0] > 1.0 - 1e-12).all():
+        return np.tile(directions[0], (len(places), 1))
     away = np.maximum(cdist(places, origin), 1e-300)
-    weight = (away.min(axis=1, keepdims=True) / away) ** NEAREST
-    return np.asarray(np.linalg.eigh(np.einsum("nk,kd,ke->nde", weight, directions, directions))[1][:, :, -1])
+    return _unit((away.min(axis=1, keepdims=True) / away) ** NEAREST @ directions)
 
 
 def _unit(vectors: Array) -> Array:

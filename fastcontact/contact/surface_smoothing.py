@@ -16,6 +16,7 @@ from one facet to the next, heights are multiplied by the limiter of van Albada,
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -76,7 +77,7 @@ class Smoothing:
         ours = None if theirs is None else smooth_side(secondary, points)
         if ours is None or theirs is None:
             return None
-        made, axes = cls(ours, theirs), (frames(secondary, points), frames(primary, points))
+        made, axes = cls(ours, theirs), [frames(side, points, points) for side in (secondary, primary)]
         middles = [points[b.facets[:, : elements.get(b.element).n_corners]].mean(axis=1) for b in secondary.blocks]
         opposite = closest_of_kinds(np.concatenate(middles), primary.corners(points)).facet
         factor = made.shared(np.arange(len(opposite)), opposite, axes)
@@ -84,7 +85,7 @@ class Smoothing:
         counts |= factor[:, 1] * np.abs(theirs.heights[opposite]).max(axis=(1, 2)) > 0.0
         return made if counts.any() else None
 
-    def shared(self, ours: Indices, theirs: Indices, frames: tuple[Array, Array]) -> Array:
+    def shared(self, ours: Indices, theirs: Indices, frames: Sequence[Array]) -> Array:
         """Return the factors (n, 2) of the heights of secondary and primary facets, both (n,), that face each other.
 
         `frames` are those of all facets where they are now.
@@ -95,7 +96,7 @@ class Smoothing:
         own = np.stack([np.einsum("nij,nij->n", tensor, tensor) for tensor in (a, b)], axis=1)
         return np.clip(np.divide(common[:, None], own, out=np.zeros_like(own), where=own > 0.0), 0.0, 1.0)
 
-    def overlap(self, ours: tuple[Indices, Array], theirs: tuple[Indices, Array], frames: tuple[Array, Array]) -> Array:
+    def overlap(self, ours: tuple[Indices, Array], theirs: tuple[Indices, Array], frames: Sequence[Array]) -> Array:
         """Return by how much (n,) the smooth surfaces are closer to each other than the facets, where these face [length].
 
         `ours` and `theirs` are facets (n,) and reference coordinates (n, dim - 1) in them.
@@ -104,9 +105,20 @@ class Smoothing:
         return factor[:, 0] * self.secondary.at(*ours) + factor[:, 1] * self.primary.at(*theirs)
 
 
-def frames(side: Surface, coordinates: Array) -> Array:
-    """Return the unit tangents (n_facets, dim - 1, dim) of the middles of facets, the first towards their first corner."""
-    return np.concatenate([_axes(block, coordinates, _normals(block, coordinates))[:, :-1] for block in side.blocks])
+def frames(side: Surface, points: Array, coordinates: Array) -> Array:
+    """Return tangents (n_facets, dim - 1, dim) in the middles of facets as bodies carry them along, of unit length at rest.
+
+    At rest, at `points` (n_points, dim), the first one goes towards the first corner; they take part in the mean deformation
+    of a facet to `coordinates` (n_points, dim), so that no corner matters more than others.
+    """
+    found = []
+    for block in side.blocks:
+        rest, now = (x[block.facets[:, : elements.get(block.element).n_corners]] for x in (points, coordinates))
+        axes = _axes(block, points, _normals(block, points))[:, :-1]
+        local = (rest - rest.mean(axis=1, keepdims=True)) @ axes.transpose(0, 2, 1)
+        apart = now - now.mean(axis=1, keepdims=True)
+        found.append(np.linalg.solve(local.transpose(0, 2, 1) @ local, local.transpose(0, 2, 1) @ apart))
+    return np.concatenate(found)
 
 
 def _normals(block: FacetBlock, coordinates: Array) -> Array:

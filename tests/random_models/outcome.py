@@ -116,7 +116,7 @@ def figures(model: fc.Model, step: fc.StepResult, settled, factor: float, tolera
         "product": product,
         "cone": cone,
         "driving": driving,
-        "carried": max(mechanics.carried(step, settled, sizes, name) for name in step.contact),
+        "carried": max(mechanics.carried(model, step, settled, sizes, name) for name in step.contact),
     }
 
 

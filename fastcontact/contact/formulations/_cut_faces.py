@@ -18,7 +18,7 @@ from fastcontact.contact.search.box_tree_kernels import build, tree_order
 from fastcontact.contact.search.closest import closest_of_kinds
 from fastcontact.contact.search.facet_tables import tables
 from fastcontact.contact.surface import FacetBlock, Surface
-from fastcontact.contact.surface_smoothing import Smoothing
+from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements, quadrature
 
@@ -54,6 +54,7 @@ def face_overlap(
     theirs = [_Polygons.of(block, deformed) for block in primary.blocks]
     centres = np.concatenate([polygons.origin for polygons in ours])
     away = closest_of_kinds(centres, primary.corners(deformed)).distance
+    axes = None if smoothing is None else [frames(side, reference, deformed) for side in (secondary, primary)]
     masses, couplings, closer, first = [], [], [], 0
     for mine in ours:
         size, nodes = mine.block.facets.shape
@@ -61,7 +62,8 @@ def face_overlap(
         mass, depth, first_other = np.zeros((size, nodes, nodes)), np.zeros((size, nodes)), 0
         for other in theirs:
             pairs = _facing(mine, other, reach)
-            heights = _heights(smoothing, pairs, (first, first_other), (mine, other))
+            rows = slice(first, first + size), slice(first_other, first_other + len(other.nodes))
+            heights = _heights(smoothing, pairs, rows, axes)
             coupling, part, deep = _integrated(mine, other, pairs, reference, heights)
             couplings.append(coupling)
             mass += part
@@ -74,20 +76,18 @@ def face_overlap(
 
 
 def _heights(
-    smoothing: Smoothing | None, pairs: Indices, first: tuple[int, int], blocks: tuple[_Polygons, _Polygons]
+    smoothing: Smoothing | None, pairs: Indices, rows: tuple[slice, slice], axes: list[Array] | None
 ) -> tuple[Array, Array, Array]:
     """Return the heights of the facets of two blocks above their planes, and the factors (n_pairs, 2) of `Smoothing.shared`.
 
-    Heights of degree zero for none; `first` are the numbers of the first facets.
+    Heights of degree zero for none; `rows` are those of the facets of the blocks, `axes` the `frames` of all.
     """
-    if smoothing is None:
+    if smoothing is None or axes is None:
         none = np.zeros((0, 0, 0))
         return none, none, np.zeros((len(pairs), 2))
-    rows = [slice(start, start + len(polygons.nodes)) for start, polygons in zip(first, blocks, strict=True)]
     secondary, primary = smoothing.secondary.part(rows[0]), smoothing.primary.part(rows[1])
-    axes = blocks[0].axes[:, :2], blocks[1].axes[:, :2]
-    factor = Smoothing(secondary, primary).shared(pairs[:, 0], pairs[:, 1], axes)
-    return secondary.heights, primary.heights, factor
+    own = axes[0][rows[0]], axes[1][rows[1]]
+    return secondary.heights, primary.heights, Smoothing(secondary, primary).shared(pairs[:, 0], pairs[:, 1], own)
 
 
 @dataclass(frozen=True, eq=False)

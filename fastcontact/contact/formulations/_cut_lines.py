@@ -192,7 +192,7 @@ def line_overlap(
     """
     first = np.cumsum([0] + [len(block.facets) for block in primary.blocks])
     masses, couplings, closer, number_of_first = [], [], [], 0
-    axes = None if smoothing is None else (frames(secondary, deformed), frames(primary, deformed))
+    axes = None if smoothing is None else [frames(side, reference, deformed) for side in (secondary, primary)]
     for block in secondary.blocks:
         n, k = block.facets.shape
         points = line_points(block, primary, reference, deformed, axisymmetric, k + 2, tolerance)

@@ -84,14 +84,15 @@ def dual_functions(mass: Array, kept: Mask, fraction: Array) -> tuple[Array, Arr
     -------
     dual, D
         As by `biorthogonal`, for all functions kept where that makes sense. On a narrow strip those with next to no
-        share are left out, and if that does not help all but the one with the largest.
+        share are left out, and if that does not help all but those with the largest, or the first of these.
     """
     part = kept & (fraction > 0.0)
     dual, D = biorthogonal(mass, part)
     share = np.where(part, fraction, -1.0)
-    # The first of those that are nearly equal: which it is must not change as facets deform.
-    largest = np.argmax(share >= EQUAL * share.max(axis=1, keepdims=True), axis=1)[:, None] == np.arange(part.shape[1])
-    for fewer in (part & (fraction > COVERED), part & largest):
+    # Those that are nearly equal, or the first of them: which they are must not change as facets deform.
+    large = share >= EQUAL * share.max(axis=1, keepdims=True)
+    largest = np.argmax(large, axis=1)[:, None] == np.arange(part.shape[1])
+    for fewer in (part & (fraction > COVERED), part & large, part & largest):
         wild = np.flatnonzero(~_tame(dual, mass, part))
         if not len(wild):
             break

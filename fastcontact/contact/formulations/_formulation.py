@@ -283,10 +283,8 @@ class Formulation(ABC):
             or not isinstance(self.primary, Surface)
         ):
             return closer
-        axes = (
-            frames(self.secondary, self.points + at.displacement),
-            frames(self.primary, self.points + at.displacement),
-        )
+        deformed = self.points + at.displacement
+        axes = [frames(side, self.points, deformed) for side in (self.secondary, self.primary)]
         ours, theirs = (candidates.facet[rows], candidates.xi[rows]), (pairing.facet[rows], pairing.xi[rows])
         closer[rows] = self.smoothing.overlap(ours, theirs, axes)
         return closer

@@ -89,7 +89,7 @@ def test_only_the_curvature_that_both_sides_share_counts():
     rings = fc.generate.rings("quad4", divisions_inner=(1, 24), divisions_outer=(1, 36))
     inner, outer = surface(rings, "CONT_INNER"), surface(rings, "CONT_OUTER")
     both = Smoothing.of(inner, outer, rings.points)
-    axes = frames(inner, rings.points), frames(outer, rings.points)
+    axes = [frames(side, rings.points, rings.points) for side in (inner, outer)]
     assert both.shared(np.array([0, 2]), np.array([1, 7]), axes) == pytest.approx(np.ones((2, 2)), rel=1e-5)
     twice = Smoothing(both.secondary, smooth_side(outer, 2.0 * rings.points))
     assert twice.shared(np.array([3]), np.array([4]), axes) == pytest.approx(np.array([[0.5, 1.0]]), rel=1e-5)
