@@ -18,7 +18,12 @@ MANY = 10
 
 
 def wavering(pair: Formulation, contact: ContactResult) -> Iterator[str]:
-    """Yield a warning where pressures of nodes whose neighbours are all closed waver by much of their mean."""
+    """Yield a warning where pressures of nodes whose neighbours are all closed waver by much of their mean.
+
+    Sides that never part carry tension, too: their mean may be zero, or round-off, and says nothing.
+    """
+    if pair.options.always_closed:
+        return
     beside = pair.secondary.beside
     # A node is among its own neighbours here: so many less one are the others.
     others = np.asarray(beside.sum(axis=1)).ravel() - 1.0
