@@ -11,8 +11,9 @@ from fastcontact.results.step import ContactResult
 
 # Median difference of a nodal pressure from the mean of its neighbours, over the mean pressure, above which pressures waver.
 # On rings of tri3 cells 4.6 times as deep as wide it is 0.30, and pressures are off by 0.16 to 0.27; on wider ones 0.16 (0.09
-# to 0.13), on quadrangles 0.002; under punches of hex8 and tet4, whose pressures are singular at the edges, 0.10 to 0.12.
-WAVERING = 0.2
+# to 0.13), on quadrangles 0.002; under punches of hex8 and tet4, whose pressures are singular at the edges, 0.10 to 0.12,
+# and under a hex8 sole that wears 0.22.
+WAVERING = 0.25
 # Nodes that a median says something about.
 MANY = 10
 
