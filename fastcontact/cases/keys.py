@@ -107,7 +107,7 @@ def called(where: str, function: Callable[..., Any], arguments: dict[str, Any]) 
         given = ", ".join(f"{key} = {repr(value)}" for key, value in arguments.items())
         raise CaseError(f"'{where}': {given} are not of the kinds that it takes ({error})") from error
     except FastcontactError as error:
-        raise CaseError(of_key(where, f"'{where}': {error}", str(error))) from error
+        raise CaseError(_of_key(where, str(error)) or f"'{where}': {error}") from error
 
 
 @contextlib.contextmanager
@@ -120,14 +120,16 @@ def at(where: str) -> Iterator[None]:
     except FastcontactError as error:
         if where.replace(".", " '", 1) + "'" in str(error):  # it names the place already
             raise
-        raise type(error)(of_key(where, f"{where}: {error}", str(error))) from error
+        if told := _of_key(where, str(error)):
+            raise CaseError(told) from error
+        raise type(error)(f"{where}: {error}") from error
 
 
-def of_key(where: str, otherwise: str, text: str) -> str:
-    """Return what is wrong with an argument of a Python function as what is wrong with a key of a case file."""
+def _of_key(where: str, text: str) -> str:
+    """Return what is wrong with an argument of a Python function as what is wrong with a key; empty for all else."""
     wrong = _ARGUMENT.fullmatch(text)
     if wrong is None:
-        return otherwise
+        return ""
     kinds = wrong["kinds"].replace("a sequence of", "a list of").removesuffix(" or None")
     return f"the value of '{where}.{wrong['key']}' must be {kinds}, not {wrong['given']}"
 
