@@ -50,9 +50,12 @@ def types_as_prose(app: Any, what: str, name: str, obj: Any, options: Any, lines
 
 
 def colons_as_prose(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
-    """Keep napoleon from taking what stands before a colon, in the first line on a property, for its type."""
-    if what in ("attribute", "data", "property"):
-        lines.insert(0, "")
+    """Put what stood before a colon in the first line on a property back: napoleon takes it for a type."""
+    told = [line.removeprefix(":type: ") for line in lines if line.startswith(":type: ")]
+    if what in ("attribute", "data", "property") and told:
+        first = next(k for k, line in enumerate(lines) if line)
+        lines[first] = f"{told[0]}: {lines[first]}"
+        lines[:] = [line for line in lines if not line.startswith(":type: ")]
 
 
 def inline_math(translator: Any, node: nodes.math) -> None:
@@ -68,7 +71,7 @@ def block_math(translator: Any, node: nodes.math_block) -> None:
 
 
 def setup(app: Any) -> None:
-    """Register with Sphinx; colons are kept before napoleon runs, types rewritten after it."""
+    """Register with Sphinx; types are rewritten after napoleon has run."""
     app.add_html_math_renderer("mathml", (inline_math, None), (block_math, None))
-    app.connect("autodoc-process-docstring", colons_as_prose, priority=100)
+    app.connect("autodoc-process-docstring", colons_as_prose, priority=800)
     app.connect("autodoc-process-docstring", types_as_prose, priority=900)
