@@ -147,12 +147,12 @@ def _solve(
 
     `at` are the bodies and their displacements (n_dofs,) [length], `scale` the displacement to expect [length] and the last
     relative change: contact geometry settles to a part of that. Where the tangent is not positive definite, there is no
-    equilibrium to lead to, and the part of the pressure that turns is left out.
+    equilibrium of the bodies alone to lead to, and the initial-stress stiffness is left out.
     """
     try:
         return _linear_contact(problem, start, load, at, iterate, scale)
     except (ModelError, ConvergenceError) as error:
-        log.info("the tangent leaves out how pressure turns: %s", error)
+        log.info("the tangent leaves out the initial-stress stiffness: %s", error)
     try:
         definite = problem.deformed(at[1], start, geometric=False)
         return _linear_contact(problem, start, load, (definite, at[1]), iterate, scale)

@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact.analysis.contact_answers import lumped_areas
 from fastcontact.analysis.problem import Problem
+from fastcontact.contact.integration import lumped_areas
 from fastcontact.model.periodicity import Seam
 from fastcontact.results.step import ContactResult, StepResult
 

@@ -69,6 +69,8 @@ class State:
         Rigid position of unsupported bodies in the last step.
     history : dict of str to ndarray (n_cells, n_q, 9)
         By solid element of nonlinear bodies, see `constitutive_kernels`; none before the first step.
+    halved : int
+        How often load steps of nonlinear bodies are halved before they are tried.
     solver : object
         What the linear solver keeps from step to step, see `LinearSolver.snapshot`.
     """
@@ -94,6 +96,7 @@ class State:
     last_change: tuple[int, float] | None = None
     rigid: RigidPosition | None = None
     history: Mapping[str, Array] = field(default_factory=dict)
+    halved: int = 0
     solver: Any = None
 
     def after_touching(self, pairs: Iterable[str]) -> State:
@@ -109,6 +112,7 @@ class State:
                 "largest_force": float(self.largest_force),
                 "largest_work": float(self.largest_rigid_force),
                 "round_off": float(self.gap_round_off),
+                "halved": self.halved,
             },
             "obstacles": self.u[n_dofs:].copy(),
             "touched": sorted(self.touched),
@@ -157,6 +161,7 @@ class State:
             u,
             numbers["round_off"],
             history=dict(kept.get("history", {})),
+            halved=int(numbers.get("halved", 0)),
             active=dict(kept["active"]),
             pressure=dict(kept["pressure"]),
             obstacles={name: now.copy() for name, now in found["now"].items()},
