@@ -26,6 +26,8 @@ Array = NDArray[np.float64]
 History = dict[str, Array]
 # Numbers of the history of a quadrature point, see `constitutive_kernels`.
 HISTORY, PLASTIC_STRAIN, ACROSS = 9, 6, 8
+# How much of the geometric stiffness a tangent has, see `NonlinearBodies.at`.
+WHOLE = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,11 +109,12 @@ class NonlinearBodies:
         bulk[projected] = np.column_stack([bulk[:, 1] - rest, np.broadcast_to(rest, len(bulk))])[projected]
         return moduli, bulk
 
-    def at(self, displacement: Array, before: Mapping[str, Array], *, geometric: bool = True) -> DeformedBodies:
+    def at(self, displacement: Array, before: Mapping[str, Array], *, geometric: int = WHOLE) -> DeformedBodies:
         """Return the bodies at `displacement` (n_points, dim) [length], with the history `before` the load step.
 
-        Without `geometric` the tangent has no initial-stress stiffness: it is positive definite farther from the solution, and
-        where contact alone keeps a body under load from turning.
+        The tangent is whole, or as `geometric` says without how the mean pressure turns (1), or without initial-stress
+        stiffness (0): it is then positive definite farther from the solution, and where contact alone keeps a body under load
+        from turning.
 
         Raises
         ------

@@ -59,7 +59,8 @@ class ContactResult:
     pressure : ndarray (m,)
         Contact pressure, >= 0 in compression, per reference area; negative only where tied or bilateral contact pulls. With
         the shape functions of the facets its integral over the whole reference surface is the sum of the normal forces.
-        In finite strain per area of the deformed surface, as `multiplier` and `shear` are [pressure].
+        In finite strain per area of the deformed surface, in plane stress of unit thickness, as `multiplier` and `shear` are
+        [pressure].
     multiplier : ndarray (m,)
         The pressure that the formulation finds at the nodes, before closed nodes take over what open ones have of it, and
         tension [pressure].

@@ -160,7 +160,7 @@ def test_the_tangent_without_initial_stress_is_positive_semidefinite(kinematics:
     points = model.mesh.points
     for squeeze in (-0.15, 0.15):
         u = squeeze * points + 0.02 * np.random.default_rng(1).normal(size=points.shape)
-        definite = bodies.at(u, bodies.beginning, geometric=False)
+        definite = bodies.at(u, bodies.beginning, geometric=0)
         whole = bodies.at(u, bodies.beginning)
         values = np.linalg.eigvalsh(definite.K.toarray())
         assert values[0] >= -1e-12 * values[-1]

@@ -1,0 +1,166 @@
+"""Contact in finite strain on the deformed surfaces: patch tests, sliding over facets, rings held by contact alone."""
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from tests.verification.test_finite_strain import LAWS
+
+
+def stack(kinematics: str, element: str, law, **options):
+    """Squeeze two blocks whose cells do not match by 30 %; return the last step and the model."""
+    if kinematics == "3d":
+        lower = fc.generate.box((1.0, 1.0, 0.5), (2, 3, 2), element=element)
+        upper = fc.generate.box((1.0, 1.0, 0.5), (3, 2, 2), element=element)
+        faces, axis = ("ZMIN", "ZMAX"), "z"
+    else:
+        lower = fc.generate.block((1.0, 0.5), (4, 2), element=element)
+        upper = fc.generate.block((1.0, 0.5), (3, 2), element=element)
+        faces, axis = ("BOTTOM", "TOP"), "y"
+    upper = fc.generate.transformed(upper, translate=(*[0.0] * (lower.dim - 1), 0.5))
+    names = {faces[0]: "BASE", faces[1]: "JOINT"}, {faces[0]: "SOLE", faces[1]: "HEAD"}
+    mesh = fc.generate.union(*(fc.generate.renamed(part, own) for part, own in zip((lower, upper), names, strict=True)))
+    model = fc.Model(mesh, kinematics, strain="finite")
+    model.add_material(law)
+    for group, component in (("LEFT", "x"), ("XMIN", "x"), ("YMIN", "y"), ("BASE", axis)):
+        if group in mesh.cell_groups:
+            model.fix(group, component)
+    model.prescribe("HEAD", **{axis: -0.3})
+    model.add_contact("joint", secondary="SOLE", primary="JOINT", **options)
+    return fc.solve(model, 3)[-1], model
+
+
+@pytest.mark.parametrize("law", ["neo-Hookean", "Ogden"])
+@pytest.mark.parametrize(
+    ("kinematics", "element"),
+    [
+        ("plane_strain", "quad4"),
+        ("plane_strain", "tri6"),
+        ("plane_stress", "quad8"),
+        ("axisymmetric", "quad4"),
+        ("3d", "hex8"),
+    ],
+)
+def test_pressure_is_the_true_stress_across(kinematics: str, element: str, law: str) -> None:
+    step, model = stack(kinematics, element, LAWS[law][0])
+    contact, axis = step.contact["joint"], model.mesh.dim - 1
+    stress = step.stress[:, {"3d": 2}.get(kinematics, 1)]
+    assert stress == pytest.approx(stress[0], rel=1e-6)
+    side = model.mesh.points[contact.points, 0].argmax()
+    grown = 1.0 + step.displacement[contact.points[side], 0]
+    # In plane stress pressures are forces per length and unit of thickness before.
+    thickness = step.cell_fields["J"][0] / (0.7 * grown) if kinematics == "plane_stress" else 1.0
+    assert contact.pressure == pytest.approx(-stress[0] * thickness, rel=1e-6)
+    # The true area is larger than that of before, by what the body has grown across.
+    answers = fc.contact_answers(model, [step], "joint")[0]
+    area = {"plane_strain": grown, "plane_stress": grown, "axisymmetric": np.pi * grown**2, "3d": grown**2}[kinematics]
+    assert grown > 1.1
+    assert answers.area == pytest.approx(area, rel=1e-6)
+    assert answers.pressure_mean == pytest.approx(-stress[0] * thickness, rel=1e-6)
+    assert abs(contact.force[axis]) == pytest.approx(-stress[0] * thickness * area, rel=1e-6)
+
+
+def test_the_width_of_a_contact_is_that_of_the_deformed_shape() -> None:
+    step, _ = stack("plane_strain", "quad4", LAWS["neo-Hookean"][0])
+    contact = step.contact["joint"]
+    grown = 1.0 + step.displacement[contact.points, 0].max()
+    assert max(contact.radius[0], 0.0) in (pytest.approx(grown, rel=1e-6), pytest.approx(0.5 * grown, rel=1e-6))
+
+
+@pytest.mark.parametrize("element", ["quad4", "quad8"])
+@pytest.mark.filterwarnings("ignore:contact 'ball' has only")
+def test_a_ball_slides_over_a_rubber_block(element: str) -> None:
+    """Pressed in by a quarter of the height, then slid by more than three facets; friction of 0.5."""
+    size, far = 0.1, 0.9
+    mesh = fc.generate.block((4.0, 1.0), (40, 10), element=element, origin=(-2.0, 0.0))
+    model = fc.Model(mesh, "plane_strain", strain="finite")
+    model.add_material(fc.NeoHookean(E=1.0, nu=0.4995))
+    model.fix("BOTTOM", "y")
+    model.prescribe("BOTTOM", x=-far, ramp=[(0.0, 0.0), (1.0, 0.0), (2.0, 1.0)])
+    model.add_obstacle(
+        "ball", secondary="TOP", obstacle=fc.obstacles.Sphere((0.0, 1.5), 0.5), friction=0.5, motion={"y": -0.25},
+        ramp=[(0.0, 0.0), (1.0, 1.0), (2.0, 1.0)],
+    )  # fmt: skip
+    steps = fc.solve(model, [0.5, 1.0, *(1.0 + np.arange(1, 13) / 12)])
+    for step in steps:
+        contact = step.contact["ball"]
+        bottom = mesh.points_of("BOTTOM")
+        assert step.reaction[bottom].sum(axis=0) == pytest.approx(
+            -contact.force, abs=1e-6 * np.abs(contact.force).max()
+        )
+        assert (np.linalg.norm(contact.shear, axis=1) <= 0.5 * contact.pressure * (1.0 + 1e-3) + 1e-9).all()
+        # Normals of the obstacle at the deformed nodes.
+        out = contact.coordinates + step.displacement[contact.points] - [0.0, 1.5 - 0.25 * min(step.load_factor, 1.0)]
+        out /= np.linalg.norm(out, axis=1)[:, None]
+        assert contact.normal[contact.active] == pytest.approx(out[contact.active], abs=1e-6)
+    last = steps[-1].contact["ball"]
+    assert not last.sticking.any()
+    assert np.linalg.norm(last.slip_total, axis=1)[last.active].min() > 0.0
+    assert np.linalg.norm(last.slip_total, axis=1).max() >= 3.0 * size
+    sliding = np.linalg.norm(last.shear[last.active], axis=1)
+    assert sliding == pytest.approx(0.5 * last.pressure[last.active], rel=1e-3)
+    # Sliding has become steady: the last facet changes the force by little.
+    forces = np.array([step.contact["ball"].force for step in steps[-3:]])
+    assert np.ptp(forces, axis=0).max() <= 0.03 * np.abs(forces).max()
+    work = steps[-1].work
+    assert work["friction"] > 0.3 * work["strain_energy"]
+
+
+def ring(free: bool):
+    """Return an O-ring between plates that squeeze it by a quarter: half of it, or all, held by contact alone."""
+    part = fc.generate.quarter_disc("tri6", R=2.5, size=0.5, contact_size=0.5, contact_radius=1.25)
+    part = fc.generate.transformed(part, translate=(0.0, 2.5))
+    mesh = fc.generate.union(part, fc.generate.mirrored(part, "x"))
+    if free:
+        mesh = fc.generate.union(mesh, fc.generate.mirrored(mesh, "y"))
+    mesh = fc.generate.transformed(fc.generate.merge_points(mesh, 1e-6), translate=(25.0, 0.0))
+    model = fc.Model(mesh, "axisymmetric", strain="finite")
+    model.add_material(fc.NeoHookean(E=6.0, nu=0.4995))
+    if free:
+        model.add_obstacle("floor", secondary="CONT1", obstacle=fc.obstacles.HalfSpace((0.0, -2.5), (0.0, 1.0)))
+    else:
+        model.fix("A1B1", "y")
+    plate = fc.obstacles.HalfSpace(point=(0.0, 2.5), normal=(0.0, -1.0))
+    model.add_obstacle("plate", secondary="CONT1", obstacle=plate, motion={"y": -0.625 * (1 + free)})
+    return model
+
+
+@pytest.mark.filterwarnings("ignore:contact .* has only 3 elements")
+def test_a_ring_held_by_contact_alone_is_that_of_symmetry() -> None:
+    """Between plates a ring would roll: its stiffness alone is not definite, and it has more iterations."""
+    half, whole = (fc.solve(ring(free), 2) for free in (False, True))
+    for one, other in zip(half, whole, strict=True):
+        assert other.contact["plate"].force[1] == pytest.approx(one.contact["plate"].force[1], rel=1e-5)
+        assert other.contact["floor"].force[1] == pytest.approx(-other.contact["plate"].force[1], rel=1e-5)
+    # Lindley (1967), of a cord with a diameter of 5; the volume is kept.
+    force = -half[-1].contact["plate"].force[1] / (np.pi * 50.0)
+    assert force == pytest.approx(6.0 * 5.0 * (1.25 * 0.25**1.5 + 50.0 * 0.25**6), rel=0.1)
+    points, moved = (ring(False).mesh.points + part * half[-1].displacement for part in (0.0, 1.0))
+    assert volume(ring(False).mesh, moved) == pytest.approx(volume(ring(False).mesh, points), rel=1e-3)
+
+
+def volume(mesh: fc.Mesh, points: np.ndarray) -> float:
+    """Return the volume of revolution of a mesh with other places."""
+    from fastcontact.mesh import elements
+
+    total = 0.0
+    for name, cells in mesh.solids.items():
+        N, dN, weights = elements.get(name).tables
+        jacobian = np.einsum("qaj,cai->cqij", dN, points[cells])
+        total += (weights * np.linalg.det(jacobian) * (points[cells][:, :, 0] @ N.T)).sum()
+    return 2.0 * np.pi * total
+
+
+def test_steps_are_cut_and_grow_again() -> None:
+    """One step to half the height, under a punch: parts that fail are halved, and the next ones are no larger at once."""
+    mesh = fc.generate.block((1.0, 1.0), (6, 6))
+    model = fc.Model(mesh, "plane_strain", strain="finite")
+    model.add_material(fc.NeoHookean(E=1.0, nu=0.4995))
+    model.fix("BOTTOM", "xy")
+    model.prescribe("TOP", x=0.0, y=-0.6)
+    step = fc.solve(model, 1)[-1]
+    parts = step.iterations.get("substeps", [])
+    assert step.load_factor == 1.0
+    direct = fc.solve(model, 16)[-1]
+    assert step.displacement == pytest.approx(direct.displacement, abs=1e-6)
+    assert len(parts) < 16
