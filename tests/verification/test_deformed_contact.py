@@ -67,9 +67,9 @@ def test_the_width_of_a_contact_is_that_of_the_deformed_shape() -> None:
     assert max(contact.radius[0], 0.0) in (pytest.approx(grown, rel=1e-6), pytest.approx(0.5 * grown, rel=1e-6))
 
 
-@pytest.mark.parametrize("element", ["quad4", "quad8"])
+@pytest.mark.parametrize(("element", "formulation"), [("quad4", "node_to_segment"), ("quad8", None)])
 @pytest.mark.filterwarnings("ignore:contact 'ball' has only")
-def test_a_ball_slides_over_a_rubber_block(element: str) -> None:
+def test_a_ball_slides_over_a_rubber_block(element: str, formulation: str | None) -> None:
     """Pressed in by a quarter of the height, then the block is drawn on by three facets; friction of 0.5."""
     mesh = fc.generate.block((4.0, 1.0), (40, 10), element=element, origin=(-2.0, 0.0))
     model = fc.Model(mesh, "plane_strain", strain="finite")
@@ -78,7 +78,7 @@ def test_a_ball_slides_over_a_rubber_block(element: str) -> None:
     model.prescribe("BOTTOM", x=-0.3, ramp=[(0.0, 0.0), (1.0, 0.0), (2.0, 1.0)])
     model.add_obstacle(
         "ball", secondary="TOP", obstacle=fc.obstacles.Sphere((0.0, 1.5), 0.5), friction=0.5, motion={"y": -0.25},
-        ramp=[(0.0, 0.0), (1.0, 1.0), (2.0, 1.0)],
+        ramp=[(0.0, 0.0), (1.0, 1.0), (2.0, 1.0)], formulation=formulation,
     )  # fmt: skip
     steps = fc.solve(model, [0.5, 1.0, 1.25, 1.5, 1.75, 2.0])
     bottom = mesh.points_of("BOTTOM")
@@ -96,13 +96,13 @@ def test_a_ball_slides_over_a_rubber_block(element: str) -> None:
     last = steps[-1].contact["ball"]
     slides = last.active & ~last.sticking
     assert 2 <= slides.sum() < last.active.sum()
-    if element == "quad4":  # a force and a node are one
+    if formulation == "node_to_segment":  # where the law holds at nodes
         shear = np.linalg.norm(last.shear, axis=1)
-        assert shear[slides] == pytest.approx(0.5 * last.pressure[slides], rel=0.05)
-    # What the support pulls with grows by nearly the same in every part of the way; the block sinks no further.
+        assert shear[slides] == pytest.approx(0.5 * last.pressure[slides], rel=1e-3)
+    # The pull grows in every part of the way; the push falls by the few hundredths that sheared rubber sinks.
     pull = np.array([step.contact["ball"].force[0] for step in steps[1:]])
     assert (np.diff(pull) > 0.05).all()
-    assert steps[-1].contact["ball"].force[1] == pytest.approx(steps[1].contact["ball"].force[1], rel=0.05)
+    assert steps[-1].contact["ball"].force[1] == pytest.approx(steps[1].contact["ball"].force[1], rel=0.08)
     assert steps[-1].contact["ball"].dissipation > 0.0
 
 
