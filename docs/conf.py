@@ -49,6 +49,12 @@ def types_as_prose(app: Any, what: str, name: str, obj: Any, options: Any, lines
     lines[:] = [re.sub(r"^:ivar ([^:]+):", described, line) for line in kept]
 
 
+def colons_as_prose(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
+    """Keep napoleon from taking what stands before a colon, in the first line on a property, for its type."""
+    if what in ("attribute", "data", "property"):
+        lines.insert(0, "")
+
+
 def inline_math(translator: Any, node: nodes.math) -> None:
     """Write a formula in a line as MathML, which browsers show without scripts and without the network."""
     translator.body.append(tex2mathml(node.astext()))
@@ -62,6 +68,7 @@ def block_math(translator: Any, node: nodes.math_block) -> None:
 
 
 def setup(app: Any) -> None:
-    """Register with Sphinx; types are rewritten after napoleon has run."""
+    """Register with Sphinx; colons are kept before napoleon runs, types rewritten after it."""
     app.add_html_math_renderer("mathml", (inline_math, None), (block_math, None))
+    app.connect("autodoc-process-docstring", colons_as_prose, priority=100)
     app.connect("autodoc-process-docstring", types_as_prose, priority=900)

@@ -1,4 +1,4 @@
-"""Compiled kernels on disk: each in a file, used only if it is whole, nobody else's, and of the sources as they are.
+"""Cache of compiled kernels on disk: a file is used only if intact, owned by the user and built from the present sources.
 
 Numba knows a kernel by the time and size of its own source file, reads whatever lies in its cache, and stops where that is
 damaged. Here the name of a file tells the contents of all sources that the kernel depends on, so that kernels outlive another
@@ -30,6 +30,8 @@ log = logging.getLogger("fastcontact")
 OPTIONS = ("OPT", "BOUNDSCHECK", "DEBUGINFO_DEFAULT", "CPU_NAME", "CPU_FEATURES", "THREADING_LAYER")
 # Characters of a digest.
 DIGEST = 64
+# Whether kernels are kept at all.
+kept = False
 CONSTANTS = (bool, int, float, complex, str, tuple, np.ndarray, np.generic, type(None))
 
 
@@ -110,6 +112,8 @@ def keep(kernel: Any, function: Callable[..., Any], options: str) -> str:
         return f"others may write to the folder of compiled kernels, {folder}"
     name = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}"
     numbas._cache_file = KernelFiles(folder, name, function, options, numbas._cache_file)
+    global kept
+    kept = True
     return ""
 
 

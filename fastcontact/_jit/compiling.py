@@ -1,4 +1,4 @@
-"""Who is told that kernels are being compiled, which takes up to a minute where all were silent."""
+"""Notification that kernels are being compiled, which may take a minute."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def notify() -> None:
     count += 1
     if count == 1:
         log.info(TEXT)
-    for listener in tuple(listeners):
+    for listener in (*listeners, *helpers):
         listener()
 
 
@@ -37,3 +37,5 @@ def _somebody_waits() -> bool:
 
 # Called as a kernel is compiled; one that is read from the disk cache is not.
 listeners: list[Callable[[], None]] = [tell_who_waits]
+# Called likewise: see `ahead`.
+helpers: list[Callable[[], None]] = []

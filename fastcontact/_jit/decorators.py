@@ -1,4 +1,4 @@
-"""How kernels are compiled: disk cache, arithmetic as written, threads.
+"""Decorators of kernels: disk cache, strict floating-point arithmetic, threads.
 
 Kernels compile at their first call, never at import. Where no folder is writable for the cache, they compile
 in every process instead, and one line in the log says so.
@@ -12,6 +12,7 @@ import os
 from collections.abc import Callable
 from typing import Any
 
+from fastcontact._jit import environment  # isort: skip # noqa: F401 (before Numba)
 import numba
 from numba.core import event
 
@@ -82,6 +83,7 @@ def innermost_kernel(function: Callable[..., Any]) -> Any:
 
 def _compile(function: Callable[..., Any], parallel: bool, fastmath: set[str] = AS_WRITTEN, **inlining: Any) -> Any:
     options: dict[str, Any] = {"fastmath": fastmath, "parallel": parallel, "nogil": True, "error_model": "numpy"}
+    options["no_cfunc_wrapper"] = True  # a second entry for C, which nobody calls
     options |= inlining
     try:
         cached = numba.njit(cache=True, **options)(function)

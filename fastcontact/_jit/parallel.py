@@ -1,4 +1,4 @@
-"""Work shared by threads, with the same bits whatever their number.
+"""Deterministic multithreading: results do not depend on the number of threads.
 
 Compiled loops release the interpreter, so plain threads run them side by side. Each has its own rows of a matrix, or its
 own cells; nothing is added across threads.
@@ -13,6 +13,7 @@ from functools import lru_cache, wraps
 from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fastcontact._jit import decorators
 
@@ -52,6 +53,13 @@ def on_one_blas_thread(function: Callable[Given, Result]) -> Callable[Given, Res
             return function(*args, **kwargs)
 
     return limited
+
+
+def read_only(numbers: NDArray[Any]) -> NDArray[Any]:
+    """Return a view that cannot be written, as the arrays of a mesh are: kernels are compiled for either kind."""
+    view = numbers.view()
+    view.flags.writeable = False
+    return view
 
 
 def portions(count: int, nodes: int = NODES) -> list[tuple[int, int]]:

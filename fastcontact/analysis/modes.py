@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import bsr_array
 
 from fastcontact._jit import parallel
-from fastcontact.analysis.locked_sections import at_present_length
 from fastcontact.analysis.modal.eigenpairs import lowest
 from fastcontact.analysis.modal.held_contact import held_contact
 from fastcontact.analysis.modal.reduced import Reduced
 from fastcontact.analysis.problem import near_nullspace
+from fastcontact.analysis.stages import at_present_length, stage_of
+from fastcontact.arrays import Array
 from fastcontact.contact.held_motions import HeldMotions
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.cell_stress import CellStress
@@ -33,7 +33,9 @@ from fastcontact.mesh.html_table import html_table
 from fastcontact.model.model import Model
 from fastcontact.results.step import StepResult
 
-Array = NDArray[np.float64]
+if TYPE_CHECKING:
+    import pandas
+
 # The shift that makes free bodies regular, by the eigenvalue of a uniform deformation: below those of all but thin bodies.
 SHIFT = 1e-4
 
@@ -66,7 +68,7 @@ class Modes(Sequence[StepResult]):
 
     @property
     def effective_mass(self) -> Array:
-        """Effective modal masses (n, dim) [mass]: squares of the participation, which add up to all of the mass."""
+        """Effective modal masses (n, dim) [mass], the squares of the participation factors, whose sum is the total mass."""
         return np.asarray(self.participation**2)
 
     def __len__(self) -> int:
@@ -104,7 +106,7 @@ class Modes(Sequence[StepResult]):
             for k, (f, masses) in enumerate(zip(self.frequencies, self.effective_mass))
         ]
 
-    def to_pandas(self) -> Any:
+    def to_pandas(self) -> pandas.DataFrame:
         """Return frequencies and effective masses as a ``pandas.DataFrame``; FileError if pandas is not installed."""
         try:
             import pandas
@@ -178,6 +180,7 @@ def modes(
             f"the step has displacements of shape {step.displacement.shape}, but the mesh points of shape "
             f"{model.mesh.points.shape}: take a step of this model"
         )
+    model = stage_of(model, step)
     density = Densities([material for material, _ in model.materials], model.material_of_cells())
     field, driven = model.material_field(), model.force_driven
     K = _stiffness(model, step if stress_stiffening else None, field)

@@ -1,4 +1,4 @@
-"""Restart data: what a later process needs to continue an analysis, as plain numbers, strings and arrays.
+"""Restart data, as plain numbers, strings and arrays.
 
 It is the state at the end of a step, but for the displacements, which the result of the step holds; what the linear solver
 has learnt; and what tells the case from others. The state includes what later iterates owe to earlier ones in their last
@@ -7,7 +7,8 @@ digits, so that an analysis that continues repeats an uninterrupted one bit for 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
@@ -30,7 +31,7 @@ SAME_INSTANT = 1e-12
 
 
 def identity(model: Model, ramp: Ramp, criteria: Criteria) -> dict[str, Any]:
-    """Return what tells a case from another one: digests of its parts, and its load history."""
+    """Return the identity of a case: digests of its parts, and its load history."""
     options = {name: getattr(criteria, name) for name in ANSWER}
     return {"parts": fingerprint(model, options), "table": [list(row) for row in ramp.table]}
 
@@ -43,10 +44,11 @@ def check(step: StepResult, case: dict[str, Any], model: Model) -> None:
             f"step {step.index} does not hold what it takes to go on from it: resume from the last step that solve "
             "returned, or from a result file of this version of fastcontact; or start anew"
         )
-    then, end = state["case"], step.load_factor
-    parts = different(then["parts"], case["parts"])
-    if _history(then["table"], end, case["table"]) != _history(case["table"], end, then["table"]):
-        parts.append(f"the load history up to {end:g}")
+    with _whole(step):
+        then, end = state["case"], step.load_factor
+        parts = different(then["parts"], case["parts"])
+        if _history(then["table"], end, case["table"]) != _history(case["table"], end, then["table"]):
+            parts.append(f"the load history up to {end:g}")
     if parts:
         raise ModelError(
             f"the steps so far belong to another case; changed since: {', '.join(parts)}. Go on with what they "
@@ -63,10 +65,10 @@ def _formulations(then: dict[str, str], now: dict[str, str], model: Model) -> st
 
 
 def taken(problem: Problem, state: State, case: dict[str, Any]) -> dict[str, Any]:
-    """Return what a later process needs to continue after a step; `case` from `identity`."""
-    solver, kept = problem.solver, state.to_dict(problem.model.n_dofs)
-    extrapolation = kept.pop("extrapolation")
-    kept = {"format": FORMAT, "case": case, **kept, "solver": {"kind": _kind(solver), "memory": solver.memory()}}
+    """Return the restart data after a step; `case` from `identity`."""
+    kept = state.to_dict(problem.model.n_dofs)
+    extrapolation, memory = kept.pop("extrapolation"), kept.pop("solver")
+    kept = {"format": FORMAT, "case": case, **kept, "solver": {"kind": _kind(problem.solver), "memory": memory}}
     if _extrapolates(problem):
         kept["extrapolation"] = extrapolation
     return kept
@@ -74,18 +76,31 @@ def taken(problem: Problem, state: State, case: dict[str, Any]) -> dict[str, Any
 
 @on_one_blas_thread
 def put_back(problem: Problem, step: StepResult, touched: frozenset[str]) -> State:
-    """Return the state after `step`, which `check` has found to fit; the linear solver remembers what it had learnt.
+    """Return the state after `step`, which `check` has accepted; the linear solver continues from its snapshot.
 
     `touched` are the contact pairs that were closed at the end of a step so far.
     """
     kept = step.restart
     assert kept is not None
-    if kept["solver"]["kind"] == _kind(problem.solver):
-        problem.solver.remember(kept["solver"]["memory"])
-    state = State.from_dict(kept, step.displacement, touched)
+    with _whole(step):
+        if kept["solver"]["kind"] == _kind(problem.solver):
+            problem.solver.put_back(kept["solver"]["memory"])
+        state = State.from_dict(kept, step.displacement, touched)
     if not _extrapolates(problem):
         state = replace(state, extrapolation=Extrapolation())
     return replace(state, solver=problem.solver.snapshot())
+
+
+@contextmanager
+def _whole(step: StepResult) -> Iterator[None]:
+    """Turn what restart data that lack a part, or have one of another kind, raise into one sentence."""
+    try:
+        yield
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
+        raise ModelError(
+            f"the restart data of step {step.index} are damaged ({type(error).__name__}: {error}): resume from another file, "
+            "or start anew without resuming"
+        ) from error
 
 
 def _extrapolates(problem: Problem) -> bool:
@@ -109,5 +124,5 @@ def _history(table: Sequence[Sequence[float]], end: float, other: Sequence[Seque
 
 
 def _kind(solver: Any) -> list[Any]:
-    """Return what solvers that take each other's memory share."""
+    """Return the kind of a solver: solvers of one kind can continue from each other's snapshots."""
     return [getattr(solver, "name", type(solver).__name__), solver.tolerance if solver.asked is None else solver.asked]

@@ -1,4 +1,4 @@
-"""The ramp: load steps one after the other, from the beginning or where others stopped, each handed over when it is done."""
+"""Run an analysis: load steps in order, from the beginning or from a restart, each yielded as it converges."""
 
 from __future__ import annotations
 
@@ -7,14 +7,15 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
+from fastcontact._jit import ahead
 from fastcontact.analysis import restart, step_halving
 from fastcontact.analysis.criteria import Criteria
-from fastcontact.analysis.locked_sections import go_on, locked_before
 from fastcontact.analysis.problem import Problem, prepare
 from fastcontact.analysis.progress import Progress
 from fastcontact.analysis.result_warnings import result_warnings
+from fastcontact.analysis.stages import go_on, stage_of
 from fastcontact.errors import ModelError, warn
-from fastcontact.linear.choice import check_tolerance
+from fastcontact.linear.choice import DIRECT_UP_TO, check_tolerance
 from fastcontact.mesh.argument_types import typed
 from fastcontact.model.model import Model
 from fastcontact.model.model_warnings import model_warnings
@@ -138,6 +139,7 @@ def solve_steps(
     instants = restart.remaining(ramp, last)
     if not instants:
         return iter(())
+    ahead.expect(_kinds(model, linear_solver))
     model.check(ramp)
     prepared = partial(
         prepare, ramp=ramp, criteria=criteria, linear_solver=linear_solver, linear_tolerance=linear_tolerance,
@@ -147,8 +149,15 @@ def solve_steps(
     return _marched(model, ramp, prepared, instants, case, last, touched)
 
 
+def _kinds(model: Model, linear_solver: str) -> list[str]:
+    """Return the kinds of runs, as in the table of `_jit.ahead`, whose kernels a model needs."""
+    dim = model.mesh.dim
+    multigrid = linear_solver == "amg" or (linear_solver == "auto" and model.mesh.n_points * dim > DIRECT_UP_TO[dim])
+    return [f"{dim}d", *([f"{dim}d amg"] if multigrid else [])]
+
+
 def _touched(steps: Sequence[StepResult]) -> frozenset[str]:
-    """Return the names of the contact pairs that were closed in any of the steps: mostly the last one tells all."""
+    """Return the names of the contact pairs that were closed in any of the steps; usually the last step suffices."""
     touched: set[str] = set()
     for step in reversed(steps):
         touched |= {name for name, found in step.contact.items() if found.active.any()}
@@ -165,7 +174,7 @@ def _marched(
     doubtful = model_warnings(model, ramp)
     for text in doubtful if last is None else ():
         warn(text)
-    problem = prepared(locked_before(model, last))
+    problem = prepared(stage_of(model, last, ramp.table[0][0]))
     for text in problem.doubtful if last is None else ():  # now: it may be the reason for an error to come
         warn(text)
     doubtful += problem.doubtful

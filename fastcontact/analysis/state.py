@@ -1,4 +1,4 @@
-"""The state of an analysis: everything that a load step changes, in one place."""
+"""State of an analysis: everything that a load step changes."""
 
 from __future__ import annotations
 
@@ -8,15 +8,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.unsupported_bodies import RigidPosition
 from fastcontact.analysis.wear import Worn
 from fastcontact.analysis.work import ContactForces, Work
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from fastcontact.arrays import Array, Mask
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +46,9 @@ class State:
         there [pressure].
     first_contact : dict of str to (ndarray (dim,), ndarray (dim,))
         By contact pair in space, where the bodies met first [length] and the normal there [-].
-    locked : dict of str to float
-        By locked pretension section, its shortening from when it was locked [length].
+    locked : dict of str to float or ndarray (m,)
+        By locked pretension section, its shortening from when it was locked [length]; by temporary relation, the values that
+        it began with.
     extrapolation : Extrapolation
         The last two converged steps.
     gap_round_off : float
@@ -71,8 +69,8 @@ class State:
         By solid element of nonlinear bodies, see `constitutive_kernels`; none before the first step.
     halved : int
         How often load steps of nonlinear bodies are halved before they are tried.
-    solver : object
-        What the linear solver keeps from step to step, see `LinearSolver.snapshot`.
+    solver : dict
+        All that later solutions owe to earlier ones, see `LinearSolver.snapshot`.
     """
 
     u: Array
@@ -86,7 +84,7 @@ class State:
     never_opening: Mapping[str, tuple[Array, Mask]] = field(default_factory=dict)
     first_contact: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
     traction: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
-    locked: Mapping[str, float] = field(default_factory=dict)
+    locked: Mapping[str, Any] = field(default_factory=dict)
     extrapolation: Extrapolation = field(default_factory=Extrapolation)
     largest_force: float = 0.0
     largest_rigid_force: float = 0.0
@@ -97,16 +95,16 @@ class State:
     rigid: RigidPosition | None = None
     history: Mapping[str, Array] = field(default_factory=dict)
     halved: int = 0
-    solver: Any = None
+    solver: Mapping[str, Any] = field(default_factory=dict)
 
     def after_touching(self, pairs: Iterable[str]) -> State:
-        """Return the state when these contact pairs are closed; places of first contact count of pairs that have been."""
+        """Return the state with these contact pairs closed; pairs that have touched keep their first contact."""
         touched = self.touched.union(pairs)
         met = {name: place for name, place in self.first_contact.items() if name in touched}
         return dataclasses.replace(self, touched=touched, first_contact=met)
 
     def to_dict(self, n_dofs: int) -> dict[str, Any]:
-        """Return what a later process needs to continue, beside the displacements of the `n_dofs` components of the mesh."""
+        """Return the restart data, without the displacements of the `n_dofs` components of the mesh."""
         return {
             "numbers": {
                 "largest_force": float(self.largest_force),
@@ -137,6 +135,7 @@ class State:
                 for name in self.active
             },
             "extrapolation": self.extrapolation.to_dict(),
+            "solver": self.solver,
         }
 
     @classmethod

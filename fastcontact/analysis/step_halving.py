@@ -1,7 +1,6 @@
-"""Load steps that do not converge are cut in halves; a step that fails leaves its state as it was.
+"""Bisection of load steps that do not converge; a failed step leaves the state unchanged.
 
-With nonlinear bodies the parts that follow are as small as the last one, and twice as large after one that took few
-iterations, also in the steps to come.
+Parts of steps of nonlinear bodies keep the size of the last one, and double after one that took few iterations.
 """
 
 from __future__ import annotations
@@ -87,7 +86,7 @@ def _sized(problem: Problem, state: State, result: StepResult, halved: int) -> S
 
 
 def _joined(parts: list[StepResult]) -> StepResult:
-    """Return the last part with what adds up over all of them."""
+    """Return the last part with the sums over all parts."""
     end = parts[-1]
     if len(parts) == 1:
         return end

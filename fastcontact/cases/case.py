@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fastcontact import analytic
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.cases.checks import CHECK, Check, read_check
-from fastcontact.cases.decks.blocks import files_of_deck
-from fastcontact.cases.decks.deck import Deck, read_deck
 from fastcontact.cases.input_files import files_named
 from fastcontact.cases.keys import NUMBER, RAMP, SENSITIVITY, TOP, at, called, check_keys, check_settings, tables
 from fastcontact.cases.model_tables import LISTS, build_model, points
@@ -21,12 +19,15 @@ from fastcontact.linear.choice import check_tolerance
 from fastcontact.mesh import generate
 from fastcontact.mesh.files import toml_text
 from fastcontact.mesh.files.mesh_files import read_mesh
-from fastcontact.mesh.files.paths import existing_file
+from fastcontact.mesh.files.paths import existing_file, is_stream
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, linear_ramp
 from fastcontact.results.step import StepResult
 from fastcontact.results.units import known_units, units_of_results
+
+if TYPE_CHECKING:
+    from fastcontact.cases.decks.deck import Deck
 
 # A quantity or a parameter of sensitivities.
 Asked = tuple[str | int, ...]
@@ -118,6 +119,8 @@ def read_case(path: str | Path) -> Case:
 
 def _case_of_deck(path: Path) -> Case:
     """Return an input deck of Abaqus or CalculiX as a case."""
+    from fastcontact.cases.decks.deck import read_deck
+
     deck = read_deck(path)
     return Case(
         name=path.stem,
@@ -144,6 +147,8 @@ def files_of_case(path: str | Path) -> list[Path]:
     """
     path = case_path(path)
     if path.suffix.lower() == DECK:
+        from fastcontact.cases.decks.blocks import files_of_deck
+
         return files_of_deck(existing_file(path))
     return [path, *files_named(_parsed(path)[1], path.parent)]
 
@@ -151,6 +156,8 @@ def files_of_case(path: str | Path) -> list[Path]:
 def _parsed(path: Path) -> tuple[str, dict[str, Any]]:
     """Return the text of a case file, and its data."""
     try:
+        if is_stream(path):
+            raise CaseError(f"'{path}' is a pipe or a terminal, and a case is read more than once: save it in a file")
         if path.stat().st_size > toml_text.LARGEST:
             raise CaseError(
                 f"the case file '{path}' is larger than {toml_text.LARGEST >> 20} MB: put its mesh into a file of its own"
@@ -316,6 +323,8 @@ def _theories(
     for pair, entry in data.get("theory", {}).items():
         if pairs is not None and pair not in pairs:
             raise CaseError(unknown("contact pair in 'theory'", pair, pairs))
+        if not isinstance(entry, dict):
+            raise CaseError(f"'theory.{pair}' must be a table of keys, kind first, not {entry!r:.80}")
         own = {key: value for key, value in entry.items() if key not in ("mesh_converged", "share")}
         theories[pair] = {"theory": _theory(f"theory.{pair}", own), "share": _share(f"theory.{pair}", entry)}
         if "mesh_converged" in entry:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import inspect
+import re
 from collections.abc import Callable, Iterator, Mapping
 from reprlib import repr
 from typing import Any
@@ -11,6 +12,7 @@ from typing import Any
 from fastcontact.errors import CaseError, FastcontactError, unknown
 
 NUMBER = (int, float)
+_ARGUMENT = re.compile(r"the argument (?P<key>\w+) of [\w.]+ must be (?P<kinds>.*), not (?P<given>.*)")
 AXES = {"x": NUMBER, "y": NUMBER, "z": NUMBER}
 UNITS = {"length": str, "force": str, "pressure": str}
 RAMP = {"steps": int, "end": NUMBER, "instants": list, "table": list}
@@ -65,6 +67,8 @@ def check_keys(where: str, data: Any, known: Mapping[str, Any]) -> None:
             raise CaseError(unknown("key", label, [f"{where}.{k}" if where else k for k in known]))
         kinds = known[key] if isinstance(known[key], tuple | None) else (known[key],)
         if kinds is not None and (not isinstance(value, kinds) or (isinstance(value, bool) and bool not in kinds)):
+            if kinds == (list,) and isinstance(value, dict):
+                raise CaseError(f"there may be several of '{label}': write [[{label}]] in place of [{label}]")
             names = " or ".join(kind.__name__ for kind in kinds)
             raise CaseError(f"the value of '{label}' must be of type {names}, not {repr(value)}")
 
@@ -102,7 +106,7 @@ def called(where: str, function: Callable[..., Any], arguments: dict[str, Any]) 
         given = ", ".join(f"{key} = {repr(value)}" for key, value in arguments.items())
         raise CaseError(f"'{where}': {given} are not of the kinds that it takes ({error})") from error
     except FastcontactError as error:
-        raise CaseError(f"'{where}': {error}") from error
+        raise CaseError(of_key(where, f"'{where}': {error}", str(error))) from error
 
 
 @contextlib.contextmanager
@@ -115,7 +119,16 @@ def at(where: str) -> Iterator[None]:
     except FastcontactError as error:
         if where.replace(".", " '", 1) + "'" in str(error):  # it names the place already
             raise
-        raise type(error)(f"{where}: {error}") from error
+        raise type(error)(of_key(where, f"{where}: {error}", str(error))) from error
+
+
+def of_key(where: str, otherwise: str, text: str) -> str:
+    """Return what is wrong with an argument of a Python function as what is wrong with a key of a case file."""
+    wrong = _ARGUMENT.fullmatch(text)
+    if wrong is None:
+        return otherwise
+    kinds = wrong["kinds"].replace("a sequence of", "a list of").removesuffix(" or None")
+    return f"the value of '{where}.{wrong['key']}' must be {kinds}, not {wrong['given']}"
 
 
 def tables(where: str, entries: Any) -> list[dict[str, Any]]:

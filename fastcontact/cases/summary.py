@@ -5,19 +5,20 @@ from __future__ import annotations
 import platform
 from collections.abc import Mapping, Sequence
 from importlib import metadata
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fastcontact._version import __version__
 from fastcontact.analysis.contact_answers import contact_answers
-from fastcontact.analysis.modes import Modes
-from fastcontact.analysis.sensitivities import sensitivities
 from fastcontact.cases.case import Asked, Case
 from fastcontact.cases.checks import at_point, evaluated
 from fastcontact.errors import ModelError
 from fastcontact.results.step import CANCELLED, ContactResult, StepResult
 from fastcontact.results.units import units_of_results, valued, with_unit
+
+if TYPE_CHECKING:
+    from fastcontact.analysis.modes import Modes
 
 # Numbers that a theory must have to be compared as a whole.
 COMPARED = ("force", "pressure_max", "radius")
@@ -76,6 +77,8 @@ def summarise(
 
 def _sensitivity(case: Case, last: StepResult, quantity: Asked, by: Sequence[Asked]) -> dict[str, Any]:
     """Return derivatives of a quantity, or why there are none in this state."""
+    from fastcontact.analysis.sensitivities import sensitivities
+
     try:
         found = sensitivities(
             case.model, last, quantity, by, ramp=case.ramp, criteria=case.criteria, linear_solver=case.linear_solver

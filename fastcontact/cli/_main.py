@@ -22,6 +22,7 @@ from fastcontact._version import __version__
 from fastcontact.cli._completion import SHELLS, PrintCompletion
 from fastcontact.cli._interrupts import CODES, forget, interruptible, meant
 from fastcontact.cli._terminal import add_loudness, encodable, say, somebody_watches
+from fastcontact.cli._warnings import warnings_shown
 from fastcontact.errors import ConvergenceError, FastcontactError, printable, unknown
 
 log = logging.getLogger("fastcontact")
@@ -130,7 +131,8 @@ def _run(given: list[str]) -> int:
     log.setLevel(logging.INFO if arguments.verbose else logging.WARNING)
     told = somebody_watches() and not (arguments.quiet or arguments.verbose)  # the log tells it with -v
     compiling.listeners[:] = [_say_compiling] if told else []
-    return int(arguments.run(arguments) or 0)
+    with warnings_shown():
+        return int(arguments.run(arguments) or 0)
 
 
 def _say_compiling() -> None:

@@ -7,12 +7,14 @@ import os
 import warnings
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fastcontact.cli._results import load_multiplier, pressure_curves
 from fastcontact.cli._terminal import say
 from fastcontact.errors import FastcontactError, FileError
-from fastcontact.results.step import ContactResult, StepResult
+
+if TYPE_CHECKING:
+    from fastcontact.results.step import ContactResult, StepResult
 
 
 def check_outputs(
@@ -58,8 +60,10 @@ def _identity(path: Path) -> object:
 def _check_formats(paths: list[str]) -> None:
     try:
         from matplotlib.backend_bases import FigureCanvasBase
-    except ImportError as error:
-        raise FastcontactError("pictures need matplotlib: pip install 'fastcontact[plot]'") from error
+    except (ImportError, ValueError) as error:
+        from fastcontact.results.plot._axes import without_matplotlib
+
+        raise without_matplotlib(error) from error
     known = FigureCanvasBase.get_supported_filetypes()
     for path in paths:
         if Path(path).suffix[1:].lower() not in known:

@@ -10,7 +10,6 @@ from fastcontact.cli._executor import executor
 from fastcontact.cli._outputs import check_outputs, save, write_json, write_text
 from fastcontact.cli._terminal import say, somebody_watches
 from fastcontact.errors import FastcontactError
-from fastcontact.studies.progress import Runs
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -44,6 +43,8 @@ def names(text: str | None) -> list[str] | None:
 
 def finished(options: argparse.Namespace, study: Callable[..., Any]) -> Any:
     """Return the result of a study, run on the executor of the options; the error of an interruption says how to go on."""
+    from fastcontact.studies.progress import Runs
+
     progress = Runs(show=somebody_watches() and not options.quiet)
     try:
         with executor(options.executor) as where:

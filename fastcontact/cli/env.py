@@ -5,10 +5,9 @@ from __future__ import annotations
 import argparse
 import os
 import time
-import warnings
 
-from fastcontact.cli._terminal import say
-from fastcontact.errors import FastcontactWarning
+from fastcontact.cli._terminal import say, somebody_watches
+from fastcontact.errors import FastcontactError
 
 HELP = "show versions, threads and the cache folder of compiled kernels"
 
@@ -31,39 +30,25 @@ def run(options: argparse.Namespace) -> int:
     say(f"{'cache':<12} {getattr(files, 'folder', 'none: kernels compile in every process')}")
     if options.warmup:
         started = time.perf_counter()
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FastcontactWarning)  # the results are not used
-            _warm_up()
-        say(f"{'warm-up':<12} {time.perf_counter() - started:.1f} s")
+        done = _warm_up(show=somebody_watches() and not options.quiet)
+        say(f"{'warm-up':<12} {done} kernels, {time.perf_counter() - started:.1f} s")
     return 0
 
 
-def _warm_up() -> None:
-    """Run small problems through the kernels that most runs need, in two and three dimensions."""
-    from fastcontact.analysis.run import solve
-    from fastcontact.elasticity.materials import LinearElastic
-    from fastcontact.mesh import generate
-    from fastcontact.model.model import Model
-    from fastcontact.model.ramp import linear_ramp
+def _warm_up(show: bool) -> int:
+    """Compile all kernels of the table, side by side in a process for each processor; return their number."""
+    from fastcontact._jit import ahead, decorators
+    from fastcontact.analysis.progress import StatusLine
 
-    for element, formulation in (("tri3", "node_to_segment"), ("tri6", "continuous"), ("tri3", "mortar")):
-        model = Model(generate.half_spheres(element, size=10.0), "axisymmetric")
-        model.add_material(LinearElastic(E=1.0, nu=0.3))
-        model.fix("A1A2", "x")
-        model.prescribe("A2B2", y=-0.1)
-        model.prescribe("A1B1", y=0.1)
-        model.add_contact("pair", secondary="CONT1", primary="CONT2", formulation=formulation)
-        solve(model, linear_ramp(1))
-    for element, formulation, solver, friction in (
-        ("hex8", "node_to_segment", "amg", 0.0), ("hex8", "node_to_segment", "amg", 0.1), ("tet4", "mortar", "direct", 0.0),
-    ):  # fmt: skip
-        model = Model(generate.sphere_on_block(element, R=1.0, size=0.4, contact_size=0.2, contact_radius=0.2), "3d")
-        model.add_material(LinearElastic(E=1.0, nu=0.3))
-        model.fix("SYMMETRY_X", "x")
-        model.fix("SYMMETRY_Z", "z")
-        model.fix("BLOCK_BOTTOM", "y")
-        model.prescribe("SPHERE_TOP", y=-0.02)
-        model.add_contact(
-            "pair", secondary="CONT_SPHERE", primary="CONT_BLOCK", formulation=formulation, friction=friction
-        )
-        solve(model, linear_ramp(1), linear_solver=solver)
+    total, ours, theirs = len(ahead.kernels_of(())), *os.pipe()
+    processes = ahead.start((), decorators.threads(), theirs)
+    os.close(theirs)
+    done = 0
+    with open(ours, encoding="ascii") as lines, StatusLine(len("compiling kernels: 000 of 000"), show) as status:
+        for done, _ in enumerate(lines, start=1):
+            status.draw(f"compiling kernels: {done} of {total}")
+    for process in processes:
+        process.wait()
+    if done < total:
+        raise FastcontactError(f"only {done} of {total} kernels were compiled: was a process ended by lack of memory?")
+    return done

@@ -14,7 +14,7 @@ HELP = "show what a mesh, deck or result file holds: groups, sizes, steps, itera
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
-    parser.add_argument("file", help="mesh file, deck (.inp), result file (.vtkhdf); with --contacts also a case file")
+    parser.add_argument("file", help="mesh file, case file (.toml), deck (.inp) or result file (.vtkhdf)")
     parser.add_argument("--contacts", action="store_true", help="the surfaces of bodies that face each other instead")
     parser.add_argument(
         "--distance", metavar="LENGTH", type=float, help="the largest gap for --contacts; the size of facets"
@@ -40,6 +40,12 @@ def run(options: argparse.Namespace) -> int:
 
         deck = read_deck(options.file)
         say("\n".join([*_deck_lines(deck), *_mesh_lines(deck.model.mesh)]))
+        return 0
+    if Path(options.file).suffix.lower() == ".toml":
+        from fastcontact.cases.case import read_case
+
+        case = read_case(options.file)
+        say("\n".join([f"{options.file}: {case.title}", repr(case.model), *_mesh_lines(case.mesh)]))
         return 0
     from fastcontact.mesh.files.mesh_files import read_mesh_report
     from fastcontact.mesh.quality import quality

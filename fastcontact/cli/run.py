@@ -96,11 +96,11 @@ def run(options: argparse.Namespace) -> int:
 
 def _modes(options: argparse.Namespace, case: Case, last: StepResult) -> Any:
     """Return the modes that the case or the command asks for, written to their file; None for none."""
+    if case.modes is None and not options.modes:
+        return None
     from fastcontact.analysis.modes import modes
     from fastcontact.results.writer import ResultWriter
 
-    if case.modes is None and not options.modes:
-        return None
     found = modes(case.model, last, **{"linear_solver": options.linear or case.linear_solver, **(case.modes or {})})
     if options.modes:
         with ResultWriter(options.modes, case.model, case_text=case.text) as writer:

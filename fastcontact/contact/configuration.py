@@ -1,16 +1,13 @@
-"""Where the two sides of a contact pair stand when they are paired, and where they stood as the load step began."""
+"""Configuration of a contact pair: current, and at the beginning of the load step."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Mask
 from fastcontact.contact.obstacles.rigid_side import Stance
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +34,10 @@ class Configuration:
         By which a rigid obstacle has turned, likewise [radian].
     worn : ndarray (n_points,), optional
         Depth worn off at the secondary nodes before the load step [length]; None for nothing.
+    rounded : bool
+        Whether facet normals turn at rounded edges, see `pairing.pair`.
+    friction_factor : float
+        What the coefficient of friction is multiplied with [-].
     """
 
     displacement: Array
@@ -49,10 +50,12 @@ class Configuration:
     angle: float = 0.0
     angle_start: float = 0.0
     worn: Array | None = None
+    rounded: bool = False
+    friction_factor: float = 1.0
 
     @property
     def stance(self) -> Stance:
-        """Where a rigid obstacle stands now."""
+        """Current position of a rigid obstacle."""
         return Stance(self.obstacle, self.angle)
 
     @property

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 from fastcontact.mesh.argument_types import check_type, values_at
 
-Array = NDArray[np.float64]
 Axes = Sequence[Sequence[float]] | Callable[[Array], Array] | None
 # Components of stress and strain: xx, yy, zz, xy, yz, xz.
 PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
@@ -123,7 +122,10 @@ def frames(axes: Axes, points: Array, kinematics: str) -> Array:
             "(0, 1, 0)"
         )
     returned = values_at(axes, points, "the axes of a material", ModelError)
-    found = np.asarray(returned, complex if np.iscomplexobj(returned) else float)
+    try:
+        found = np.asarray(returned, complex if np.iscomplexobj(returned) else float)
+    except (TypeError, ValueError):
+        raise ModelError(f"the function of a material's axes returned {returned!r:.80}, which are no numbers") from None
     if found.shape != (len(points), 3, 3):
         raise ModelError(
             f"the function of a material's axes returned numbers of shape {found.shape} for {len(points)} points: it must "

@@ -1,4 +1,4 @@
-"""Linear relations between displacements, and their elimination: ``R u = r`` becomes ``u = T w + S r``."""
+"""Multi-point constraints ``R u = r`` and their elimination: ``u = T w + S r``."""
 
 from __future__ import annotations
 
@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from fastcontact.arrays import Array, Indices, Mask
+
 Table = tuple[tuple[float, float], ...]
 # A coefficient below this fraction of the largest of its row has cancelled.
 ZERO = 1e-10
@@ -40,6 +39,39 @@ class Relation:
 
 
 @dataclass(frozen=True, eq=False)
+class TemporaryRelation(Relation):
+    """A relation of the load steps between two instants, from the values that it finds when it begins.
+
+    Parameters
+    ----------
+    begins, ends : float
+        Ends of load steps [-].
+    keeps : bool
+        Whether it keeps the values that it finds, whatever `value` and `ramp` say; otherwise it goes from there to the next
+        point of its history.
+    """
+
+    begins: float = -np.inf
+    ends: float = np.inf
+    keeps: bool = False
+
+    def acts_from(self, begin: float) -> bool:
+        """Return whether it holds in the load step that begins at an instant."""
+        return self.begins <= begin < self.ends
+
+    def after(self, reached: Array) -> list[Relation]:
+        """Return the relations that it comes to from ``rows @ u``, shape (m,), where it begins [unit of the value]."""
+        if self.keeps:
+            return [Relation(self.name, self.rows, reached, ((0.0, 1.0),))]
+        value, table = np.broadcast_to(self.value, reached.shape), self.ramp or ()
+        later = [[(t, v * factor) for t, factor in table if t > self.begins] for v in value.tolist()]
+        return [
+            Relation(self.name, self.rows[[row]], 1.0, ((self.begins, start), *points))
+            for row, (start, points) in enumerate(zip(reached.tolist(), later, strict=True))
+        ]
+
+
+@dataclass(frozen=True, eq=False)
 class Elimination:
     """``u = T w + S r``, with w zero at the pivots, satisfies ``R u = r`` for every w that meets the conditions.
 
@@ -58,11 +90,11 @@ class Elimination:
         The row of R that each condition comes from.
     """
 
-    pivots: NDArray[np.intp]
+    pivots: Indices
     T: csr_array
     S: csr_array
     conditions: csr_array
-    origin: NDArray[np.intp]
+    origin: Indices
 
 
 def stacked_rows(relations: Sequence[Relation], n_dofs: int) -> csr_array:

@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Sparsity of a stiffness matrix by node blocks: neighbours of each node, place of each node pair of each cell.
+"""Sparsity pattern of the stiffness matrix by node blocks, and the block index of each node pair of each cell.
 
 Cells of all elements stand in one list: the nodes of cell ``c`` are ``nodes[start[c]:start[c + 1]]``.
 """
@@ -46,16 +46,20 @@ def neighbours(start, nodes, first, cells, low, high, indptr, indices):
     """Fill the sorted numbers of the nodes that share a cell with each node from `low` to ``high - 1``, itself included."""
     seen = np.full(first.shape[0] - 1, -1, np.int32)
     for p in range(low, high):
-        at = indptr[p]
+        begin = end = indptr[p]
         for k in range(first[p], first[p + 1]):
             for m in range(start[cells[k]], start[cells[k] + 1]):
-                if seen[nodes[m]] != p:
-                    seen[nodes[m]] = p
-                    indices[at] = nodes[m]
-                    at += 1
-        if at == indptr[p]:
-            indices[at] = p
-        indices[indptr[p] : indptr[p + 1]].sort()
+                node = nodes[m]
+                if seen[node] != p:
+                    seen[node] = p
+                    at = end
+                    while at > begin and indices[at - 1] > node:
+                        indices[at] = indices[at - 1]
+                        at -= 1
+                    indices[at] = node
+                    end += 1
+        if end == begin:
+            indices[begin] = p
 
 
 @kernel

@@ -8,13 +8,11 @@ from typing import Any
 
 from fastcontact.contact.obstacles import Obstacle
 from fastcontact.contact.obstacles.rotation import Rotation
-from fastcontact.model.pair_options import clearance_ramp
+from fastcontact.model.pair_options import clearance_ramp, friction_ramp
 from fastcontact.model.ramp import Table
 
 # Force on an obstacle by component, None where the component is prescribed; empty for none at all.
 Driving = tuple[float | None, ...]
-# Formulations that need no facets on the primary side.
-AGAINST_OBSTACLES = ("node_to_segment", "continuous")
 
 
 @dataclass(frozen=True)
@@ -47,6 +45,11 @@ class ContactPair:
     def clearance_ramp(self) -> Table | None:
         """History of the clearance; None where it does not change."""
         return clearance_ramp(self.name, self.options)
+
+    @property
+    def friction_ramp(self) -> Table | None:
+        """History of the coefficient of friction; None where it does not change."""
+        return friction_ramp(self.name, self.options)
 
     @property
     def opposite(self) -> str:

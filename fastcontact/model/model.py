@@ -5,16 +5,17 @@ A `Value` is a number, or a function from reference positions (n, dim) [length] 
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.elasticity.constrained_system import ConstrainedMotion
 from fastcontact.elasticity.initial_states import InitialState
 from fastcontact.elasticity.loads import Load
-from fastcontact.elasticity.relations import Relation
+from fastcontact.elasticity.relations import Relation, TemporaryRelation
 from fastcontact.elasticity.temperature import Temperature
 from fastcontact.errors import ModelError
 from fastcontact.mesh.argument_types import typed
@@ -28,8 +29,6 @@ from fastcontact.model.prescribed_overlap import Supports, check_prescribed
 from fastcontact.model.pretension import check_locks
 from fastcontact.model.ramp import Ramp, Table, combined, multiplier
 from fastcontact.model.rigid_motions import free_motions, generalised, resisting, unstopped
-
-Array = NDArray[np.float64]
 
 
 class Model(ModelSupports):
@@ -95,6 +94,7 @@ class Model(ModelSupports):
             named = [(item.name, item.ramp) for item in items]
             named += [(f"the motion of obstacle '{p.name}'", p.ramp) for p in self.contact]
             named += [(f"the clearance of contact '{p.name}'", p.clearance_ramp) for p in self.contact]
+            named += [(f"the friction of contact '{p.name}'", p.friction_ramp) for p in self.contact]
             named += [(f"the rotation of obstacle '{p.name}'", p.rotation_ramp) for p in self.contact]
             check_ramps(named, ramp.instants)
             check_turns(self.contact, ramp)
@@ -108,17 +108,29 @@ class Model(ModelSupports):
         check_overlap(
             self.mesh, self.kinematics, [(p.secondary, p.primary) for p in self.contact if p.obstacle is None]
         )
-        self._check_motions(fixed, list(self.force_driven.forces(forces).values()))
+        for begin in self._changes():
+            acting = copy.copy(self)
+            acting.relations = [r for r in self.relations if not isinstance(r, TemporaryRelation) or r.acts_from(begin)]
+            try:
+                acting._check_motions(fixed, list(self.force_driven.forces(forces).values()))
+            except ModelError as error:
+                raise ModelError(f"in the load steps after {begin:g}: {error}" if begin else str(error)) from None
 
-    def _check_relations(self, fixed: NDArray[np.bool_], prescribed: Mapping[Table | None, Array], ramp: Ramp) -> None:
-        if not self.relations:
+    def _changes(self) -> list[float]:
+        """Return the instants at which temporary relations begin or end, and 0."""
+        temporary = [own for own in self.relations if isinstance(own, TemporaryRelation)]
+        return sorted({0.0, *(t for own in temporary for t in (own.begins, own.ends) if 0.0 < t < np.inf)})
+
+    def _check_relations(self, fixed: Mask, prescribed: Mapping[Table | None, Array], ramp: Ramp) -> None:
+        relations = [own for own in self.relations if not isinstance(own, TemporaryRelation)]
+        if not relations:
             return
-        motion = ConstrainedMotion(fixed.ravel(), self.relations)
+        motion = ConstrainedMotion(fixed.ravel(), relations)
         for instant in ramp.instants:
             lift = combined(prescribed, ramp, instant, fixed.shape)
-            motion.lift(lift.ravel(), motion.values([multiplier(r.ramp, ramp, instant) for r in self.relations]))
+            motion.lift(lift.ravel(), motion.values([multiplier(r.ramp, ramp, instant) for r in relations]))
 
-    def _check_motions(self, fixed: NDArray[np.bool_], forces: Sequence[Array]) -> None:
+    def _check_motions(self, fixed: Mask, forces: Sequence[Array]) -> None:
         """Refuse motions without deformation that no supports, relations, springs or loads against a contact stop."""
         driven = self.force_driven
         motions = driven.motions(free_motions(self.mesh, self.kinematics, fixed, self.holding_rows()))

@@ -18,8 +18,8 @@ from fastcontact.model.ramp import Table, table_of
 
 # Options that every contact pair takes, beside those of its formulation.
 SHARED_OPTIONS = (
-    "clearance", "clearance_primary", "clearance_ramp", "excluded", "frictionless", "frictionless_along", "kind", "penalty",
-    "search_distance", "tangential_penalty", "wear",
+    "clearance", "clearance_primary", "clearance_ramp", "excluded", "friction_ramp", "frictionless", "frictionless_along",
+    "kind", "penalty", "search_distance", "tangential_penalty", "wear",
 )  # fmt: skip
 
 
@@ -37,6 +37,7 @@ def pair_options(
     if "clearance_ramp" in options and not {"clearance", "clearance_primary"} & set(options):
         raise ContactError(f"contact '{name}' has a clearance_ramp, but no clearance that it could multiply")
     clearance_ramp(name, options)
+    _check_friction_ramp(name, options)
     return PairOptions(
         _function(f"the clearance of contact '{name}'", options.get("clearance")),
         _function(f"the clearance_primary of contact '{name}'", options.get("clearance_primary")),
@@ -119,6 +120,22 @@ def _all_positive(penalty: Field, name: str, positions: Array) -> Array:
     return values
 
 
+def _check_friction_ramp(name: str, options: Mapping[str, Any]) -> None:
+    """Refuse a history of the coefficient of friction without one, and negative multipliers."""
+    table = friction_ramp(name, options)
+    if table is not None and not options.get("friction"):
+        raise ContactError(f"contact '{name}' has a friction_ramp, but no friction that it could multiply")
+    if table is not None and min(factor for _, factor in table) < 0.0:
+        raise ContactError(
+            f"the friction_ramp of contact '{name}' has negative multipliers: coefficients are 0 or more"
+        )
+
+
+def friction_ramp(name: str, options: Mapping[str, Any]) -> Table | None:
+    """Return the history of the coefficient of friction of contact pair `name`, None where it does not change."""
+    return table_of(options.get("friction_ramp"), f"the friction_ramp of contact '{name}'")
+
+
 def clearance_ramp(name: str, options: Mapping[str, Any]) -> Table | None:
     """Return the history of the clearance of contact pair `name`, None where it does not change."""
     return table_of(options.get("clearance_ramp"), f"the clearance_ramp of contact '{name}'")
@@ -146,7 +163,7 @@ def _nodes(name: str, option: str, options: Mapping[str, Any], mesh: Mesh, side:
 
 
 def _function(what: str, value: Any) -> Field | None:
-    """Return a number or a function of position as a function that checks what it returns; None for None."""
+    """Return a number or a function of position as a function that checks its result; pass None through."""
     if value is None:
         return None
     check_value(what, value)

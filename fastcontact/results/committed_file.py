@@ -1,4 +1,4 @@
-"""A file that HDF5 writes to, and that can be opened after every single write.
+"""An HDF5 file that can be opened after every single write.
 
 HDF5 writes the records of its indices in no particular order. A process that is killed between two writes may leave an index
 that leads beyond the end of the file or has lost entries, and with them steps that were complete. Here writes are kept in
@@ -69,8 +69,9 @@ class CommittedFile(DriverFile):
         return self._file.read(48)
 
     def intact(self) -> bool:
-        """Return whether the superblock, which changes with every flush, is still as it was written."""
-        self.ours = self.ours and self._read_head() == self._head
+        """Return whether the superblock, which changes with every flush, is as it was written, and nothing is cut off."""
+        cut = os.fstat(self.fileno()).st_size < self._ends[-1]
+        self.ours = self.ours and not cut and self._read_head() == self._head
         return self.ours
 
     @property

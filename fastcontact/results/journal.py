@@ -1,4 +1,4 @@
-"""Writes that are repeated after a power loss: a list of them with a checksum, kept at the end of a file until they are done.
+"""Write-ahead journal: writes with a checksum at the end of the file, replayed after a power loss.
 
 A disk may do what was written since the last synchronisation in any order, in part, or not at all. New data hurt nobody,
 since nothing leads to them yet; records of HDF5 that are changed in place do. So these are first written behind the contents
@@ -14,11 +14,16 @@ import struct
 from collections.abc import Iterable, Sequence
 from typing import IO, Any
 
+from fastcontact.errors import FileError
+
 Write = tuple[int, bytes]
 MAGIC = b"fastcontact journal\n"
 FOOTER = struct.Struct(f"<Q32s{len(MAGIC)}s")  # length and SHA-256 of the writes
 HEADER = struct.Struct("<QQ?")  # place and length of one; whether its checksum stands for it
 DIGEST = hashlib.sha256().digest_size
+# Bytes of a journal, which holds what changes in place: restart data, at most some hundred bytes an unknown.
+LARGEST = 1 << 31
+PIECE = 1 << 20
 
 
 def packed(new: Sequence[Write], changes: Sequence[Write]) -> bytes:
@@ -33,7 +38,10 @@ def packed(new: Sequence[Write], changes: Sequence[Write]) -> bytes:
 
 
 def found(file: IO[bytes]) -> list[Write]:
-    """Return the changes that the end of a file holds; none where there are none, or not all of them and their data."""
+    """Return the changes that the end of a file holds; none where there are none, or not all of them and their data.
+
+    Raises FileError for a journal that no writer makes: nothing is read of it before its bounds are checked.
+    """
     size = file.seek(0, io.SEEK_END)
     if size < FOOTER.size:
         return []
@@ -41,22 +49,57 @@ def found(file: IO[bytes]) -> list[Write]:
     length, digest, magic = FOOTER.unpack(file.read(FOOTER.size))
     if magic != MAGIC or length > size - FOOTER.size:
         return []
-    file.seek(size - FOOTER.size - length)
-    body = file.read(length)
-    if hashlib.sha256(body).digest() != digest:
+    end = size - FOOTER.size - length  # of what was there before
+    if length > LARGEST:
+        raise _forged(file, f"declares {length:.3g} bytes")
+    if _digest(file, end, length) != digest:
         return []
-    changes, position = [], 0
-    while position < length:
-        place, count, is_new = HEADER.unpack_from(body, position)
-        position += HEADER.size
-        if is_new:
-            file.seek(place)
-            if hashlib.sha256(file.read(count)).digest() != body[position : position + DIGEST]:
-                return []
-        else:
-            changes.append((place, body[position : position + count]))
-        position += DIGEST if is_new else count
+    records = _records(file, end, end + length)
+    if sum(count for _, count, is_new, _ in records if is_new) > end:
+        raise _forged(file, "counts data twice")
+    changes = []
+    for place, count, is_new, data in records:
+        if count and place + count > end:
+            raise _forged(file, "leads beyond the contents")
+        file.seek(data)
+        kept = file.read(DIGEST if is_new else count)
+        if not is_new:
+            changes.append((place, kept))
+        elif _digest(file, place, count) != kept:
+            return []
     return changes
+
+
+def _records(file: IO[bytes], place: int, end: int) -> list[tuple[int, int, bool, int]]:
+    """Return place, length and kind of each write of a journal, and where its data or checksum stand."""
+    found = []
+    while place < end:
+        file.seek(place)
+        head = file.read(min(HEADER.size, end - place))
+        if len(head) < HEADER.size:
+            raise _forged(file, "is cut off")
+        at, count, is_new = HEADER.unpack(head)
+        place += HEADER.size
+        found.append((at, count, is_new, place))
+        place += DIGEST if is_new else count
+    if place > end:
+        raise _forged(file, "is cut off")
+    return found
+
+
+def _digest(file: IO[bytes], place: int, count: int) -> bytes:
+    """Return the SHA-256 of a part of a file, read piece by piece."""
+    hashed = hashlib.sha256()
+    file.seek(place)
+    while count > 0 and (piece := file.read(min(count, PIECE))):
+        hashed.update(piece)
+        count -= len(piece)
+    return hashed.digest()
+
+
+def _forged(file: IO[bytes], what: str) -> FileError:
+    name = getattr(file, "name", "the file")
+    return FileError(f"the journal at the end of '{name}' {what}: no writer leaves that, compute the file again")
 
 
 class Repeated(io.RawIOBase):

@@ -10,11 +10,11 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Numbers
 from fastcontact.errors import FileError
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.files import toml_text
@@ -28,6 +28,9 @@ from fastcontact.results.file_lock import is_being_written
 from fastcontact.results.material_stress import MaterialStress
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.results.texts import read_text
+
+if TYPE_CHECKING:
+    import pandas
 
 
 @typed(FileError)
@@ -97,11 +100,11 @@ class Results(Sequence[StepResult]):
             raise FileError(f"'{path}' is no HDF5 file: name a result file that fastcontact wrote (.vtkhdf)")
         # A file object of our own: by its name HDF5 would return a file that this process has open, as it was then.
         self._raw: Any = open(path, "rb")  # noqa: SIM115
-        writes = journal.found(self._raw) if not is_being_written(self.path) or repeat else []
-        if writes:
-            self._raw = io.BufferedReader(journal.Repeated(self._raw, writes))
         self._file: Any = None
         try:
+            writes = journal.found(self._raw) if not is_being_written(self.path) or repeat else []
+            if writes:
+                self._raw = io.BufferedReader(journal.Repeated(self._raw, writes))
             with self._explained():
                 self._file = h5py.File(self._raw, "r")
                 self._read_header(self._checked())
@@ -134,7 +137,7 @@ class Results(Sequence[StepResult]):
             raise ValueError(f"only {len(self._rows)} of {self._n_steps} steps")
         if not isinstance(self.kinematics, str) or not isinstance(self.case_text, str):
             raise ValueError("its kinematics or its case is no text")
-        self.load_factors: NDArray[np.float64] = np.ascontiguousarray(self._rows["load_factor"])
+        self.load_factors: Array = np.ascontiguousarray(self._rows["load_factor"])
         run = self._run_record(own)
         self.log: Any = (run or {}).get("log")
         self.error: str = (run or {}).get("error", "")
@@ -163,7 +166,7 @@ class Results(Sequence[StepResult]):
     def __getitem__(self, number: int | slice) -> StepResult | list[StepResult]:
         """Return a step by its position, from 0, or from the end if negative; a slice gives a list of steps."""
         if isinstance(number, slice):
-            return [self._read_step(position) for position in range(*number.indices(self._n_steps))]
+            return [self[position] for position in self._positions(number)]
         try:
             number = operator.index(number)
         except TypeError:
@@ -171,6 +174,18 @@ class Results(Sequence[StepResult]):
         if not -self._n_steps <= number < self._n_steps:
             raise IndexError(f"'{self.path}' has {self._n_steps} steps, so there is no step at position {number}")
         return self._read_step(range(self._n_steps)[number])
+
+    def _positions(self, part: slice) -> range:
+        try:
+            return range(*part.indices(self._n_steps))
+        except (TypeError, ValueError) as error:
+            raise FileError(
+                f"{part} of '{self.path}' needs whole numbers, and steps that are not 0 ({error})"
+            ) from None
+
+    def lacks(self, names: Sequence[str]) -> list[str]:
+        """Return which objects of HDF5, by their paths, the file does not hold."""
+        return [name for name in names if name not in self._file]
 
     def __enter__(self) -> Results:
         return self
@@ -227,7 +242,7 @@ class Results(Sequence[StepResult]):
             return conversions.series(self.mesh, self)
         return conversions.grid(self.mesh, step if isinstance(step, StepResult) else self[step])
 
-    def to_pandas(self) -> Any:
+    def to_pandas(self) -> pandas.DataFrame:
         """Return the contact tables of all steps as one ``pandas.DataFrame``.
 
         A row is a secondary node of a contact pair in a step: columns ``step``, ``load_factor``, ``contact``, then those of
@@ -328,7 +343,7 @@ class Results(Sequence[StepResult]):
         static = {*layout.cell_fields(self.mesh), *layout.MATERIAL_FIELDS, "material"}
         return [name for name in self._file["VTKHDF/CellData"] if name not in static]
 
-    def _cell_fields(self, number: int) -> dict[str, NDArray[np.float64]]:
+    def _cell_fields(self, number: int) -> dict[str, Array]:
         data, n = self._file["VTKHDF/CellData"], len(self._file["VTKHDF/Types"])
         fields = {name: data[name][number * n : (number + 1) * n] for name in self.cell_field_names}
         for name, values in fields.items():
@@ -336,7 +351,7 @@ class Results(Sequence[StepResult]):
                 raise ValueError(f"{name} of step {number} is cut off or of another kind")
         return fields
 
-    def _field(self, name: str, number: int, width: int | None = None) -> NDArray[np.float64]:
+    def _field(self, name: str, number: int, width: int | None = None) -> Array:
         n = self.mesh.n_points
         data, rows = self._file["VTKHDF/PointData"][name], slice(number * n, (number + 1) * n)
         values = data[rows] if width is None else data[rows, :width]
@@ -389,7 +404,7 @@ def _read_mesh(stored: Any, raw: Any) -> Mesh:
     )
 
 
-def _read_groups(group: Any, raw: Any) -> dict[str, NDArray[np.int32]]:
+def _read_groups(group: Any, raw: Any) -> dict[str, Numbers]:
     names = _read_json(group["names"], raw)
     if group["sizes"].shape != (len(names),):
         raise ValueError(f"'{group.name}' has {len(names)} names for sizes of shape {group['sizes'].shape}")

@@ -1,4 +1,4 @@
-"""Write the steps of an analysis to one result file, step by step, so that a crash costs no finished step.
+"""Crash-safe writer of result files: no completed step is lost.
 
 Data are written first, then the rows of the step, the number of steps last, with a flush after each. Uncompressed tables and
 small fields grow in place, larger fields are a chunk of their own for each step, so that nothing of a finished step moves.
@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact.elasticity.material_sides import material_sides
-from fastcontact.errors import ConvergenceError, FileError, ModelError
+from fastcontact.errors import ConvergenceError, FastcontactError, FileError, ModelError
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.files.hdf5_driver import new_hdf5
 from fastcontact.mesh.files.packing import packed
@@ -370,15 +370,17 @@ class ResultWriter:
                 yield
             except Exception as error:  # a failed read shows as errors of many kinds
                 failure = self._committed.failure if self._committed is not None else None
-                if isinstance(error, FileError) or (failure is None and not isinstance(error, (OSError, RuntimeError))):
+                if isinstance(error, (FastcontactError, MemoryError)):
                     raise
                 told = failure or error
                 if not isinstance(told, Exception):
                     raise told from None
                 reason = getattr(told, "strerror", None) or next(iter(str(told).splitlines()), type(told).__name__)
+                remedy = "see whether the disk is full or the folder protected"
+                if not isinstance(told, (OSError, RuntimeError)):
+                    remedy = "its tables are damaged: name another file, or start anew without resuming"
                 raise FileError(
-                    f"'{self.path}' cannot be {what} ({reason}), {self.n_steps} steps are complete: "
-                    "see whether the disk is full or the folder protected"
+                    f"'{self.path}' cannot be {what} ({reason}), {self.n_steps} steps are complete: {remedy}"
                 ) from error
 
     def _begin(self, kinematics: str, case_text: str) -> None:
@@ -431,6 +433,8 @@ def _steps_to_resume(
                 f"'{path}' was written by an earlier fastcontact, which kept nothing to go on from: name another file "
                 f"{begin_anew}"
             )
+        if lost := old.lacks(layout.CONTINUED):
+            raise FileError(f"'{path}' is damaged, it lacks '{lost[0]}': restore a copy, {begin_anew}")
         if not _same_mesh(old.mesh, mesh) or old.kinematics != kinematics:
             what = "kinematics" if _same_mesh(old.mesh, mesh) else "mesh"
             raise FileError(f"'{path}' belongs to another {what}: resume the case it was begun for, {begin_anew}")

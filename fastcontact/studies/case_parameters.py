@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from fastcontact.errors import CaseError, unknown
+from fastcontact.model.pair_options import SHARED_OPTIONS
 
 _PART = re.compile(r"([^.\[\]]+)((?:\[\d{1,9}\])*)$")
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -46,6 +47,11 @@ def by_law(law: Any, value: Any, where: str) -> Any:
 
 def _set(data: dict[str, Any], path: str, value: Any, names: Iterable[str]) -> None:
     keys = _keys(path)
+    pairs = [
+        f"{kind}.{name}" for kind in ("contact", "obstacle") if isinstance(data.get(kind), dict) for name in data[kind]
+    ]
+    if pairs and path in ("friction", *SHARED_OPTIONS):
+        raise CaseError(f"'{path}' belongs to a pair: write {' or '.join(f'{pair}.{path}' for pair in pairs)}")
     if len(keys) == 1:
         raise CaseError(
             unknown("parameter", path, [name for name in names if not isinstance(data.get(name), (dict, list))])

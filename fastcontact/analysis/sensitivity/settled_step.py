@@ -1,4 +1,4 @@
-"""The end of a load step found again, as equations that can be differentiated."""
+"""Reconstruct the end of a load step as equations that can be differentiated."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from fastcontact.analysis import restart
 from fastcontact.analysis.convergence_messages import named_nodes, nearest_nodes
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.load_step import equilibrium, prepare_start, with_loads
-from fastcontact.analysis.locked_sections import locked_before
 from fastcontact.analysis.problem import Problem, prepare
 from fastcontact.analysis.sensitivity.moving_contact import REMEDY, MovingContact
 from fastcontact.analysis.solution import Equilibrium
+from fastcontact.analysis.stages import stage_of
 from fastcontact.errors import ModelError
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp
@@ -64,10 +64,10 @@ def _check_path(model: Model, step: StepResult, criteria: Criteria) -> None:
                 f"contact '{pair.name}' never opens what was closed in earlier load steps: sensitivities are those of one "
                 "step. Take differences of two solutions"
             )
-    if len(locked_before(model, step).relations) > len(model.relations):
+    if stage_of(model, step) is not model:
         raise ModelError(
-            "pretension sections are locked at a length that earlier load steps have found: sensitivities are those of one "
-            "step. Ask for them in the last step before the lock, or take differences of two solutions"
+            "pretension sections or temporary supports hold what earlier load steps have found: sensitivities are those of "
+            "one step. Ask for them in the last step before the lock, or take differences of two solutions"
         )
     if criteria.geometry_updates is not None and not criteria.keep_pairing:
         raise ModelError(

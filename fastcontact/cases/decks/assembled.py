@@ -3,59 +3,87 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Mask
 from fastcontact.cases.decks.blocks import Place, folded
-from fastcontact.cases.decks.content import Cell, Content, Instance, Members, Part, SurfaceDefinition
+from fastcontact.cases.decks.content import Cell, Content, Instance, Members, Part, Section, SurfaceDefinition
 from fastcontact.cases.decks.element_types import ElementType, element_type
 from fastcontact.mesh import elements
 
-Array = NDArray[np.float64]
-# Instance (empty for what belongs to no part) and number.
-Key = tuple[str, int]
 # Names of sets that a message lists, and characters that it shows of one.
 SHOWN = 12
 LONGEST = 80
 
 
-@dataclass(frozen=True)
-class Solid:
-    """A solid element: as the deck has it, its type, and its points."""
+@dataclass(eq=False, slots=True)
+class Element:
+    """An element of an instance: as the deck has it, its type, None for what is no solid, and its points.
 
+    `row` is its place among the solids of its type, `section` what gives it its material.
+    """
+
+    scope: str
+    number: int
     cell: Cell
-    type: ElementType
+    type: ElementType | None
     points: tuple[int, ...]
+    row: int = -1
+    section: Section | None = None
+
+    @property
+    def solid(self) -> ElementType:
+        """The type of a solid."""
+        assert self.type is not None
+        return self.type
+
+    @property
+    def given_section(self) -> Section:
+        """The section of a solid, which every one has once sections are checked."""
+        assert self.section is not None
+        return self.section
+
+
+Face = tuple[Element, int]
 
 
 @dataclass
 class Assembled:
-    """Points and solids of a deck with all its instances.
+    """Points and elements of a deck with all its instances.
 
     Attributes
     ----------
     content : Content
-    points : list of (float, float, float)
+    points : ndarray (n_points, 3)
         Coordinates in the assembly [length].
-    index : dict of (str, int) to int
-        Point number by instance and node number.
-    solids : dict of (str, int) to Solid
+    index : dict of str to dict of int to int
+        Point number by instance, empty for what belongs to no part, and node number.
+    elements : dict of str to dict of int to Element
         By instance and element number.
-    discrete : dict of (str, int) to (Cell, tuple of int)
-        Gap elements and springs with their points.
     """
 
     content: Content
-    points: list[tuple[float, ...]] = field(default_factory=list)
-    index: dict[Key, int] = field(default_factory=dict)
-    solids: dict[Key, Solid] = field(default_factory=dict)
-    discrete: dict[Key, tuple[Cell, tuple[int, ...]]] = field(default_factory=dict)
-    resolved: dict[tuple[str, str, str], list[Key]] = field(default_factory=dict)
+    points: Array = field(default_factory=lambda: np.empty((0, 3)))
+    index: dict[str, dict[int, int]] = field(default_factory=dict)
+    elements: dict[str, dict[int, Element]] = field(default_factory=dict)
+    resolved: dict[tuple[str, str, str], list[Any]] = field(default_factory=dict)
+    surfaces: dict[str, list[Face]] = field(default_factory=dict)
     open: list[tuple[str, str, str]] = field(default_factory=list)
+
+    @cached_property
+    def solids(self) -> list[Element]:
+        """All solids."""
+        return [own for elements in self.elements.values() for own in elements.values() if own.type is not None]
+
+    @cached_property
+    def discrete(self) -> list[Element]:
+        """All gap elements and springs."""
+        return [own for elements in self.elements.values() for own in elements.values() if own.type is None]
 
     def part(self, scope: str) -> Part:
         """Return the part of an instance, or what belongs to none."""
@@ -74,15 +102,15 @@ class Assembled:
                 return scope, text[len(scope) + 1 :]
         return "", text
 
-    def keys(self, kind: str, name: str, place: Place) -> list[Key]:
-        """Return the nodes or elements (`kind`) of a set or a single number; CaseError at `place` if there is none."""
+    def members(self, kind: str, name: str, place: Place) -> list[Any]:
+        """Return the points of nodes, or the elements (`kind`), of a set or a number; CaseError if there is none."""
         scope, rest = self.place_of(name)
-        if rest.isdigit():
-            return [self._existing(kind, (scope, int(rest[:19])), place)]
-        return self.members(kind, scope, rest, place, name)
+        if rest.isdecimal():
+            return [self._existing(kind, scope, int(rest[:19]), place)]
+        return self.members_of(kind, scope, rest, place, name)
 
-    def members(self, kind: str, scope: str, name: str, place: Place, shown: str = "") -> list[Key]:
-        """Return the nodes or elements of a set that is defined in an instance, sets of sets included."""
+    def members_of(self, kind: str, scope: str, name: str, place: Place, shown: str = "") -> list[Any]:
+        """Return the points or elements of a set that is defined in an instance, sets of sets included."""
         part, label = self.part(scope), (kind, scope, name)
         sets = part.node_sets if kind == "node" else part.element_sets
         if name not in sets:
@@ -93,56 +121,54 @@ class Assembled:
             if label in self.open:
                 raise place.refuse(f"set '{part.set_names[name]}' contains itself")
             self.open.append(label)
-            found = dict.fromkeys(key for entry in sets[name] for key in self._entry(kind, scope, entry))
+            found = [own for entry in sets[name] for own in self._entry(kind, scope, entry)]
             self.open.pop()
-            self.resolved[label] = list(found)
+            self.resolved[label] = list(dict.fromkeys(found)) if len(sets[name]) > 1 or len(found) > 1 else found
         return self.resolved[label]
 
-    def _entry(self, kind: str, scope: str, entry: Members) -> Iterator[Key]:
+    def _entry(self, kind: str, scope: str, entry: Members) -> Iterable[Any]:
         scope = entry.instance or scope
         if scope and scope not in self.content.instances:
             known = ", ".join(instance.name for instance in self.content.instances.values()) or "none"
             raise entry.place.refuse(f"instance '{scope}' is not defined; instances: {known}")
         if entry.name:
-            yield from self._named(kind, scope, entry)
-            return
-        if not entry.generated:
-            yield self._existing(kind, (scope, entry.first), entry.place)
-            return
-        numbers = range(entry.first, entry.last + 1, entry.increment)
-        there = self.part(scope).nodes if kind == "node" else self.part(scope).cells
-        found = (
-            [n for n in numbers if n in there]
-            if len(numbers) <= len(there)
-            else sorted(n for n in there if n in numbers)
-        )
+            return self._named(kind, scope, entry)
+        numbers = entry.numbers
+        if not isinstance(numbers, range):
+            return (self._existing(kind, scope, number, entry.place) for number in numbers)
+        there = self._there(kind, scope)
+        found = [n for n in (numbers if len(numbers) <= len(there) else sorted(there)) if n in there and n in numbers]
         if len(found) < len(numbers):
-            absent = len(numbers) - len(found)
-            text = f"{absent} of the {len(numbers)} numbers {entry.first} to {entry.last} are no {kind}s and left out"
-            self.content.note(entry.place, text)
-        yield from ((scope, n) for n in found)
+            absent = f"{len(numbers) - len(found)} of the {len(numbers)} numbers {numbers[0]} to {numbers[-1]}"
+            self.content.note(entry.place, f"{absent} are no {kind}s and left out")
+        return (there[n] for n in found)
 
-    def _named(self, kind: str, scope: str, entry: Members) -> Iterator[Key]:
-        if scope or not any(entry.name.upper().startswith(name) for name in self.content.instances):
-            part = self.part(scope)
-            if kind == "node" and folded(entry.name) not in part.node_sets and folded(entry.name) in part.element_sets:
-                for key in self.members("element", scope, folded(entry.name), entry.place):
-                    yield from ((scope, n) for n in part.cells[key[1]].nodes)
-                return
-            yield from self.members(kind, scope, folded(entry.name), entry.place, entry.name)
-        else:
-            yield from self.keys(kind, entry.name, entry.place)
+    def _named(self, kind: str, scope: str, entry: Members) -> Iterable[Any]:
+        if not scope and any(entry.name.upper().startswith(name) for name in self.content.instances):
+            return self.members(kind, entry.name, entry.place)
+        part, name = self.part(scope), folded(entry.name)
+        if kind == "node" and name not in part.node_sets and name in part.element_sets:
+            return (point for own in self.members_of("element", scope, name, entry.place) for point in own.points)
+        return self.members_of(kind, scope, name, entry.place, entry.name)
 
-    def _existing(self, kind: str, key: Key, place: Place) -> Key:
-        there = self.part(key[0]).nodes if kind == "node" else self.part(key[0]).cells
-        if key[1] not in there:
-            where = f" in instance '{self.content.instances[key[0]].name}'" if key[0] else ""
-            raise place.refuse(f"{kind} {key[1]} is not defined{where}")
-        return key
+    def _there(self, kind: str, scope: str) -> Mapping[int, Any]:
+        """Return the points or elements of an instance by their numbers."""
+        return self.index.get(scope, {}) if kind == "node" else self.elements.get(scope, {})
+
+    def _existing(self, kind: str, scope: str, number: int, place: Place) -> Any:
+        found = self._there(kind, scope).get(number)
+        if found is None:
+            where = f" in instance '{self.content.instances[scope].name}'" if scope else ""
+            raise place.refuse(f"{kind} {number} is not defined{where}")
+        return found
 
     def nodes(self, name: str, place: Place) -> list[int]:
-        """Return the points of a node set or a single node; errors as for `keys`."""
-        return [self.index[key] for key in self.keys("node", name, place)]
+        """Return the points of a node set or a single node; errors as for `members`."""
+        return self.members("node", name, place)
+
+    def elements_of(self, name: str, place: Place) -> list[Element]:
+        """Return the elements of a set or a single one; errors as for `members`."""
+        return self.members("element", name, place)
 
     def node(self, name: str, place: Place) -> int:
         """Return the only point of a node set, or of a number; errors as for `keys`, or if there are several."""
@@ -151,21 +177,28 @@ class Assembled:
             raise place.refuse(f"'{name}' holds {len(found)} nodes where one is needed")
         return found[0]
 
-    def faces(self, name: str, place: Place) -> list[tuple[Key, int]]:
+    def faces(self, name: str, place: Place) -> list[Face]:
         """Return the elements of a surface and the place of each face among the facets of its element."""
         definition, scope = self.surface(name, place)
         if definition.of_nodes:
-            return self._faces_of_nodes(definition, scope)
-        found: dict[tuple[Key, int], None] = {}
-        for face in definition.faces:
-            given = face.of if not scope else f"{scope}.{face.of}"
-            keys = self.keys("element", given, face.place)
-            if face.label:
-                entries = [(key, self.facet(key, int(face.label[1:]), face.place)) for key in keys]
-            else:
-                entries = self._free_faces(keys, face.place)
-            found.update(dict.fromkeys(entries))
-        return list(found)
+            whole, _, left = self.faces_of_nodes(definition, scope)
+            if left:
+                raise definition.place.refuse(
+                    f"the nodes of surface '{definition.name}' make up no whole faces: {len(left)} belong to none (first: "
+                    f"node {self.number_of(left[0])}), and *{place.keyword} in line {place.line} needs faces, TYPE=ELEMENT"
+                )
+            return whole
+        if (label := folded(name)) not in self.surfaces:
+            found: dict[Face, None] = {}
+            for face in definition.faces:
+                own = self.elements_of(face.of if not scope else f"{scope}.{face.of}", face.place)
+                if face.label:
+                    entries = [(element, self.facet(element, int(face.label[1:]), face.place)) for element in own]
+                else:
+                    entries = [entry for element in own for entry in self._free_faces(element, face.place)]
+                found.update(dict.fromkeys(entries))
+            self.surfaces[label] = list(found)
+        return self.surfaces[label]
 
     def surface(self, name: str, place: Place) -> tuple[SurfaceDefinition, str]:
         """Return the definition of a surface and the instance it stands in; CaseError if there is none."""
@@ -178,66 +211,100 @@ class Assembled:
             raise surfaces[rest].place.refuse(f"surface '{surfaces[rest].name[:80]}' has no faces")
         return surfaces[rest], scope
 
-    def facet(self, key: Key, label: int, place: Place) -> int:
+    def facet(self, element: Element, label: int, place: Place) -> int:
         """Return the place of the face with a label, 1 and up, among the facets of its element."""
-        solid = self.solids.get(key)
-        if solid is None:
-            raise place.refuse(f"element {key[1]} is no solid, so it has no faces")
-        faces = solid.type.faces
+        if element.type is None:
+            raise place.refuse(f"element {element.number} is no solid, so it has no faces")
+        faces = element.type.faces
         if not 1 <= label <= len(faces):
             raise place.refuse(
-                f"element {key[1]} of type {solid.type.name} has no face {label}, only 1 to {len(faces)}"
+                f"element {element.number} of type {element.type.name} has no face {label}, only 1 to {len(faces)}"
             )
-        return matching(solid.type.element)[label - 1]
+        return matching(element.type.element)[label - 1]
 
-    def _free_faces(self, keys: list[Key], place: Place) -> list[tuple[Key, int]]:
-        """Return the faces of elements that no other element shares."""
-        return [
-            (key, facet) for key in keys for facet, corners in self._sides(key, place) if len(self.owners[corners]) == 1
-        ]
-
-    def _sides(self, key: Key, place: Place) -> list[tuple[int, frozenset[int]]]:
-        if key not in self.solids:
-            raise place.refuse(f"element {key[1]} is no solid, so it has no faces")
-        return corners_of(self.solids[key])
+    def _free_faces(self, element: Element, place: Place) -> Iterator[Face]:
+        """Yield the faces of an element that no other one shares."""
+        if element.type is None:
+            raise place.refuse(f"element {element.number} is no solid, so it has no faces")
+        facets = matching(element.type.element)
+        for label in np.flatnonzero(self.free[element.type.element][element.row]).tolist():
+            yield element, facets[label]
 
     @cached_property
-    def owners(self) -> dict[frozenset[int], list[tuple[Key, int]]]:
-        """Which solids and facets have the corners of each face."""
-        found: dict[frozenset[int], list[tuple[Key, int]]] = {}
-        for key, solid in self.solids.items():
-            for facet, corners in corners_of(solid):
-                found.setdefault(corners, []).append((key, facet))
+    def free(self) -> dict[str, Mask]:
+        """Which faces (n_elements, n_faces), by label, of the solids of each kind no other solid shares."""
+        corners, shapes = [], {}
+        for name, own in self.by_kind.items():
+            points = np.array([element.points for element in own], np.int32)
+            faces = own[0].solid.faces
+            shapes[name] = len(own), len(faces)
+            found = np.full((len(own), len(faces), 4), -1, np.int32)
+            for label, face in enumerate(faces):
+                found[:, label, : len(face)] = np.sort(points[:, list(face)], axis=1)
+            corners.append(found.reshape(-1, 4))
+        _, inverse, count = np.unique(np.concatenate(corners), axis=0, return_inverse=True, return_counts=True)
+        ends = np.cumsum([n * m for n, m in shapes.values()])
+        parts = np.split(count[inverse.ravel()] == 1, ends[:-1])
+        return {name: part.reshape(shapes[name]) for name, part in zip(shapes, parts, strict=True)}
+
+    @cached_property
+    def by_kind(self) -> dict[str, list[Element]]:
+        """The solids by the element that they become, each at its `row`."""
+        found: dict[str, list[Element]] = {}
+        for element in self.solids:
+            found.setdefault(element.solid.element, []).append(element)
         return found
 
-    def _faces_of_nodes(self, definition: SurfaceDefinition, scope: str) -> list[tuple[Key, int]]:
-        """Return the outer faces all of whose nodes belong to a surface of nodes."""
-        chosen: set[int] = set()
-        for face in definition.faces:
-            chosen.update(self.nodes(face.of if not scope else f"{scope}.{face.of}", face.place))
-        found = [sides[0] for corners, sides in self.owners.items() if len(sides) == 1 and corners <= chosen]
-        carried = {p for key, facet in found for p in facet_points(self.solids[key], facet)}
-        if chosen - carried:
-            number = min(chosen - carried)
-            name = next(key for key, index in self.index.items() if index == number)
-            raise definition.place.refuse(
-                f"the nodes of surface '{definition.name}' make up no whole faces: {len(chosen - carried)} of {len(chosen)} "
-                f"belong to none (first: node {name[1]}); contact needs faces, TYPE=ELEMENT"
-            )
+    @cached_property
+    def outer(self) -> dict[int, list[tuple[Face, frozenset[int]]]]:
+        """Which outer faces the points have, each with its corners."""
+        found: dict[int, list[tuple[Face, frozenset[int]]]] = {}
+        for name, own in self.by_kind.items():
+            facets, faces = matching(name), own[0].solid.faces
+            for row, label in np.argwhere(self.free[name]).tolist():
+                face = own[row], facets[label]
+                corners = frozenset(own[row].points[i] for i in faces[label])
+                for point in facet_points(*face):
+                    found.setdefault(point, []).append((face, corners))
         return found
 
+    def faces_within(self, points: set[int]) -> list[Face]:
+        """Return the outer faces all of whose corners are among points."""
+        near = dict.fromkeys(face for point in sorted(points) for face in self.outer.get(point, ()))
+        return [face for face, corners in near if corners <= points]
 
-def corners_of(solid: Solid) -> list[tuple[int, frozenset[int]]]:
-    """Return the facets of an element, each with the points of its corners."""
-    found = []
-    for label, facet in enumerate(matching(solid.type.element)):
-        found.append((facet, frozenset(solid.points[i] for i in solid.type.faces[label])))
-    return found
+    def surface_nodes(self, definition: SurfaceDefinition, scope: str) -> list[int]:
+        """Return the points of a surface of nodes, each once."""
+        given = [(face.of if not scope else f"{scope}.{face.of}", face.place) for face in definition.faces]
+        return list(dict.fromkeys(point for name, place in given for point in self.nodes(name, place)))
+
+    def number_of(self, point: int) -> str:
+        """Return how the deck names the node of a point."""
+        for scope, nodes in self.index.items():
+            for number, index in nodes.items():
+                if index == point:
+                    return f"{self.content.instances[scope].name}.{number}" if scope else str(number)
+        return "of a rotation"
+
+    def faces_of_nodes(self, definition: SurfaceDefinition, scope: str) -> tuple[list[Face], list[Face], list[int]]:
+        """Return the outer faces all of whose corners a surface of nodes has, those with most for other nodes, and these."""
+        chosen = set(self.surface_nodes(definition, scope))
+        whole: list[tuple[Face, set[int]]] = []
+        others: list[tuple[Face, set[int]]] = []
+        for face, corners in dict.fromkeys(face for point in sorted(chosen) for face in self.outer.get(point, ())):
+            points = chosen.intersection(facet_points(*face))
+            (whole if corners <= chosen else others).append((face, points))
+        left = chosen.difference(*(points for _, points in whole))
+        most: dict[int, int] = {}
+        for _, points in others:
+            most.update((point, max(len(points), most.get(point, 0))) for point in points & left)
+        further = [face for face, points in others if any(most[p] == len(points) for p in points & left)]
+        return [face for face, _ in whole], further, sorted(left)
 
 
-def facet_points(solid: Solid, facet: int) -> tuple[int, ...]:
+def facet_points(element: Element, facet: int) -> tuple[int, ...]:
     """Return the points of a facet of an element."""
-    return tuple(solid.points[i] for i in elements.get(solid.type.element).facets[facet])
+    return tuple(element.points[i] for i in elements.get(element.solid.element).facets[facet])
 
 
 MATCHING: dict[str, tuple[int, ...]] = {}
@@ -255,24 +322,27 @@ def matching(element: str) -> tuple[int, ...]:
 
 
 def assembled(content: Content) -> Assembled:
-    """Return the points and solids of all instances; CaseError where an element uses a node that is not there."""
-    made = Assembled(content)
+    """Return the points and elements of all instances; CaseError where an element uses a node that is not there."""
+    made, total, counts = Assembled(content), 0, {}  # type: tuple[Assembled, int, dict[str, int]]
+    places = []
     for scope in made.scopes:
         part = made.part(scope)
-        where = _placed(part, content.instances.get(scope))
-        for number, point in zip(part.nodes, where.tolist(), strict=True):
-            made.index[scope, number] = len(made.points)
-            made.points.append(tuple(point))
+        places.append(_placed(part, content.instances.get(scope)))
+        index = made.index[scope] = dict(zip(part.nodes, range(total, total + len(part.nodes)), strict=True))
+        total += len(index)
+        found = made.elements[scope] = {}
         for number, cell in part.cells.items():
-            for node in cell.nodes:
-                if node not in part.nodes:
-                    raise cell.place.refuse(f"element {number} uses node {node}, which is not defined")
-            points = tuple(made.index[scope, node] for node in cell.nodes)
+            points = tuple(index.get(node, -1) for node in cell.nodes)
+            if -1 in points:
+                raise cell.place.refuse(
+                    f"element {number} uses node {cell.nodes[points.index(-1)]}, which is not defined"
+                )
             kind = element_type(cell.type)
-            if kind is None:
-                made.discrete[scope, number] = (cell, points)
-            else:
-                made.solids[scope, number] = Solid(cell, kind, points)
+            row = -1 if kind is None else counts.setdefault(kind.element, 0)
+            if kind is not None:
+                counts[kind.element] += 1
+            found[number] = Element(scope, number, cell, kind, points, row)
+    made.points = np.concatenate(places)
     return made
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -63,13 +63,26 @@ class Row:
         return int(value)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
+class Lines:
+    """The data lines of a keyword as they stand in a file, from a line number on: rows are made when they are asked for."""
+
+    place: Place
+    texts: tuple[str, ...] = ()
+
+    def __iter__(self) -> Iterator[Row]:
+        for number, raw in enumerate(self.texts, start=self.place.line):
+            if not (line := raw.strip()).startswith("**"):
+                yield _row(Place(self.place.file, number, self.place.keyword), line)
+
+
+@dataclass(frozen=True, slots=True)
 class Block:
     """A keyword with its parameters (names in upper case, without values None) and all its data lines."""
 
     place: Place
     parameters: dict[str, str | None]
-    lines: tuple[Row, ...] = ()
+    lines: Iterable[Row] = ()
 
     @property
     def keyword(self) -> str:
@@ -79,7 +92,11 @@ class Block:
     @property
     def rows(self) -> list[Row]:
         """Return the data lines that hold anything."""
-        return [row for row in self.lines if any(row.entries)]
+        return list(self.each())
+
+    def each(self) -> Iterator[Row]:
+        """Yield `rows`, one at a time."""
+        return (row for row in self.lines if any(row.entries))
 
     def get(self, name: str, default: str = "") -> str:
         """Return the value of a parameter, `default` where it is not given or has none."""
@@ -133,8 +150,8 @@ def folded(name: str) -> str:
     return name.replace('"', "").strip().upper()
 
 
-def read_blocks(path: Path) -> list[Block]:
-    """Return all blocks of a deck, those of included files in place.
+def read_blocks(path: Path) -> Iterator[Block]:
+    """Yield all blocks of a deck, those of included files in place.
 
     Raises
     ------
@@ -144,7 +161,7 @@ def read_blocks(path: Path) -> list[Block]:
         If a line is no part of a deck, or an *INCLUDE is refused; the message names file and line.
     """
     source = Source(path.resolve().parent)
-    return list(_blocks(path, path.name, source))
+    return _blocks(path, path.name, source)
 
 
 def files_of_deck(path: Path) -> list[Path]:
@@ -172,8 +189,9 @@ def _blocks(path: Path, name: str, source: Source) -> Iterator[Block]:
     """Yield the blocks of one file; data lines at its beginning belong to no keyword and are refused."""
     source.open.append(path.resolve())
     current: Block | None = None
-    rows: list[Row] = []
-    lines = iter(enumerate(_text(path, source).splitlines(), start=1))
+    begin = 0
+    texts = _text(path, source).splitlines()
+    lines = iter(enumerate(texts, start=1))
     for number, raw in lines:
         line = raw.strip()
         if line.startswith("**"):
@@ -182,35 +200,41 @@ def _blocks(path: Path, name: str, source: Source) -> Iterator[Block]:
             keyword = _keyword(line) if line.startswith("*") else current.keyword if current else ""
             raise Place(name, number, keyword).refuse(_TOO_LONG)
         if not line.startswith("*"):
-            if current is not None and source.with_data:
-                rows.append(_row(Place(name, number, current.keyword), line))
-            elif line and current is None:
+            if line and current is None:
                 raise Place(name, number, "").refuse("a data line before any keyword")
             continue
         if current is not None:
-            yield Block(current.place, current.parameters, tuple(rows))
+            yield _with_lines(current, texts, begin, number - 1, source)
         place = Place(name, number, _keyword(line))
-        line = _continued(place, line, lines)
-        current, rows = Block(place, _parameters(place, line)), []
+        line, begin = _continued(place, line, lines, number)
+        current = Block(place, _parameters(place, line))
         if place.keyword == "INCLUDE":
             yield from _included(current, name, source)
             current = None
     if current is not None:
-        yield Block(current.place, current.parameters, tuple(rows))
+        yield _with_lines(current, texts, begin, len(texts), source)
     source.open.pop()
 
 
-def _continued(place: Place, line: str, lines: Iterator[tuple[int, str]]) -> str:
-    """Return a keyword line with the lines on which it goes on, after a comma."""
+def _with_lines(block: Block, texts: list[str], begin: int, end: int, source: Source) -> Block:
+    """Return a block with the lines of a file from one to another, counted from 0."""
+    if not source.with_data or begin >= end:
+        return block
+    place = Place(block.place.file, begin + 1, block.keyword)
+    return Block(block.place, block.parameters, Lines(place, tuple(texts[begin:end])))
+
+
+def _continued(place: Place, line: str, lines: Iterator[tuple[int, str]], number: int) -> tuple[str, int]:
+    """Return the keyword line of a number with the lines on which it goes on, after a comma, and the number of the last."""
     while line.endswith(","):
-        _, more = next(lines, (0, ""))
+        number, more = next(lines, (number, ""))
         if not more.strip().startswith("**"):
             line = f"{line} {more.strip()}"
         if len(line) > LONGEST_LINE:
             raise place.refuse(_TOO_LONG)
         if not more:
             break
-    return line
+    return line, number
 
 
 def _keyword(line: str) -> str:

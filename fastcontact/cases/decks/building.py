@@ -3,38 +3,41 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, vstack
 from scipy.spatial import cKDTree
 
-from fastcontact.cases.decks.assembled import Assembled, assembled
+from fastcontact.arrays import Array
+from fastcontact.cases.decks.assembled import Assembled, Element, assembled, facet_points
 from fastcontact.cases.decks.blocks import Place, folded
-from fastcontact.cases.decks.conditions import Component, Conditions, Distributed
-from fastcontact.cases.decks.content import Content, Material, Pair, Section, Step
+from fastcontact.cases.decks.conditions import Acting, Component, Conditions, Distributed
+from fastcontact.cases.decks.content import Content, Interaction, Material, Pair, Section, Step
 from fastcontact.cases.decks.cyclic_symmetry import add_sectors
+from fastcontact.cases.decks.histories import JUMP, shape_of
 from fastcontact.cases.decks.initial_stresses import add_initial_stresses
 from fastcontact.cases.decks.local_axes import local_axes, orientation_of
-from fastcontact.cases.decks.meshing import DeckMesh, begun, group_of_surface
+from fastcontact.cases.decks.meshing import DeckMesh, begun, group_of_surface, secondary_group
 from fastcontact.cases.decks.nonlinear import strain_of
 from fastcontact.cases.decks.pretension import add_sections, cut_sections
 from fastcontact.cases.decks.relating import make_rotations, relations_of
 from fastcontact.cases.decks.stepping import MOST_PARTS
 from fastcontact.cases.decks.temperatures import add_temperatures
+from fastcontact.contact.integration import all_nodes_carry
 from fastcontact.contact.obstacles.shapes import HalfSpace
 from fastcontact.elasticity.anisotropic_materials import Orthotropic
 from fastcontact.elasticity.material_axes import CylindricalAxes
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.elasticity.nonlinear_materials import NonlinearElastic
-from fastcontact.elasticity.relations import Relation
+from fastcontact.elasticity.relations import Relation, TemporaryRelation
+from fastcontact.errors import FastcontactError
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, Table
 
-Array = NDArray[np.float64]
 # What a gap of the undeformed sides may be, relative to the size of the model, and still count as none.
 TOUCHING = 1e-6
 LONGEST_RAMP = 100_000
@@ -50,7 +53,7 @@ class Building:
     thickness : float
         Of a plane model; forces of the model are those of a unit of it [length].
     local_supports : list of Relation
-        Relations that are supports along local axes.
+        Relations that are supports: those along local axes, and those that come or go between steps.
     linearised : str
         Why small strains are solved although a step has NLGEOM; empty where not.
     gap_ends : dict of str to dict of int to int
@@ -91,11 +94,10 @@ class Building:
 
     def _materials(self) -> tuple[list[tuple[Any, str]], float]:
         """Return materials with groups of solids, and the thickness; every solid needs a section."""
-        owner: dict[Any, tuple[Section, Material]] = {}
         thickness: float | None = None
         for scope in self.made.scopes:
             for section in self.made.part(scope).sections:
-                material = self._material(section)
+                self._material(section)
                 if self.found.dim == 2 and self.found.kinematics != "axisymmetric":
                     own = 1.0 if section.thickness is None else section.thickness
                     if thickness is not None and own != thickness:
@@ -104,29 +106,28 @@ class Building:
                         )
                     thickness = own
                 name = f"{scope}.{section.elements}" if scope else section.elements
-                for key in self.made.keys("element", name, section.place):
-                    if key in owner and owner[key][0] is not section:
+                for element in self.made.elements_of(name, section.place):
+                    if element.section not in (None, section):
                         raise section.place.refuse(
-                            f"element {key[1]} has a section already, in line {owner[key][0].place.line}"
+                            f"element {element.number} has a section already, in line {element.section.place.line}"
                         )
-                    owner[key] = (section, material)
-        self._check_sections(owner)
+                    element.section = section
+        self._check_sections()
         by_material: dict[tuple[str, str, bool], list[Any]] = {}
-        for key in self.made.solids:
-            section, material = owner[key]
-            modes = self.made.solids[key].type.modes
-            by_material.setdefault((folded(material.name), folded(section.orientation), modes), []).append(key)
-        self.densities = {key: owner[key][1] for key in self.made.solids}
+        for element in self.made.solids:
+            given = element.given_section
+            key = (folded(given.material), folded(given.orientation), element.solid.modes)
+            by_material.setdefault(key, []).append(element)
         found = []
-        for (name, turned, modes), keys in by_material.items():
+        for (name, turned, modes), members in by_material.items():
             material = self.content.materials[name]
-            axes = self._axes(owner[keys[0]][0])
+            axes = self._axes(members[0].section)
             group = f"material {material.name}" + (f" along {turned.lower()}" if turned else "")
             group += " with incompatible modes" if modes else ""
             found.append(
                 (
                     _law(self.content, material, axes, modes),
-                    self.found.add_solids(group, keys),
+                    self.found.add_solids(group, members),
                 )
             )
         return found, thickness or 1.0
@@ -150,20 +151,20 @@ class Building:
             raise material.place.refuse(f"material '{material.name}' has no *ELASTIC")
         return material
 
-    def _check_sections(self, owner: Mapping[Any, Any]) -> None:
-        without = [key for key in self.made.solids if key not in owner]
+    def _check_sections(self) -> None:
+        without = [element for element in self.made.solids if element.section is None]
         if without:
-            cell = self.made.solids[without[0]].cell
+            cell = without[0].cell
             many = "1 element" if len(without) == 1 else f"{len(without)} elements"
             named = f" of set '{cell.set}'" if cell.set else ""
-            raise cell.place.refuse(f"{many} ({without[0][1]}){named} has no section, so no material")
+            raise cell.place.refuse(f"{many} ({without[0].number}){named} has no section, so no material")
 
     def _check_pairs(self) -> None:
         """Refuse pairs whose surfaces or interaction are not there."""
         seen: set[str] = set()
         for pair in self.content.pairs:
-            for name in (pair.secondary, pair.primary):
-                self.made.surface(name, pair.place)
+            secondary_group(self.found, pair.secondary, pair.place)
+            self.made.faces(pair.primary, pair.place)
             if not pair.tied and folded(pair.interaction) not in self.content.interactions:
                 known = ", ".join(i.name for i in self.content.interactions.values()) or "none"
                 raise pair.place.refuse(
@@ -176,9 +177,10 @@ class Building:
     def _groups(self, conditions: Conditions) -> list[tuple[str, Table]]:
         """Make groups of the facets with the same history of pressure; return them."""
         by_table: dict[tuple[str, Table], list[Any]] = {}
-        for name in conditions.loads.tracks:
-            if name.face is not None:
-                by_table.setdefault((name.keyword, conditions.loads.table(name)), []).append(name.face)
+        for table, names in conditions.loads.alike():
+            for name in names:
+                if name.face is not None:
+                    by_table.setdefault((name.keyword, table), []).append(name.face)
         return [
             (self.found.add_facets(f"pressure {number}", faces), table)
             for number, ((_, table), faces) in enumerate(by_table.items(), start=1)
@@ -194,47 +196,71 @@ class Building:
 
     def _supports(self, conditions: Conditions) -> None:
         mesh, alike = self.model.mesh, {}  # type: tuple[Any, dict[tuple[int, Table], list[int]]]
-        for name in conditions.supports.tracks:
-            point, axis, local = name
-            table = conditions.supports.table(name)
-            if local:
-                self._local_support(conditions, name, table)
-            else:
-                alike.setdefault((axis, table), []).append(point)
-        for (axis, table), points in alike.items():
-            letter = "xyz"[axis]
+        temporary = conditions.temporary()
+        self._temporary_supports(conditions, temporary)
+        at_times = {name for name, _ in temporary}
+        for table, names in conditions.supports.alike():
+            for name in (name for name in names if name not in at_times):
+                point, axis, local = name
+                if local:
+                    self._local_support(conditions, name, table)
+                else:
+                    alike.setdefault((axis, table), []).append(point)
+        for axis, points, value, table in _by_shape(alike):
             group = self._point_group("support", points)
-            if any(value for _, value in table):
-                self.model.prescribe(group, ramp=table, **_along(axis))
+            if callable(value) or any(factor for _, factor in table):
+                self.model.prescribe(group, ramp=table, **{"xyz"[axis]: value})
             else:
-                self.model.fix(group, letter)
+                self.model.fix(group, "xyz"[axis])
         if mesh.dim == 2 and self.found.rotations:
             self.model.fix(self._point_group("rotation", self.found.rotations.values()), "y")
 
+    def _temporary_supports(self, conditions: Conditions, temporary: Sequence[tuple[Component, Acting]]) -> None:
+        """Add the supports that come or go between steps: those alike as one relation."""
+        alike: dict[tuple[Acting, Table], list[Component]] = {}
+        for name, acting in (entry for entry in temporary if entry[1].begins < entry[1].ends):
+            alike.setdefault((acting, conditions.supports.table(name)), []).append(name)
+        for (acting, table), names in alike.items():
+            ends = "" if acting.ends == np.inf else f" to {acting.ends:g}"
+            label = (
+                f"the support of {conditions.named(names[0])}, line {acting.place.line}, from {acting.begins:g}{ends}"
+            )
+            rows = csr_array(vstack([self._support_row(conditions, name) for name in names]))
+            self._relate_support(
+                TemporaryRelation(label, rows, 1.0, table, acting.begins, acting.ends, keeps=acting.keeps)
+            )
+
     def _local_support(self, conditions: Conditions, name: Component, table: Table) -> None:
-        point, axis, _ = name
-        dim = self.found.dim
-        direction = conditions.directions[point][axis][:dim]
-        columns = point * dim + np.arange(dim)
-        rows = csr_array((direction, (np.zeros(dim, int), columns)), shape=(1, self.model.n_dofs))
-        made = Relation(f"the support of {conditions.named(name)} on local axes", rows, 1.0, table)
+        label = f"the support of {conditions.named(name)} on local axes"
+        self._relate_support(Relation(label, self._support_row(conditions, name), 1.0, table))
+
+    def _relate_support(self, made: Relation) -> None:
         self.local_supports.append(made)
         self.model.relations.append(made)
 
+    def _support_row(self, conditions: Conditions, name: Component) -> csr_array:
+        """Return the row (1, n_dofs) of the displacement that a support prescribes [-]."""
+        point, axis, local = name
+        dim = self.found.dim
+        direction = (conditions.directions[point] if local else np.eye(3))[axis][:dim]
+        columns = point * dim + np.arange(dim)
+        return csr_array((direction, (np.zeros(dim, int), columns)), shape=(1, self.model.n_dofs))
+
     def _forces(self, conditions: Conditions) -> None:
         alike: dict[tuple[int, Table], list[int]] = {}
-        for name in conditions.forces.tracks:
-            point, axis, local = name
-            table = conditions.forces.table(name)
-            direction = conditions.directions[point][axis] if local else np.eye(3)[axis]
-            for k in range(self.found.dim):
-                if abs(direction[k]) > 1e-12:
-                    scaled = tuple((t, v * float(direction[k]) / self.thickness) for t, v in table)
-                    alike.setdefault((k, scaled), []).append(point)
-        for (axis, table), points in alike.items():
-            if any(value for _, value in table):
+        for table, names in conditions.forces.alike():
+            along: dict[tuple[int, float], list[int]] = {}
+            for point, axis, local in names:
+                direction = conditions.directions[point][axis] if local else np.eye(3)[axis]
+                for k in np.flatnonzero(np.abs(direction[: self.found.dim]) > 1e-12).tolist():
+                    along.setdefault((k, float(direction[k])), []).append(point)
+            for (k, cosine), points in along.items():
+                scaled = tuple((t, v * cosine / self.thickness) for t, v in table)
+                alike.setdefault((k, scaled), []).extend(points)
+        for axis, points, value, table in _by_shape(alike):
+            if any(factor for _, factor in table):
                 group = self._point_group("force", points)
-                self.model.add_force(group, distribute=False, ramp=table, **_along(axis))
+                self.model.add_force(group, distribute=False, ramp=table, **{"xyz"[axis]: value})
 
     def _pressures(self, groups: list[tuple[str, Table]]) -> None:
         for group, table in groups:
@@ -247,19 +273,19 @@ class Building:
                 continue
             track = conditions.loads.tracks[name]
             by_density: dict[float, list[Any]] = {}
-            for key in name.elements:
-                if key in self.made.solids:
-                    by_density.setdefault(self._density(key, name, track.place), []).append(key)
-            for density, keys in by_density.items():
-                group = self.found.add_solids(f"load {number} of density {density:g}", keys)
+            for element in name.elements:
+                if element.type is not None:
+                    by_density.setdefault(self._density(element, name, track.place), []).append(element)
+            for density, members in by_density.items():
+                group = self.found.add_solids(f"load {number} of density {density:g}", members)
                 self._name_solids(group)
                 values = _body_force(name, density, self.found.dim)
                 self.model.add_body_force(group, ramp=conditions.loads.table(name), **values)
 
-    def _density(self, key: Any, name: Distributed, place: Place) -> float:
+    def _density(self, element: Element, name: Distributed, place: Place) -> float:
         if name.kind[0] == "B":
             return 1.0
-        material = self.densities[key]
+        material = self._material(element.given_section)
         if material.density is None:
             raise place.refuse(f"material '{material.name}' has no *DENSITY, so {name.kind} is no force")
         return material.density
@@ -267,44 +293,56 @@ class Building:
     def _name_solids(self, group: str) -> None:
         """Add a group of solids to the mesh that is made already; elements begin the numbers of cells."""
         offsets = self.model.mesh.offsets
-        numbers = [offsets[name] + row for name, row in self.found.groups[group]]
+        numbers = [offsets[name] + row for name, rows in self.found.groups[group].items() for row in rows]
         self.model.mesh = self.model.mesh.with_groups(cells={group: numbers})
 
     def _springs(self) -> None:
         for name, (place, stiffness) in self.content.springs.items():
-            for key in self.made.keys("element", name, place):
-                cell, points = self.made.discrete.get(key, (None, ()))
-                if cell is None or cell.type != "SPRINGA":
-                    raise place.refuse(f"element {key[1]} is no spring of type SPRINGA")
-                self.model.add_spring(points[0], points[1], axial=stiffness / self.thickness)
+            for element in self.made.elements_of(name, place):
+                if element.cell.type != "SPRINGA":
+                    raise place.refuse(f"element {element.number} is no spring of type SPRINGA")
+                self.model.add_spring(element.points[0], element.points[1], axial=stiffness / self.thickness)
         self._check_discrete("SPRINGA", self.content.springs, "*SPRING")
 
     def _check_discrete(self, kind: str, given: Mapping[str, Any], needed: str) -> None:
         """Refuse springs and gap elements without properties."""
-        with_one = {key for name, entry in given.items() for key in self.made.keys("element", name, entry[0])}
-        for key, (cell, _) in self.made.discrete.items():
-            if cell.type == kind and key not in with_one:
-                raise cell.place.refuse(f"element {key[1]} of type {kind} has no {needed}")
+        with_one = {own for name, entry in given.items() for own in self.made.elements_of(name, entry[0])}
+        for element in self.made.discrete:
+            if element.cell.type == kind and element not in with_one:
+                raise element.cell.place.refuse(f"element {element.number} of type {kind} has no {needed}")
 
     def _contact(self) -> None:
         for pair in self.content.pairs:
             secondary, primary = (group_of_surface(self.found, name) for name in (pair.secondary, pair.primary))
             options = {"kind": "tied"} if pair.tied else self._options(pair)
-            self.model.add_contact(f"{secondary}/{primary}", secondary=secondary, primary=primary, **options)
+            if secondary in self.found.loose:
+                options.update(self._at_nodes(pair, secondary))
+            try:
+                self.model.add_contact(f"{secondary}/{primary}", secondary=secondary, primary=primary, **options)
+            except FastcontactError as error:
+                raise pair.place.refuse(str(error)) from error
+
+    def _at_nodes(self, pair: Pair, secondary: str) -> dict[str, Any]:
+        """Return the options by which some nodes alone of the facets around them are in contact."""
+        options: dict[str, Any] = {"excluded": self._point_group("without contact", self.found.loose[secondary])}
+        if all(map(all_nodes_carry, self.found.groups[secondary])):
+            options["formulation"] = "node_to_segment"
+        self.content.note(
+            pair.place, f"the nodes of surface '{pair.secondary}' make up no whole faces: they alone of the facets around "
+            "them are in contact"
+        )  # fmt: skip
+        return options
 
     def _options(self, pair: Pair) -> dict[str, Any]:
         law = self.content.interactions[folded(pair.interaction)]
         options: dict[str, Any] = {}
         if law.kind != "unilateral":
-            if law.friction:
+            if law.friction or law.changes:
                 raise law.place.refuse(f"friction with {law.kind} contact is not supported")
             options["kind"] = law.kind
         if law.penalty is not None and law.kind != "tied":
             options["penalty"] = law.penalty
-        if law.friction:
-            options["friction"] = law.friction
-            if law.stick is not None:
-                options["tangential_penalty"] = law.stick
+        options.update(_friction(law, len(self.content.steps)))
         if pair.adjust or pair.clearance is not None:
             options.update(self._fitted(pair))
         return options
@@ -312,7 +350,7 @@ class Building:
     def _fitted(self, pair: Pair) -> dict[str, Any]:
         """Return the clearance that brings the sides to where ADJUST or *CLEARANCE say; refused where no number does."""
         secondary, primary = (group_of_surface(self.found, name) for name in (pair.secondary, pair.primary))
-        gaps, places = nodal_gaps(self.model, secondary, primary)
+        gaps, places = nodal_gaps(self.model, secondary, primary, self.found.loose.get(secondary, []))
         size = TOUCHING * float(np.ptp(self.model.mesh.points, axis=0).max())
         if pair.clearance is not None:
             if np.ptp(gaps) > size:
@@ -344,14 +382,15 @@ class Building:
         found = {}
         self._check_discrete("GAPUNI", self.content.gaps, "*GAP")
         for name, (place, _, _) in self.content.gaps.items():
-            ends = [self.made.discrete.get(key, (None, ()))[1] for key in self.made.keys("element", name, place)]
-            if any(len(pair) != 2 for pair in ends):
+            own = self.made.elements_of(name, place)
+            if any(element.cell.type != "GAPUNI" for element in own):
                 raise place.refuse("acts on elements of type GAPUNI only")
+            ends = [element.points for element in own]
             chosen = {pair[0] for pair in ends}
-            faces = [sides[0] for corners, sides in self.made.owners.items() if len(sides) == 1 and corners <= chosen]
+            faces = self.made.faces_within(chosen)
             shown = self.content.root.set_names.get(name, name)
             group = self.found.add_facets(f"{shown} facets", faces)
-            covered = {p for element, row in self.found.groups[group] for p in self.found.facets[element][row]}
+            covered = {p for face in faces for p in facet_points(*face)}
             if covered != chosen:
                 raise place.refuse(
                     "gap elements are supported on all nodes of whole faces only, from the body to nodes that are held"
@@ -390,11 +429,31 @@ class Building:
             for number, step in enumerate(steps):
                 instants.update(number + part for part in _parts(step))
         for histories in (conditions.supports, conditions.forces, conditions.loads, conditions.temperatures):
-            for track in histories.tracks.values():
+            for track in histories.distinct():
                 instants.update(round(time, 12) for time, _ in track.points if abs(time - round(time)) > 1e-6)
         if len(instants) > LONGEST_RAMP:
             raise steps[0].place.refuse(f"the histories have {len(instants)} corners, more than {LONGEST_RAMP}")
         return Ramp(tuple(sorted(instants)), ((0.0, 0.0), (float(len(steps)), 1.0)))
+
+
+def _friction(law: Interaction, n_steps: int) -> dict[str, Any]:
+    """Return the options of a pair for its friction, which *CHANGE FRICTION changes at the beginning of steps."""
+    table, sticks = [(0.0, law.friction)], {law.stick} if law.friction else set()
+    for before, changed in law.changes:
+        if changed.friction < 0.0 or changed.penalty is not None or changed.kind != law.kind:
+            raise changed.place.refuse("one *FRICTION must follow, and nothing else of the interaction changes")
+        table += [(float(before), table[-1][1]), (before + JUMP, changed.friction)]
+        sticks |= {changed.stick} if changed.friction else set()
+    largest = max(value for _, value in table)
+    if not largest:
+        return {}
+    if len(sticks) > 1:
+        raise law.changes[0][1].place.refuse("a stick slope that changes is not supported: give the same one")
+    options: dict[str, Any] = {"friction": largest, "tangential_penalty": sticks.pop()}
+    if law.changes:
+        points = {**dict(table), float(n_steps): table[-1][1]}
+        options["friction_ramp"] = [(time, value / largest) for time, value in sorted(points.items())]
+    return options
 
 
 def _law(content: Content, material: Material, axes: Any, modes: bool) -> Any:
@@ -448,18 +507,43 @@ def _body_force(name: Distributed, density: float, dim: int) -> dict[str, Any]:
     return {"xyz"[k]: component(k) for k in range(dim) if abs(axis[k]) < 1.0}
 
 
-def nodal_gaps(model: Model, secondary: str, primary: str) -> tuple[Array, Array]:
-    """Return how far nodes of one side that face the other are from it (n,), and where they are (n, dim) [length]."""
+def nodal_gaps(model: Model, secondary: str, primary: str, without: Sequence[int]) -> tuple[Array, Array]:
+    """Return how far nodes of one side that face the other are from it (n,), and where they are (n, dim) [length].
+
+    Those `without` contact are left out.
+    """
     from fastcontact.contact.configuration import Configuration
     from fastcontact.model.contact_pair import ContactPair
 
     pair = ContactPair("gaps", secondary, primary, "continuous", {})
     found, places = model.bind(pair), model.mesh.points
     gaps, _ = found.nodal_gap(Configuration.undeformed(places))
-    faced = np.isfinite(gaps)
+    faced = np.isfinite(gaps) & ~np.isin(found.secondary.points, without)
     return (gaps[faced], places[found.secondary.points[faced]]) if faced.any() else (np.zeros(1), places[:1])
 
 
-def _along(axis: int) -> dict[str, Any]:
-    """Return a unit force along an axis, as the model takes it."""
-    return {"xyz"[axis]: 1.0}
+def _by_shape(alike: Mapping[tuple[int, Table], list[int]]) -> Iterator[tuple[int, list[int], Any, Table]]:
+    """Yield axis, points, value and history of what points have by axis and history, once for histories of one shape.
+
+    The value is 1, or a function that returns those of the points, ascending, where they differ.
+    """
+    shapes: dict[tuple[int, Table], dict[Table, float]] = {}
+    for axis, table in alike:
+        size, shape = shape_of(table)
+        shapes.setdefault((axis, shape), {})[table] = size
+    for (axis, shape), sizes in shapes.items():
+        if len(sizes) == 1:
+            table = next(iter(sizes))
+            yield axis, alike[axis, table], 1.0, table
+            continue
+        values: dict[int, float] = {}
+        for table, size in sizes.items():
+            for point in alike[axis, table]:
+                values[point] = values.get(point, 0.0) + size
+        points = sorted(values)
+        yield axis, points, partial(_given, np.array([values[point] for point in points])), shape
+
+
+def _given(values: Array, positions: Array) -> Array:
+    """Return values (n,) that nodes have whatever their positions (n, dim)."""
+    return values

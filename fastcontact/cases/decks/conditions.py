@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fastcontact.cases.decks.assembled import Key
+from fastcontact.cases.decks.assembled import Element, Face
 from fastcontact.cases.decks.blocks import Place, Row
 from fastcontact.cases.decks.content import Given
 from fastcontact.cases.decks.histories import Histories
@@ -17,22 +17,31 @@ from fastcontact.cases.decks.pretension import Locks
 from fastcontact.cases.decks.temperatures import give as give_temperatures
 from fastcontact.cases.decks.temperatures import initial_temperatures
 
-Array = NDArray[np.float64]
 NAMED = {"XSYMM": (1,), "YSYMM": (2,), "ZSYMM": (3,), "ENCASTRE": (1, 2, 3, 4, 5, 6), "PINNED": (1, 2, 3)}
 ROUND_OFF = 1e-9
 # Point and component from 0; of supports on local axes component from 0 and True.
 Component = tuple[int, int, bool]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Distributed:
     """What a distributed load acts on: its kind, facets or elements, and its direction or axis."""
 
     keyword: str
     kind: str
-    face: tuple[Key, int] | None = None
-    elements: tuple[Key, ...] = ()
+    face: Face | None = None
+    elements: tuple[Element, ...] = ()
     vector: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Acting:
+    """When a support acts, as load factors, and whether it keeps what it finds; its place where it begins."""
+
+    place: Place
+    begins: float
+    ends: float = np.inf
+    keeps: bool = False
 
 
 class Conditions:
@@ -47,6 +56,9 @@ class Conditions:
         self.loads: Histories[Distributed] = Histories(content)
         initial = initial_temperatures(self.made, content.initial)
         self.temperatures: Histories[int] = Histories(content, rest=initial)
+        self.acting: dict[Component, Acting] = {}
+        self.over: list[tuple[Component, Acting]] = []
+        self.keeping: set[Component] = set()
         self.locks = Locks(self.made)
         self.directions = local_directions(self.made)
 
@@ -56,24 +68,13 @@ class Conditions:
         for given in content.supports:
             self._supports(given, before=True)
         self.supports.begin()
+        self._act(self.supports.first, 0.0)
         for number, step in enumerate(content.steps, start=1):
             self.locks.begin(number, [g for g in step.given if g.block.keyword == "BOUNDARY"], self.made)
             for given in step.given:
                 self._take(given)
-            held = {name for name, track in self.supports.tracks.items() if track.alive}
-            lost = [name for name in self.supports.tracks if name not in held and name not in self.supports.changing]
-            if lost:
-                raise self._new_list(step.given).refuse(
-                    f"step {number} leaves out {len(lost)} supports that were there before (first: {self.named(lost[0])}): "
-                    "supports must stay through all steps"
-                )
-            new = self.supports.advance(number, step)
-            if new and number > 1:
-                place = self.supports.tracks[new[0]].place
-                raise place.refuse(
-                    f"step {number} has {len(new)} supports that were not there before (first: {self.named(new[0])}): "
-                    "supports must stay through all steps"
-                )
+            self._change(number)
+            self.supports.advance(number, step)
             self.forces.advance(number, step)
             self.loads.advance(number, step)
             self.temperatures.advance(number, step)
@@ -85,18 +86,36 @@ class Conditions:
         else:
             {"BOUNDARY": self._supports, "CLOAD": self._forces}.get(keyword, self._loads)(given)
 
-    @staticmethod
-    def _new_list(given: list[Given]) -> Place:
-        return next(g.block.place for g in given if g.block.keyword == "BOUNDARY" and g.new)
+    def _change(self, number: int) -> None:
+        """Take note of the supports that come and go at the beginning of step `number`."""
+        changing = self.supports.changing
+        gone = [name for name in self.supports.dying if name in self.acting]
+        moved = [
+            name for name in changing if name in self.acting and self.acting[name].keeps and name not in self.keeping
+        ]
+        for name in gone + moved:
+            self.over.append((name, replace(self.acting.pop(name), ends=number - 1.0)))
+        self._act(changing, number - 1.0)
+        self.keeping.clear()
+
+    def _act(self, names: Mapping[Component, tuple[float, str, Place]], begin: float) -> None:
+        """Let supports act from the beginning of a step on, where they do not yet."""
+        begun: dict[tuple[Place, bool], Acting] = {}
+        for name, (_, _, place) in names.items():
+            if name not in self.acting:
+                key = place, name in self.keeping
+                self.acting[name] = begun.setdefault(key, Acting(place, begin, keeps=key[1]))
+
+    def temporary(self) -> list[tuple[Component, Acting]]:
+        """Return the supports that do not act in all steps, each with when it does."""
+        return [*self.over, *((name, acting) for name, acting in self.acting.items() if acting.begins > 0.0)]
 
     def named(self, component: Component) -> str:
         """Return a component of a point as the deck names it."""
         point, axis, _ = component
-        for key, index in self.made.index.items():
-            if index == point:
-                where = f"{self.made.content.instances[key[0]].name}." if key[0] else ""
-                return f"component {axis + 1} of node {where}{key[1]}"
-        return f"rotation {axis + 1} of a reference node"
+        if point >= sum(map(len, self.made.index.values())):
+            return f"rotation {axis + 1} of a reference node"
+        return f"component {axis + 1} of node {self.made.number_of(point)}"
 
     def _supports(self, given: Given, before: bool = False) -> None:
         block = given.block
@@ -134,8 +153,9 @@ class Conditions:
         if point in self.directions and component <= 3:
             name, sign = self._local(point, component)
         if "FIXED" in given.block.parameters:
-            self.supports.hold(name, row.place)
-            if name in self.supports.tracks:
+            self.keeping.add(name)
+            if name in self.acting:
+                self.supports.hold(name, row.place)
                 return
         self.supports.give(name, sign * value, given.amplitude, row.place)
 
@@ -173,9 +193,7 @@ class Conditions:
     def _loads(self, given: Given) -> None:
         keyword = given.block.keyword
         if given.new:
-            kept = self.loads.changing
-            for name, track in self.loads.tracks.items():
-                track.alive = track.alive and (name.keyword != keyword or name in kept)
+            self.loads.forget(lambda name: name.keyword == keyword)
         for row in given.block.rows:
             for name, value in self._distributed(keyword, row):
                 self.loads.give(name, value, given.amplitude, row.place)
@@ -187,9 +205,9 @@ class Conditions:
                 raise row.place.refuse(f"load {label[:40]} on a surface is not supported, only P")
             faces, value = self.made.faces(row.text(0), row.place), row.number(2)
             return [(Distributed(keyword, "P", face), value) for face in faces]
-        keys = self.made.keys("element", row.text(0), row.place) if row.text(0) else list(self.made.solids)
+        own = self.made.elements_of(row.text(0), row.place) if row.text(0) else self.made.solids
         if label[:1] == "P" and label[1:].isdigit():
-            facets = [(key, self.made.facet(key, int(label[1:]), row.place)) for key in keys]
+            facets = [(element, self.made.facet(element, int(label[1:]), row.place)) for element in own]
             return [(Distributed(keyword, "P", face), row.number(2)) for face in facets]
         size = {"GRAV": 3, "CENTRIF": 6, "BX": 0, "BY": 0, "BZ": 0}.get(label)
         if size is None:
@@ -199,4 +217,4 @@ class Conditions:
         vector = tuple(row.number(3 + i, 0.0) for i in range(size))
         if size and not any(vector[-3:]):
             raise row.place.refuse(f"the direction of {label} is missing")
-        return [(Distributed(keyword, label, None, tuple(keys), vector), row.number(2))]
+        return [(Distributed(keyword, label, None, tuple(own), vector), row.number(2))]

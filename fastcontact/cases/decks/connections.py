@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from fastcontact.cases.decks.blocks import Block, Row, as_number, unquoted
-from fastcontact.cases.decks.content import Axes, Content, Equation, Link, Pair, Pin
+from fastcontact.cases.decks.content import Axes, Content, Equation, Link, MultiPoint, Pair, Pin
 from fastcontact.cases.decks.cyclic_symmetry import sector_ends
+from fastcontact.cases.decks.multi_points import LEAST
 
 # Terms of an equation: more tie everything to everything.
 MOST_TERMS = 100_000
@@ -87,17 +88,27 @@ def _term(row: Row, start: int) -> tuple[str, int, float]:
 
 
 def multi_point(content: Content, block: Block) -> None:
-    """*MPC: PIN and TIE give two nodes the same displacement, BEAM a rigid bar from the first node to the second."""
+    """*MPC: PIN and TIE give two nodes the same displacement, BEAM a rigid bar from the first node to the second.
+
+    Those of PLANE, STRAIGHT and MEANROT go on over lines that begin with a number.
+    """
+    several: list[tuple[Row, str, list[str]]] = []
     for row in block.rows:
         kind, nodes = row.text(0).upper(), [unquoted(entry) for entry in row.entries[1:] if entry]
-        if kind not in ("PIN", "TIE", "BEAM"):
-            raise row.place.refuse(f"an MPC of type {kind[:40]} is not supported, only PIN, TIE and BEAM")
-        if len(nodes) != 2:
+        if kind.isdecimal() and several:
+            several[-1][2].extend([*([row.text(0)] if int(kind) else []), *nodes])
+        elif kind in LEAST:
+            several.append((row, kind, nodes))
+        elif kind not in ("PIN", "TIE", "BEAM"):
+            known = ", ".join(("PIN", "TIE", "BEAM", *LEAST))
+            raise row.place.refuse(f"an MPC of type {kind[:40]} is not supported, only {known}")
+        elif len(nodes) != 2:
             raise row.place.refuse(f"{kind} needs two nodes, the one that follows and the one that leads")
-        if kind == "BEAM":
+        elif kind == "BEAM":
             content.links.append(Link(row.place, nodes[1], nodes[0], "nodes"))
         else:
             content.pins.append(Pin(row.place, nodes[0], nodes[1]))
+    content.multi_points += [MultiPoint(row.place, kind, tuple(nodes)) for row, kind, nodes in several]
 
 
 def rigid_body(content: Content, block: Block) -> None:

@@ -2,37 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from fastcontact.cases.decks.blocks import Block, Place, folded
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Cell:
-    """An element: its type, the numbers of its nodes, and its line."""
+    """An element: its type, the numbers of its nodes, the place of its keyword, and its line."""
 
     type: str
-    nodes: tuple[int, ...]
-    place: Place
+    nodes: Sequence[int]
+    within: Place
+    line: int
     set: str = ""
 
+    @property
+    def place(self) -> Place:
+        """Its place."""
+        return replace(self.within, line=self.line)
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, slots=True)
 class Members:
-    """One entry of a set: a number, a range or the name of another set, in an instance (empty: where it is defined)."""
+    """Entries of a set: numbers, or the name of another set, in an instance (empty: where it is defined)."""
 
     place: Place
-    first: int = 0
-    last: int = 0
-    increment: int = 1
+    numbers: Sequence[int] = ()
     name: str = ""
     instance: str = ""
-    generated: bool = False
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Face:
     """One entry of a surface: an element set or number, or for nodes a node set or number, and the label of the face."""
 
@@ -114,6 +117,7 @@ class Interaction:
     friction: float = 0.0
     stick: float | None = None
     kind: str = "unilateral"
+    changes: list[tuple[int, Interaction]] = field(default_factory=list)  # of friction, by the number of steps before
 
 
 @dataclass
@@ -172,6 +176,15 @@ class Pin:
 
 
 @dataclass(frozen=True)
+class MultiPoint:
+    """Nodes that stay in a plane or on a line, or, with a last one for it, have a mean rotation."""
+
+    place: Place
+    kind: str
+    nodes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Link:
     """A reference node with nodes that follow it (rigid, kinematic) or whose mean motion it follows (distributing)."""
 
@@ -215,7 +228,7 @@ class Amplitude:
     total: bool
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Given:
     """Values of supports, loads or temperatures: their block, what remains of earlier steps, their amplitude."""
 
@@ -224,7 +237,7 @@ class Given:
     amplitude: str = ""
 
 
-@dataclass
+@dataclass(slots=True)
 class Step:
     """A load step of the deck."""
 
@@ -253,6 +266,7 @@ class Content:
     sectors: list[Sectors] = field(default_factory=list)
     equations: list[Equation] = field(default_factory=list)
     pins: list[Pin] = field(default_factory=list)
+    multi_points: list[MultiPoint] = field(default_factory=list)
     links: list[Link] = field(default_factory=list)
     axes: list[Axes] = field(default_factory=list)
     pretensions: list[PretensionSection] = field(default_factory=list)

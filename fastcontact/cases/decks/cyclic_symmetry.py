@@ -48,7 +48,7 @@ def add_sectors(model: Model, found: DeckMesh) -> list[Relation]:
         if model.mesh.dim == 2 and np.abs(direction[:2]).max() > 1e-9:
             raise sectors.place.refuse("the axis of a plane model is along z: give two points above each other")
         for name in ends.surfaces:
-            found.made.surface(name, ends.place)
+            found.made.faces(name, ends.place)
         groups = [group_of_surface(found, name) for name in ends.surfaces]
         try:
             model.add_cyclic_symmetry(

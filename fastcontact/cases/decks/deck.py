@@ -8,18 +8,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.result_warnings import largest_rotation
 from fastcontact.analysis.run import solve_steps
 from fastcontact.analysis.support_forces import multipliers
+from fastcontact.arrays import Array, Numbers
 from fastcontact.cases.decks.blocks import Place, read_blocks
 from fastcontact.cases.decks.building import Building
 from fastcontact.cases.decks.content import Content
 from fastcontact.cases.decks.reading import read_content
 from fastcontact.elasticity import recovery
-from fastcontact.errors import FileError, MeshError, warn
+from fastcontact.elasticity.relations import TemporaryRelation
+from fastcontact.errors import ContactError, FileError, MeshError, ModelError, warn
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.files.paths import PathLike, existing_file
 from fastcontact.model.model import Model
@@ -85,7 +86,7 @@ class Deck:
         for step in solve_steps(self.model, self.ramp, **{"criteria": self.criteria, **options}):
             yield self.finished(step)
 
-    def points_of(self, name: str) -> NDArray[np.int32]:
+    def points_of(self, name: str) -> Numbers:
         """Return the sorted point numbers (n,) of a node set, in any case; of sets of parts ``Instance.set``.
 
         MeshError if there is none of that name.
@@ -103,13 +104,13 @@ class Deck:
         """
         made = self.building.made
         scope, rest = made.place_of(str(number))
-        if not rest.isdigit() or (scope, int(rest[:19])) not in made.index:
+        if not rest.isdecimal() or int(rest[:19]) not in made.index[scope]:
             raise MeshError(f"node '{number}' is not defined in '{self.path.name}'")
-        return made.index[scope, int(rest[:19])]
+        return made.index[scope][int(rest[:19])]
 
     def finished(self, step: StepResult) -> StepResult:
         """Return a step of the model with the reactions of supports alone and forces of the whole thickness."""
-        reaction = self._supports_alone(step.reaction)
+        reaction = self._supports_alone(step.reaction, float(np.nextafter(step.load_factor, -np.inf)))
         for name, ends in self.building.gap_ends.items():
             contact = step.contact[name]
             for point, force in zip(contact.points.tolist(), contact.force_vectors, strict=True):
@@ -129,14 +130,15 @@ class Deck:
         work = {"work": {name: t * value for name, value in step.work.items()}} if step.work else {}
         return replace(step, reaction=t * reaction, contact=whole, iterations=step.iterations | work)
 
-    def _supports_alone(self, reaction: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _supports_alone(self, reaction: Array, instant: float) -> Array:
         """Return nodal forces (n_points, dim) without those of relations, found where no support acts [force]."""
         links = self.building.links
         if not links:
             return reaction.copy()
         held = self.model.prescribed()[0].ravel()
         for support in self.building.local_supports:
-            held[support.rows.indices] = True
+            if not isinstance(support, TemporaryRelation) or support.acts_from(instant):
+                held[support.rows.indices[support.rows.data != 0.0]] = True
         rows = [link.rows for link in links]
         forces = multipliers(reaction.ravel(), rows, held)
         linked = sum((own.T @ force for own, force in zip(rows, forces, strict=True)), np.zeros(held.size))
@@ -203,7 +205,10 @@ def read_deck(path: PathLike) -> Deck:
     content = read_content(read_blocks(found))
     if not content.steps:
         raise Place(found.name, 1, "STEP").refuse("the deck has no step, so nothing is loaded")
-    building = Building(content, _text(found))
+    try:
+        building = Building(content, _text(found))
+    except (ModelError, MeshError, ContactError) as error:
+        raise type(error)(f"{found.name}: {error}") from error
     if building.linearised:
         step = next(step for step in content.steps if step.nonlinear)
         warn(

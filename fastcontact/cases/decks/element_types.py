@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 TETRAHEDRON = ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0))
 HEXAHEDRON = ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))
@@ -50,6 +51,7 @@ class ElementType:
         return SHAPES[self.element[:3]]
 
 
+@cache
 def element_type(name: str) -> ElementType | None:
     """Return what an element type of decks (in upper case) becomes, None for what is no solid known here."""
     base, note, modes = name, "", False

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from array import array
+from collections.abc import Iterator
+from itertools import groupby
+
 from fastcontact.cases.decks.blocks import Block, Row, folded, unquoted
 from fastcontact.cases.decks.content import Cell, Content, Face, Instance, Members, Part, SurfaceDefinition
 from fastcontact.cases.decks.element_types import described, element_type
@@ -17,17 +21,17 @@ def nodes(content: Content, part: Part, block: Block) -> None:
     """*NODE: numbers and coordinates."""
     if block.get("SYSTEM", "R").upper() != "R":
         raise block.place.refuse(f"SYSTEM={block.get('SYSTEM')} is not supported: give rectangular coordinates")
-    numbers = []
-    for row in block.rows:
+    numbers = array("q")
+    for row in block.each():
         number = row.whole(0)
         if len(row.entries) > 4 and any(row.entries[4:]):
             raise row.place.refuse(f"node {number} has more than three coordinates")
         where = (row.number(1, 0.0), row.number(2, 0.0), row.number(3, 0.0))
         if part.nodes.setdefault(number, where) != where:
             raise row.place.refuse(f"node {number} is defined twice, at different places")
-        numbers.append(Members(row.place, number, number))
+        numbers.append(number)
     if block.get("NSET"):
-        part.add("node", block.get("NSET"), numbers)
+        part.add("node", block.get("NSET"), [Members(block.place, numbers)])
 
 
 def cells(content: Content, part: Part, block: Block) -> None:
@@ -36,39 +40,43 @@ def cells(content: Content, part: Part, block: Block) -> None:
     kind = element_type(name)
     if kind is None and name not in DISCRETE:
         where = f" in set '{own}'" if own else ""
-        count = len(_joined(block, 0))
+        count = sum(1 for _ in _joined(block, 0))
         raise block.place.refuse(
             f"element type {name[:40]}{described(name)} is not supported; {count} element{'s' * (count != 1)}{where}"
         )
     needed = DISCRETE[name] if kind is None else elements.get(kind.element).n_nodes
     if kind is not None and kind.note and f"{name}: " not in "".join(content.notes):
         content.note(block.place, f"{name}: {kind.note}")
-    members = []
+    members = array("q")
     for row, entries in _joined(block, needed):
         number = row.whole(0)
-        found = [Row(row.place, entries).whole(i) for i in range(1, len(entries)) if entries[i]]
+        whole = Row(row.place, entries)
+        found = array("q", (whole.whole(i) for i in range(1, len(entries)) if entries[i]))
         if len(found) != needed:
             raise row.place.refuse(f"element {number} of type {name} has {len(found)} nodes, {needed} are needed")
         if number in part.cells:
             raise row.place.refuse(f"element {number} is defined twice, first in line {part.cells[number].place.line}")
-        part.cells[number] = Cell(name, tuple(found), row.place, own)
-        members.append(Members(row.place, number, number))
+        part.cells[number] = Cell(name, found, block.place, row.place.line, own)
+        members.append(number)
     if own:
-        part.add("element", own, members)
+        part.add("element", own, [Members(block.place, members)])
 
 
-def _joined(block: Block, needed: int) -> list[tuple[Row, tuple[str, ...]]]:
-    """Return the entries of each element, which may go on over lines that end with a comma."""
-    found: list[tuple[Row, tuple[str, ...]]] = []
-    goes_on = False
-    for row in block.rows:
-        if goes_on:
-            found[-1] = (found[-1][0], found[-1][1] + row.entries)
+def _joined(block: Block, needed: int) -> Iterator[tuple[Row, tuple[str, ...]]]:
+    """Yield the entries of each element, which may go on over lines that end with a comma."""
+    first: Row | None = None
+    entries: tuple[str, ...] = ()
+    for row in block.each():
+        if first is None:
+            first, entries = row, row.entries
         else:
-            found.append((row, row.entries))
-        short = len(found[-1][1]) < needed + 1
-        goes_on = short and (row.goes_on or (needed >= LONG and len(row.entries) >= 8))
-    return found
+            entries += row.entries
+        short = len(entries) < needed + 1
+        if not (short and (row.goes_on or (needed >= LONG and len(row.entries) >= 8))):
+            yield first, entries
+            first = None
+    if first is not None:
+        yield first, entries
 
 
 def node_set(content: Content, part: Part, block: Block) -> None:
@@ -85,18 +93,18 @@ def _members(block: Block) -> list[Members]:
     """Return the entries of a set."""
     instance = folded(block.get("INSTANCE"))
     found = []
-    for row in block.rows:
+    for row in block.each():
         if "GENERATE" in block.parameters:
             first, last, increment = row.whole(0), row.whole(1), row.whole(2, 1)
             if increment < 1 or last < first:
                 raise row.place.refuse(f"the range {first} to {last} by {increment} is empty: it must ascend")
-            found.append(Members(row.place, first, last, increment, "", instance, True))
+            found.append(Members(row.place, range(first, last + 1, increment), instance=instance))
             continue
-        for entry in row.entries:
-            if entry.isdigit() and len(entry) < 19:
-                found.append(Members(row.place, int(entry), int(entry), instance=instance))
-            elif entry:
-                found.append(Members(row.place, name=entry, instance=instance))
+        for numbers, group in groupby(row.entries, lambda entry: entry.isdecimal() and len(entry) < 19):
+            if numbers:
+                found.append(Members(row.place, array("q", map(int, group)), instance=instance))
+            else:
+                found += [Members(row.place, name=entry, instance=instance) for entry in group if entry]
     return found
 
 
@@ -106,7 +114,7 @@ def surface(content: Content, part: Part, block: Block) -> None:
     if folded(name) in part.surfaces:
         raise block.place.refuse(f"surface '{name}' is defined twice")
     made = SurfaceDefinition(name, block.place, kind == "NODE")
-    for row in block.rows:
+    for row in block.each():
         label = row.text(1).upper()
         if not made.of_nodes and label and not (label[0] == "S" and label[1:].isdigit()):
             raise row.place.refuse(f"face '{row.text(1)[:40]}' is not supported: faces of solids are S1, S2, ...")

@@ -22,7 +22,6 @@ def add_initial_stresses(model: Model, found: DeckMesh) -> None:
     for name, cells in model.mesh.solids.items():
         starts[name], total = total, total + len(cells)
     values = np.zeros((total, len(names)))
-    turned = _turned(found)
     for block in content.stresses:
         for row in block.rows:
             if len(row.entries) != 1 + len(names):
@@ -31,26 +30,14 @@ def add_initial_stresses(model: Model, found: DeckMesh) -> None:
                     f"{', '.join(names)} of its stress; stresses by integration point are not supported"
                 )
             numbers = [row.number(index) for index in range(1, 1 + len(names))]
-            for key in found.made.keys("element", row.text(0), row.place):
-                if key not in found.solid_rows:
-                    raise row.place.refuse(f"element {key[1]} is no solid, so it has no initial stress")
-                if key in turned:
+            for element in found.made.elements_of(row.text(0), row.place):
+                if element.type is None:
+                    raise row.place.refuse(f"element {element.number} is no solid, so it has no initial stress")
+                if element.section is not None and element.section.orientation:
                     raise row.place.refuse(
-                        f"element {key[1]} has an *ORIENTATION: initial stresses along such axes are not supported"
+                        f"element {element.number} has an *ORIENTATION: initial stresses along such axes are not supported"
                     )
-                element, number = found.solid_rows[key]
-                values[starts[element] + number] = numbers
+                values[starts[element.type.element] + element.row] = numbers
     given: dict[str, Any] = {name: values[:, [k]] for k, name in enumerate(names) if values[:, k].any()}
     if given:
         model.add_initial_stress(**given)
-
-
-def _turned(found: DeckMesh) -> set[tuple[str, int]]:
-    """Return the elements whose section has an orientation."""
-    made, keys = found.made, set()
-    for scope in made.scopes:
-        for section in made.part(scope).sections:
-            if section.orientation:
-                name = f"{scope}.{section.elements}" if scope else section.elements
-                keys.update(made.keys("element", name, section.place))
-    return keys

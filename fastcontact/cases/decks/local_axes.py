@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import Assembled
 from fastcontact.cases.decks.blocks import Place, folded
 from fastcontact.cases.decks.content import Axes, Content
 
-Array = NDArray[np.float64]
 ROUND_OFF = 1e-9
 
 
 def local_directions(made: Assembled) -> dict[int, Array]:
     """Return the local axes (3, 3), in rows, of the points of all nodes with *TRANSFORM [-]."""
     return {
-        point: local_axes(axes, np.array(made.points[point]))
+        point: local_axes(axes, made.points[point])
         for axes in made.content.axes
         for point in made.nodes(axes.nodes, axes.place)
     }

@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fastcontact.cases.decks.assembled import Assembled, Key, facet_points
-from fastcontact.cases.decks.blocks import folded
+from fastcontact.cases.decks.assembled import Assembled, Element, Face, facet_points
+from fastcontact.cases.decks.blocks import Place, folded
+from fastcontact.cases.decks.content import SurfaceDefinition
 from fastcontact.errors import CaseError
 from fastcontact.mesh import topology
 from fastcontact.mesh.mesh import Mesh
@@ -31,8 +32,11 @@ class DeckMesh:
         By reference point the point whose displacement is its rotation [radian]; in the plane the first component.
     facets : dict of str to list of tuple of int
         Facets by element, each once.
-    groups, point_groups : dict of str to list
-        Groups of cells, as pairs (element, row), and of points.
+    groups : dict of str to dict of str to list of int
+        Groups of cells, as rows by element.
+    point_groups : dict of str to list of int
+    loose : dict of str to list of int
+        By group of facets around nodes that make up no whole faces, the points that are none of these.
     """
 
     made: Assembled
@@ -41,27 +45,32 @@ class DeckMesh:
     rotations: dict[int, int] = field(default_factory=dict)
     facets: dict[str, list[tuple[int, ...]]] = field(default_factory=dict)
     rows: dict[frozenset[int], tuple[str, int]] = field(default_factory=dict)
-    solid_rows: dict[Key, tuple[str, int]] = field(default_factory=dict)
-    groups: dict[str, list[tuple[str, int]]] = field(default_factory=dict)
+    groups: dict[str, dict[str, list[int]]] = field(default_factory=dict)
     point_groups: dict[str, list[int]] = field(default_factory=dict)
+    loose: dict[str, list[int]] = field(default_factory=dict)
 
-    def add_facets(self, group: str, faces: Iterable[tuple[Key, int]]) -> str:
+    def add_facets(self, group: str, faces: Iterable[Face]) -> str:
         """Make a group of facets, given by element and place among its facets; return its name."""
-        members = []
-        for key, facet in faces:
-            points = facet_points(self.made.solids[key], facet)
+        members: dict[str, list[int]] = {}
+        for face in faces:
+            points = facet_points(*face)
             if frozenset(points) not in self.rows:
                 name = FACETS[self.dim][len(points)]
                 block = self.facets.setdefault(name, [])
                 self.rows[frozenset(points)] = (name, len(block))
                 block.append(points)
-            members.append(self.rows[frozenset(points)])
+            name, row = self.rows[frozenset(points)]
+            members.setdefault(name, []).append(row)
         self.groups[group] = members
         return group
 
-    def add_solids(self, group: str, keys: Iterable[Key]) -> str:
+    def add_solids(self, group: str, chosen: Iterable[Element]) -> str:
         """Make a group of solids; return its name."""
-        self.groups[group] = [self.solid_rows[key] for key in keys if key in self.solid_rows]
+        members: dict[str, list[int]] = {}
+        for element in chosen:
+            if element.type is not None:
+                members.setdefault(element.type.element, []).append(element.row)
+        self.groups[group] = members
         return group
 
     def add_points(self, group: str, points: Iterable[int]) -> str:
@@ -77,24 +86,24 @@ class DeckMesh:
         """Return the point that carries the rotation of a reference point, which is made where there is none."""
         if point not in self.rotations:
             self.rotations[point] = len(self.made.points)
-            self.made.points.append(self.made.points[point])
+            self.made.points = np.concatenate([self.made.points, self.made.points[[point]]])
         return self.rotations[point]
 
     def mesh(self) -> Mesh:
         """Return the mesh, with solids turned the right way."""
-        solids: dict[str, list[tuple[int, ...]]] = {}
-        for solid in self.made.solids.values():
-            solids.setdefault(solid.type.element, []).append(solid.points)
-        cells = {**solids, **self.facets}
+        solids = {name: [element.points for element in own] for name, own in self.made.by_kind.items()}
+        cells = {name: np.array(block, np.int32) for name, block in {**solids, **self.facets}.items()}
+        del solids
         starts, total = {}, 0
         for name, block in cells.items():
             starts[name], total = total, total + len(block)
         groups = {
-            group: np.array([starts[name] + row for name, row in members]) for group, members in self.groups.items()
+            group: np.concatenate([[], *(starts[name] + np.array(rows) for name, rows in members.items())]).astype(int)
+            for group, members in self.groups.items()
         }
-        points = np.array(self.made.points)[:, : self.dim]
+        points = self.made.points[:, : self.dim]
         points_of = {name: np.array(members) for name, members in self.point_groups.items()}
-        mesh = Mesh(points, {name: np.array(block) for name, block in cells.items()}, groups, points_of)
+        mesh = Mesh(points, cells, groups, points_of)
         mesh, turned = topology.oriented(mesh)
         if turned:
             self.made.content.notes.append(f"{turned} elements were inside out and are turned")
@@ -108,23 +117,18 @@ def begun(made: Assembled) -> DeckMesh:
     """
     if not made.solids:
         raise CaseError("the deck has no solid elements")
-    first = next(iter(made.solids.values()))
-    for solid in made.solids.values():
-        if solid.type.kinematics != first.type.kinematics:
-            raise solid.cell.place.refuse(
-                f"elements of type {solid.type.name} and {first.type.name} ({first.type.kinematics}) cannot be in one model"
+    first = made.solids[0].solid
+    for element in made.solids:
+        if element.solid.kinematics != first.kinematics:
+            raise element.cell.place.refuse(
+                f"elements of type {element.solid.name} and {first.name} ({first.kinematics}) cannot be in one model"
             )
-    kinematics = first.type.kinematics
-    dim = 3 if kinematics == "3d" else 2
-    points = np.array(made.points)
+    dim, points = 3 if first.kinematics == "3d" else 2, made.points
     if dim == 2 and np.ptp(points[:, 2]) > FLAT * np.ptp(points[:, :2]):
-        raise first.cell.place.refuse(f"elements of type {first.type.name} lie in the plane z = const, but z differs")
-    found = DeckMesh(made, kinematics, dim)
-    counts: dict[str, int] = {}
-    for key, solid in made.solids.items():
-        name = solid.type.element
-        found.solid_rows[key] = (name, counts.setdefault(name, 0))
-        counts[name] += 1
+        raise made.solids[0].cell.place.refuse(
+            f"elements of type {first.name} lie in the plane z = const, but z differs"
+        )
+    found = DeckMesh(made, first.kinematics, dim)
     _name_sets(found)
     return found
 
@@ -136,15 +140,46 @@ def _name_sets(found: DeckMesh) -> None:
         part = made.part(scope)
         prefix = f"{made.content.instances[scope].name}." if scope else ""
         for name, members in part.node_sets.items():
-            points = [made.index[key] for key in made.members("node", scope, name, members[0].place)] if members else []
+            points = made.members_of("node", scope, name, members[0].place) if members else []
             found.point_groups[prefix + part.set_names[name]] = sorted(set(points))
         for name, definition in part.surfaces.items():
-            if definition.faces:  # one that nothing uses may be empty
+            if definition.of_nodes and definition.faces:
+                _name_nodes(found, prefix + definition.name, definition, scope)
+            elif definition.faces:  # one that nothing uses may be empty
                 faces = made.faces(f"{scope}.{name}" if scope else name, definition.place)
                 found.add_facets(prefix + definition.name, faces)
         for name, members in part.element_sets.items():
             if name not in part.surfaces and members:
-                found.add_solids(prefix + part.set_names[name], made.members("element", scope, name, members[0].place))
+                found.add_solids(
+                    prefix + part.set_names[name], made.members_of("element", scope, name, members[0].place)
+                )
+
+
+def _name_nodes(found: DeckMesh, group: str, definition: SurfaceDefinition, scope: str) -> None:
+    """Name the facets around the nodes of a surface; where they make up no whole ones, its further points are `loose`."""
+    whole, further, left = found.made.faces_of_nodes(definition, scope)
+    if not (whole or further):  # nodes of no solid
+        return
+    found.add_facets(group, [*whole, *further])
+    if left:
+        points = {point for face in (*whole, *further) for point in facet_points(*face)}
+        found.loose[group] = sorted(points.difference(found.made.surface_nodes(definition, scope)))
+
+
+def secondary_group(found: DeckMesh, name: str, place: Place) -> str:
+    """Return the group of a surface as the secondary side of a pair, which may be one of nodes; CaseError for lone nodes."""
+    definition, scope = found.made.surface(name, place)
+    if not definition.of_nodes:
+        return group_of_surface(found, name)
+    whole, further, _ = found.made.faces_of_nodes(definition, scope)
+    carried = {point for face in (*whole, *further) for point in facet_points(*face)}
+    for point in found.made.surface_nodes(definition, scope):
+        if point not in carried:
+            raise definition.place.refuse(
+                f"node {found.made.number_of(point)} of surface '{definition.name}' is on no outer face of a solid: contact "
+                "needs nodes of bodies, so leave it out"
+            )
+    return group_of_surface(found, name)
 
 
 def group_of_surface(found: DeckMesh, name: str) -> str:

@@ -98,7 +98,9 @@ def strain_of(content: Content, laws: list[Any]) -> tuple[str, str]:
         "a nearly incompressible elastic material": any(law.averaged for law in laws),
         "temperatures": any(given.block.keyword == "TEMPERATURE" for step in content.steps for given in step.given),
         "initial stresses": bool(content.stresses),
-        "couplings, rigid bodies and multi-point constraints": bool(content.links or content.pins),
+        "couplings, rigid bodies and multi-point constraints": bool(
+            content.links or content.pins or content.multi_points
+        ),
         "pretension sections": bool(content.pretensions),
         "incompatible modes": any(law.incompatible_modes for law in laws),
     }

@@ -31,7 +31,7 @@ def pretension_section(content: Content, block: Block) -> None:
 
 def section_points(made: Assembled) -> dict[int, PretensionSection]:
     """Return the sections by the points of their nodes; CaseError where such a point belongs to a body or to another one."""
-    used = {point for solid in made.solids.values() for point in solid.points}
+    used = {point for solid in made.solids for point in solid.points}
     found: dict[int, PretensionSection] = {}
     for section in made.content.pretensions:
         point = made.node(section.node, section.place)
@@ -76,7 +76,7 @@ def cut_sections(found: DeckMesh, mesh: Mesh) -> Mesh:
     """Return the mesh cut along all pretension sections."""
     sections: set[str] = set()
     for section in found.made.content.pretensions:
-        found.made.surface(section.surface, section.place)
+        found.made.faces(section.surface, section.place)
         group = group_of_surface(found, section.surface)
         if group in sections:
             raise section.place.refuse(f"surface '{group}' has a pretension section already")
@@ -112,8 +112,7 @@ def _side(found: DeckMesh, section: PretensionSection) -> float:
     """
     if section.normal is None:
         return 1.0
-    made, outward = found.made, np.zeros(3)
-    for key, facet in made.faces(section.surface, section.place):
-        solid, points = made.solids[key], np.array(made.points)
+    points, outward = found.made.points, np.zeros(3)
+    for solid, facet in found.made.faces(section.surface, section.place):
         outward += points[list(facet_points(solid, facet))].mean(axis=0) - points[list(solid.points)].mean(axis=0)
     return float(np.copysign(1.0, outward @ np.array(section.normal)))

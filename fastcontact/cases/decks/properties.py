@@ -6,8 +6,8 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.cases.decks.blocks import Block, Row, folded
 from fastcontact.cases.decks.content import Amplitude, Axes, Content, Interaction, Material, Part, Section
 from fastcontact.contact.overclosure import OverclosureLaw
@@ -74,7 +74,7 @@ def _with_axes(current: Material, block: Block, kind: str) -> None:
     current.law = law
 
 
-def _moduli(values: list[float]) -> NDArray[np.float64]:
+def _moduli(values: list[float]) -> Array:
     """Return moduli (6, 6) [pressure] from those of a deck, its upper triangle by columns 11, 22, 33, 12, 13, 23."""
     D = np.zeros((6, 6))
     places = [(i, j) for j in range(6) for i in range(j + 1)]
@@ -130,6 +130,17 @@ def interaction(content: Content, block: Block) -> Interaction:
         block.rows[0].number(0, 1.0)
         content.note(block.rows[0].place, "the thickness of the interaction has no effect: that of the sections counts")
     return content.interactions[folded(name)]
+
+
+def changed_interaction(content: Content, block: Block) -> Interaction:
+    """*CHANGE FRICTION: begins what holds from the current step on, by the *FRICTION below it."""
+    name = block.required("INTERACTION")
+    if folded(name) not in content.interactions:
+        known = ", ".join(own.name for own in content.interactions.values()) or "none"
+        raise block.place.refuse(f"surface interaction '{name}' is not defined; interactions: {known}")
+    changed = Interaction(name, block.place, friction=-1.0)  # which it has to say
+    content.interactions[folded(name)].changes.append((len(content.steps) - 1, changed))
+    return changed
 
 
 def behaviour(content: Content, current: Interaction, block: Block) -> None:

@@ -148,6 +148,11 @@ class Reader:
         self._not_in_step(block)
         self.interaction = properties.interaction(self.content, block)
 
+    def _change_friction(self, block: Block) -> None:
+        if self.step is None:
+            raise block.place.refuse("belongs into a step")
+        self.interaction = properties.changed_interaction(self.content, block)
+
     def _coupling(self, block: Block) -> None:
         self._not_in_step(block)
         self.coupling = block

@@ -5,19 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import facet_points
 from fastcontact.cases.decks.content import Equation, Link, Pin
 from fastcontact.cases.decks.local_axes import local_axes, local_directions, orientation_of
 from fastcontact.cases.decks.meshing import DeckMesh
+from fastcontact.cases.decks.multi_points import multi_point_rows
 from fastcontact.elasticity.loads import Traction
 from fastcontact.elasticity.relations import Relation
 from fastcontact.errors import ModelError
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.couplings import ReferencePoint, Term, distributing_rows, relation, rigid_rows
-
-Array = NDArray[np.float64]
 
 
 def make_rotations(found: DeckMesh) -> None:
@@ -38,6 +37,7 @@ def relations_of(found: DeckMesh, mesh: Mesh) -> list[Relation]:
     axes = local_directions(found.made)
     rows = [_equation(found, equation, axes) for equation in content.equations]
     rows += [row for pin in content.pins for row in _pinned(found, pin)]
+    rows += [row for own in content.multi_points for row in multi_point_rows(found, own)]
     made = [relation("the equations of the deck", rows, mesh.points.shape)] if rows else []
     for link in content.links:
         rows = _distributing(found, mesh, link) if link.distributing else _rigid(found, link)
@@ -78,11 +78,14 @@ def _points(found: DeckMesh, link: Link) -> list[int]:
     if link.kind == "nodes":
         points = made.nodes(link.group, link.place)
     elif link.kind == "elements":
-        keys = made.keys("element", link.group, link.place)
-        points = [p for key in keys if key in made.solids for p in made.solids[key].points]
+        own = made.elements_of(link.group, link.place)
+        points = [p for element in own if element.type is not None for p in element.points]
     else:
-        faces = made.faces(link.group, link.place)
-        points = [p for key, facet in faces for p in facet_points(made.solids[key], facet)]
+        definition, scope = made.surface(link.group, link.place)
+        if definition.of_nodes:
+            points = made.surface_nodes(definition, scope)
+        else:
+            points = [p for face in made.faces(link.group, link.place) for p in facet_points(*face)]
     reference = made.node(link.reference, link.place)
     kept = sorted(set(points) - {reference, found.rotations[reference]})
     if not kept:
@@ -92,13 +95,13 @@ def _points(found: DeckMesh, link: Link) -> list[int]:
 
 def _reference(found: DeckMesh, link: Link) -> ReferencePoint:
     point = found.made.node(link.reference, link.place)
-    return ReferencePoint(point, found.rotations[point], tuple(found.made.points[point][: found.dim]))
+    return ReferencePoint(point, found.rotations[point], tuple(found.made.points[point][: found.dim].tolist()))
 
 
 def _rigid(found: DeckMesh, link: Link) -> list[list[Term]]:
     """Return the equations by which nodes follow the motion of a reference point with its rotation."""
     points, dim = np.array(_points(found, link), np.intp), found.dim
-    rows = rigid_rows(_reference(found, link), points, np.array(found.made.points)[points, :dim], range(dim))
+    rows = rigid_rows(_reference(found, link), points, found.made.points[points, :dim], range(dim))
     along = [_directions(found, link, point) for point in points.tolist()]
     return [row for i, axes in enumerate(along) for row in _along(rows[i * dim : (i + 1) * dim], axes)]
 
@@ -107,9 +110,7 @@ def _directions(found: DeckMesh, link: Link, point: int) -> Array:
     """Return the directions (n, dim) of the components that a coupling relates at a point [-]."""
     axes = np.eye(3)
     if link.orientation:
-        axes = local_axes(
-            orientation_of(found.made.content, link.orientation, link.place), np.array(found.made.points[point])
-        )
+        axes = local_axes(orientation_of(found.made.content, link.orientation, link.place), found.made.points[point])
     return axes[[component - 1 for component in link.components if component <= found.dim], : found.dim]
 
 
@@ -133,7 +134,7 @@ def _distributing(found: DeckMesh, mesh: Mesh, link: Link) -> list[list[Term]]:
     points = np.array(_points(found, link), np.intp)
     weight = areas[points] / areas[points].sum()
     try:
-        rows = distributing_rows(_reference(found, link), points, np.array(made.points)[points, : found.dim], weight)
+        rows = distributing_rows(_reference(found, link), points, made.points[points, : found.dim], weight)
     except ModelError as error:
         raise link.place.refuse(str(error)) from error
     turns = len(rows) - found.dim

@@ -5,20 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.cases.decks.assembled import Assembled
 from fastcontact.cases.decks.blocks import Block, Row
 from fastcontact.cases.decks.content import Content, Given, Material
-from fastcontact.cases.decks.histories import Histories
+from fastcontact.cases.decks.histories import Histories, shape_of
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
 
-Array = NDArray[np.float64]
 # Coefficients of expansion by type.
 EXPANSIONS = {"ISO": 1, "ORTHO": 3}
-# Digits to which histories of two nodes must agree, up to a factor, to count as one.
-ALIKE = 12
 
 
 def expansion(content: Content, current: Material, block: Block) -> None:
@@ -81,17 +77,15 @@ def _of_row(made: Assembled, block: Block, row: Row) -> list[tuple[int, float]]:
 
 def add_temperatures(model: Model, histories: Histories[int]) -> None:
     """Add the rises over the initial temperatures to a model, as few fields as the histories allow."""
-    rises: dict[int, Table] = {}
-    for point in histories.tracks:
-        rest = histories.rest.get(point, 0.0)
-        rises[point] = tuple((time, value - rest) for time, value in histories.table(point))
+    rises = [
+        (tuple((time, value - table[0][1]) for time, value in table), points) for table, points in histories.alike()
+    ]
     by_shape: dict[Table, list[tuple[int, float]]] = {}
-    for point, table in rises.items():
-        size = max((value for _, value in table), key=abs)
+    for table, points in rises:
+        size, shape = shape_of(table)
         if size:
-            shape = tuple((time, round(value / size, ALIKE)) for time, value in table)
-            by_shape.setdefault(shape, []).append((point, size))
-    times = sorted({time for table in rises.values() for time, _ in table})
+            by_shape.setdefault(shape, []).extend((point, size) for point in points)
+    times = sorted({time for table, _ in rises for time, _ in table})
     if len(by_shape) <= len(times):
         for shape, members in by_shape.items():
             _add(model, members, shape)
@@ -99,8 +93,7 @@ def add_temperatures(model: Model, histories: Histories[int]) -> None:
     for place, time in enumerate(times):  # histories that differ from node to node: one field for each corner of them
         around = sorted({times[0], *times[max(place - 1, 0) : place + 2], times[-1]})
         hat = tuple((other, float(other == time)) for other in around)
-        values = {point: _at(table, time) for point, table in rises.items()}
-        _add(model, [(point, value) for point, value in values.items() if value], hat)
+        _add(model, [(point, value) for table, points in rises if (value := _at(table, time)) for point in points], hat)
 
 
 def _at(table: Table, time: float) -> float:

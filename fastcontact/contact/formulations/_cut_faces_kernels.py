@@ -1,14 +1,13 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Facets that face each other in 3D: one polygon is clipped by the other in the plane of the first, and integrated there.
+"""Polygon clipping of facets in 3D, in the plane of the secondary facet, and integration over the clipped polygon.
 
 A facet is a polynomial with coefficients ``terms`` (n_terms, 3) of the terms in `contact.search.facet_tables`. Its corners
 make the polygon that is cut, in the ``axes`` (3, 3) of its plane: two tangents and the unit normal.
 """
 
 import numpy as np
-from numba import prange
 
-from fastcontact._jit.decorators import inlined_kernel, innermost_kernel, kernel, parallel_kernel
+from fastcontact._jit.decorators import inlined_kernel, innermost_kernel, kernel
 from fastcontact.contact.search.box_tree_kernels import DEPTH
 
 # A polygon of up to 4 corners clipped by one of up to 4 has at most 8.
@@ -17,8 +16,6 @@ MOST = 12
 SLIVER = 1e-12
 # Newton's method on a facet; its error is the square of the last step.
 MAX_ITERATIONS, STEP = 30, 1e-8
-# Secondary facets that one thread takes at a time.
-CHUNK = 32
 
 
 @kernel
@@ -319,23 +316,29 @@ def _symmetrise(mass):
 
 
 @kernel
-def first_pairs(pairs, n_facets):
-    """Return where the pairs of each secondary facet begin (n_facets + 1,), pairs ascending in that facet."""
-    start = np.zeros(n_facets + 1, np.intp)
-    for i in range(pairs.shape[0]):
-        start[pairs[i, 0] + 1] += 1
-    for s in range(n_facets):
-        start[s + 1] += start[s]
-    return start
-
-
-@kernel
-def _integrate(
+def integrate(
     low, high, start, secondary, n_secondary, origin, axes, deformed, reference, to_terms, middle,
     primary, n_primary, other_deformed, other_to_terms, other_middle, pairs, points, weights, heights, other_heights,
     factor, mass, coupling, closer,
 ):  # fmt: skip
-    """Integrate over the parts of the secondary facets [low, high), whose pairs begin at `start`; see `integrate`."""
+    """Integrate products of shape functions over the parts where the secondary facets `low` to ``high - 1`` face others.
+
+    Both facets are followed along the normal of the secondary polygon; areas are those of the reference surface. Parts
+    are cut into triangles around their centres: the rule is not exact on mapped facets, and its error then depends on no
+    first corner and does not jump where a corner comes or goes as the facets move. Between flat triangles it is exact.
+
+    Planes and polygons are those of `facing_pairs`, `pairs` (n_pairs, 2) its result, ascending in the secondary facet;
+    those of facet s begin at ``start[s]``.
+    `deformed` and `reference` (n_facets, n_terms, 3) are the terms of the secondary facets where they are and where they
+    were, `to_terms` (n_terms, n_nodes) leads to them from nodal values, `middle` (2,) are the reference coordinates to start
+    from; the same with `other` for the primary facets. `points` (n_q, 2) and `weights` (n_q,) are a rule on the triangle.
+    `heights` (n_facets, k, k) of both sides' smooth surfaces, k = 0 for none, count by the `factor` (n_pairs, 2) of the pair.
+    Filled in place: `mass` (n_facets, n_nodes, n_nodes) of the secondary shape functions over the part that faces the primary
+    side, `coupling` (n_pairs, n_nodes, n_other_nodes), secondary times primary shape functions, and `closer` (n_facets,
+    n_nodes), the former times the sum of both heights.
+
+    Returns -1, or the number of a pair with a facet too distorted to be followed.
+    """
     subject, window, spare = np.empty((MOST, 2)), np.empty((MOST, 2)), np.empty((MOST, 2))
     n, m = to_terms.shape[0], other_to_terms.shape[0]
     terms, other_terms, shape, other_shape = np.empty((n, 3)), np.empty((m, 3)), np.empty(n), np.empty(m)
@@ -347,7 +350,8 @@ def _integrate(
         _flatten(deformed[s], origin[s], axes[s], flat)
         _flatten(other_deformed[p], origin[s], axes[s], other_flat)
         count = _common(secondary[s], n_secondary, primary[p], n_primary, origin[s], axes[s], subject, window, spare)
-        xi[:], other_xi[:] = middle, other_middle
+        for d in range(2):
+            xi[d], other_xi[d] = middle[d], other_middle[d]
         ox, oy = (subject[0, 0], subject[0, 1]) if exact else _centroid(subject, count)
         for k in range(1 if exact else 0, count - 1 if exact else count):
             following = (k + 1) % count
@@ -372,43 +376,4 @@ def _integrate(
                     for a in range(n):
                         closer[s, a] += area * above * shape[a]
     _symmetrise(mass[low:high])
-    return -1
-
-
-@parallel_kernel
-def integrate(
-    secondary, n_secondary, origin, axes, deformed, reference, to_terms, middle,
-    primary, n_primary, other_deformed, other_to_terms, other_middle, pairs, points, weights, heights, other_heights,
-    factor, mass, coupling, closer,
-):  # fmt: skip
-    """Integrate products of shape functions over the parts where facets face each other.
-
-    Both facets are followed along the normal of the secondary polygon; areas are those of the reference surface. Parts
-    are cut into triangles around their centres: the rule is not exact on mapped facets, and its error then depends on no
-    first corner and does not jump where a corner comes or goes as the facets move. Between flat triangles it is exact.
-
-    Planes and polygons are those of `facing_pairs`, `pairs` (n_pairs, 2) its result, ascending in the secondary facet.
-    `deformed` and `reference` (n_facets, n_terms, 3) are the terms of the secondary facets where they are and where they
-    were, `to_terms` (n_terms, n_nodes) leads to them from nodal values, `middle` (2,) are the reference coordinates to start
-    from; the same with `other` for the primary facets. `points` (n_q, 2) and `weights` (n_q,) are a rule on the triangle.
-    `heights` (n_facets, k, k) of both sides' smooth surfaces, k = 0 for none, count by the `factor` (n_pairs, 2) of the pair.
-    Filled in place: `mass` (n_facets, n_nodes, n_nodes) of the secondary shape functions over the part that faces the primary
-    side, `coupling` (n_pairs, n_nodes, n_other_nodes), secondary times primary shape functions, and `closer` (n_facets,
-    n_nodes), the former times the sum of both heights. Each facet is one thread's.
-
-    Returns -1, or the number of a pair with a facet too distorted to be followed.
-    """
-    n_facets = secondary.shape[0]
-    start, parts = first_pairs(pairs, n_facets), (n_facets + CHUNK - 1) // CHUNK
-    wrong = np.full(parts, -1, np.intp)
-    for part in prange(parts):
-        low, high = part * CHUNK, min(n_facets, (part + 1) * CHUNK)
-        wrong[part] = _integrate(
-            low, high, start, secondary, n_secondary, origin, axes, deformed, reference, to_terms, middle, primary,
-            n_primary, other_deformed, other_to_terms, other_middle, pairs, points, weights, heights, other_heights,
-            factor, mass, coupling, closer,
-        )  # fmt: skip
-    for part in range(parts):
-        if wrong[part] >= 0:
-            return wrong[part]
     return -1

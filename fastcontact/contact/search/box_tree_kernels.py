@@ -9,13 +9,12 @@ power of two by empty boxes, which are infinitely far from every point.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._jit.decorators import inlined_kernel, kernel
+from fastcontact.arrays import Array
 
 # Room for the boxes that a search has still to open; a squared distance that no facet exceeds.
 DEPTH, FAR = 64, 1e300
-Array = NDArray[np.float64]
 
 
 class Tree(NamedTuple):
@@ -26,7 +25,7 @@ class Tree(NamedTuple):
 
 
 @kernel
-def tree_order(points, together=1):
+def tree_order(points, together):
     """Return the permutation (n,) that sorts points (n, dim) by halving them along their longest side, and again the halves.
 
     The left half has a power of two of them, so that the facets below a box of the tree are one of these parts. Parts of
@@ -85,7 +84,9 @@ def build(low, high):
     while leaves < n:
         leaves *= 2
     tree = Tree(np.full((2 * leaves, dim), np.inf), np.full((2 * leaves, dim), -np.inf))
-    tree.low[leaves : leaves + n], tree.high[leaves : leaves + n] = low, high
+    for k in range(n):  # element by element: a slice compiles its message about shapes, too, seconds of it
+        for d in range(dim):
+            tree.low[leaves + k, d], tree.high[leaves + k, d] = low[k, d], high[k, d]
     for box in range(leaves - 1, 0, -1):
         for d in range(dim):
             tree.low[box, d] = min(tree.low[2 * box, d], tree.low[2 * box + 1, d])

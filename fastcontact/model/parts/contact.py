@@ -23,7 +23,7 @@ from fastcontact.contact.surface import Surface, surface
 from fastcontact.elasticity.loads import Value, axes_of, check_number
 from fastcontact.errors import ContactError, ModelError, unknown
 from fastcontact.mesh.argument_types import check_fields, typed
-from fastcontact.model.contact_pair import AGAINST_OBSTACLES, ContactPair, Driving, method
+from fastcontact.model.contact_pair import ContactPair, Driving, method
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
 from fastcontact.model.obstacle_rotation import rotation_of
 from fastcontact.model.pair_options import SHARED_OPTIONS, pair_options
@@ -66,6 +66,7 @@ class ModelContact(ModelConnections):
               ``"gap_only"`` watches the gaps, negative where the sides penetrate, and has no forces.
             - ``clearance``: added to the gap, a number or a function from reference positions (n, dim) on the secondary
               side to lengths (n,); positive opens the gap, negative is an interference, as of a press fit [length].
+              ``friction_ramp``: history of the coefficient of friction, as multipliers.
               ``clearance_primary``: the same on the primary side, at the positions faced. ``clearance_ramp``: their
               history, as pairs (instant, multiplier); without one they are there from the beginning.
             - ``surface_smoothing``: whether gaps are those between the smooth surfaces that straight facets of curved sides
@@ -185,7 +186,8 @@ class ModelContact(ModelConnections):
             History of motion and force, and of a rotation without one of its own.
         formulation : str, optional
             ``"node_to_segment"`` (then: node against obstacle), by default on linear triangles and, in space, on
-            facets whose nodes all carry pressure (tri3, quad4, quad9), or ``"continuous"``, by default on all others.
+            facets whose nodes all carry pressure (tri3, quad4, quad9); ``"mortar"`` with one weighted gap a node, by default
+            in space on the other, quadratic facets where there is friction; or ``"continuous"``, by default on all others.
         **options
             Fields of the formulation.
         """
@@ -199,8 +201,11 @@ class ModelContact(ModelConnections):
         history = table_of(ramp, f"the ramp of the motion of obstacle '{name}'")
         options = {option: value for option, value in options.items() if value is not None}
         if formulation is None:
-            formulation, reason = against_obstacle(self.mesh.dim, *self._facet_kinds(secondary), options)
+            kinds = self._facet_kinds(secondary)
+            formulation, options, reason = against_obstacle(self.mesh.dim, *kinds, options)
             log.info("contact '%s': %s, since %s", name, method(formulation, options), reason)
+        if formulation == "mortar":
+            options.setdefault("multipliers", "dual")
         driving = self._driving(name, moves, force)
         turned = (None, None) if rotation is None else rotation_of(name, rotation, self.kinematics)
         self._add_pair(
@@ -271,11 +276,12 @@ class ModelContact(ModelConnections):
         )
         primary: Surface | RigidSide
         if pair.obstacle is not None:
-            if pair.formulation not in AGAINST_OBSTACLES:
+            if not kind.against_obstacles:
                 raise ContactError(
-                    unknown("contact formulation for a rigid obstacle", pair.formulation, AGAINST_OBSTACLES)
+                    f"contact '{pair.name}': mortar in the plane needs multipliers='dual' at an obstacle"
                 )
             primary = RigidSide(pair.obstacle, np.array(pair.motion), pair.rotation)
+            own.setdefault("surface_smoothing", False)
         else:
             primary = surface(self.mesh, pair.primary)
             check_sides(self.mesh, pair.name, secondary, primary, options.excluded)

@@ -7,9 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
+from fastcontact.arrays import Array
 from fastcontact.elasticity.following_pressure import FollowingPressure
 from fastcontact.elasticity.inertia_loads import Centrifugal, Densities, Gravity, InertiaLoad
 from fastcontact.elasticity.loads import (
@@ -32,8 +30,6 @@ from fastcontact.model.parts.base import group_names
 from fastcontact.model.parts.materials import ModelMaterials
 from fastcontact.model.ramp import History, Table, table_of
 from fastcontact.model.spread_forces import SpreadForce, spread_of
-
-Array = NDArray[np.float64]
 
 
 class ModelLoads(ModelMaterials):
@@ -158,9 +154,9 @@ class ModelLoads(ModelMaterials):
         self,
         group: str,
         *,
-        x: float | None = None,
-        y: float | None = None,
-        z: float | None = None,
+        x: Value | None = None,
+        y: Value | None = None,
+        z: Value | None = None,
         distribute: bool | None = None,
         at: Sequence[float] | None = None,
         weighting: str = "uniform",
@@ -172,8 +168,9 @@ class ModelLoads(ModelMaterials):
         Parameters
         ----------
         group : str
-        x, y, z : float
-            Components. In axisymmetry forces are those over the full circle; on facets a radial one is refused.
+        x, y, z : float or callable
+            Components: numbers, or for nodes functions of position, as in `prescribe`. In axisymmetry forces are those over
+            the full circle; on facets a radial one is refused.
         distribute : bool, optional
             True: the total force, spread as a uniform traction over the facets of the group. False: the force on every
             node of the group. By default True for a group of facets and False for a group of points.

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import io
+import os
 from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.errors import FastcontactError, unknown
 from fastcontact.results.step import ContactResult, StepResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 Units = Mapping[str, str]
 UNITS: Units = {"length": "mm", "force": "N", "pressure": "MPa"}
 UNKNOWN: Units = {}
@@ -80,13 +80,23 @@ def new_axes(ax: Axes | None, size: tuple[float, float], projection: str | None 
     return new_panels(1, 1, size, subplot_kw={"projection": projection})[0, 0] if ax is None else drawable(ax)
 
 
+def without_matplotlib(error: Exception) -> FastcontactError:
+    """Return what to say where matplotlib cannot be imported: it is missing, or does not know the backend."""
+    if isinstance(error, ImportError):
+        return FastcontactError("pictures need matplotlib: pip install 'fastcontact[plot]'")
+    backend = os.environ.get("MPLBACKEND")
+    return FastcontactError(
+        f"matplotlib does not know the backend '{backend}' of the environment variable MPLBACKEND: unset it, or set it to Agg"
+    )
+
+
 def new_panels(rows: int, columns: int, size: tuple[float, float], dpi: int = 150, **options: Any) -> Any:
     """Return the axes (rows, columns) of a new figure of a `size` [inches]; `options` are those of ``Figure.subplots``."""
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
-    except ImportError as error:
-        raise FastcontactError("pictures need matplotlib: pip install 'fastcontact[plot]'") from error
+    except (ImportError, ValueError) as error:
+        raise without_matplotlib(error) from error
     figure = Figure(figsize=size, layout="constrained", dpi=dpi)
     FigureCanvasAgg(figure)
     panels = figure.subplots(rows, columns, squeeze=False, **options)

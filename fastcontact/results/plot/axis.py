@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.arrays import AnyArray, Array
 from fastcontact.elasticity.recovery import von_mises
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.argument_types import typed
@@ -19,10 +20,11 @@ from fastcontact.results.units import labelled
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 # How deep the picture goes, in contact radii.
 DEEP = 4.0
 COMPONENTS = {"along the axis": 1, "across the axis": 0}
+# Of these, and of von Mises.
+COLOURS = ("C0", "C1", "C2")
 
 
 @typed(FastcontactError)
@@ -63,17 +65,19 @@ def axis_stress(
     axes = new_axes(ax, (6.4, 4.8))
     reach = DEEP * np.nan_to_num(contacts_of([step], pair)[0].radius[0]) or float(depth.max())
     shown = depth <= reach
-    for number, (name, marker) in enumerate(zip(bodies, ("^", "v"), strict=True)):
+    values = {what: stress[:, component] for what, component in COMPONENTS.items()} | {"von Mises": von_mises(stress)}
+    for number, name in enumerate(bodies):
         here = shown & (side == 1 - 2 * number)
-        for colour, (what, component) in zip(("C0", "C1"), COMPONENTS.items(), strict=True):
-            axes.plot(depth[here], stress[here, component], marker, color=colour, ms=4, label=f"{what}, {name}")
-        axes.plot(depth[here], von_mises(stress[here]), marker, color="C2", ms=4, label=f"von Mises, {name}")
+        for (what, value), colour, marker in zip(values.items(), COLOURS, "osD", strict=True):
+            if here.any():  # the second body is hollow, so that it hides nothing of the first
+                face, label = ("none" if number else colour), f"{what}, {name}"
+                axes.plot(depth[here], value[here], marker, color=colour, mfc=face, ms=3.5 * (1 + number), label=label)
     fine = np.linspace(0.0, reach, 400)
     for style, (label, theory) in zip(("-", "--", ":"), (theories or {}).items(), strict=False):
         exact = theory.stress_on_axis(fine)
-        for colour, component in zip(("C0", "C1"), COMPONENTS.values(), strict=True):
-            axes.plot(fine, exact[:, component], style, color=colour, lw=1.0)
-        axes.plot(fine, von_mises(exact), style, color="C2", lw=1.0)
+        curves = [*(exact[:, component] for component in COMPONENTS.values()), von_mises(exact)]
+        for colour, curve in zip(COLOURS, curves, strict=True):
+            axes.plot(fine, curve, style, color=colour, lw=1.0)
         axes.plot([], [], f"k{style}", lw=1.0, label=label)
     title = title or f"Stresses on the axis, load factor {step.load_factor:g}"
     depth_name, stress_name = (
@@ -135,7 +139,7 @@ def _turned(stress: Array, direction: Array) -> Array:
     return np.column_stack([xx, yy, stress[:, 2], xy])
 
 
-def _sides(mesh: Mesh, nodes: NDArray[Any], pole: Array, direction: Array) -> Array:
+def _sides(mesh: Mesh, nodes: AnyArray, pole: Array, direction: Array) -> Array:
     total = np.zeros(mesh.n_points)
     for block in mesh.solids.values():
         np.add.at(total, block, ((mesh.points[block].mean(axis=1) - pole) @ direction)[:, None])

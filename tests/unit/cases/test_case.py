@@ -98,6 +98,21 @@ def test_a_good_case_is_read_whole(write):
         ("C1.stress.yy", "C2.stress.yy", r"probe in check\[0\].quantity 'C2'"),
         ("C1.stress.yy", "C1.stress.tt", r"quantity in check\[0\] 'stress.tt'"),
         ("tolerance = 0.05\n", "", r"check\[0\] needs 'tolerance'"),
+        (
+            GOOD[GOOD.index("[theory") : GOOD.index("[[check")],
+            "[theory]\nhertz = 3\n",
+            r"'theory.hertz' must be a table of",
+        ),
+        (
+            "E = 20000.0\nnu",
+            "groups = [3]\nE = 20000.0\nnu",
+            r"'material\[0\].groups' must be a list of strings or a string, not",
+        ),
+        (
+            'primary = "CONT2"',
+            'primary = "CONT2"\nformulation = 3',
+            r"'contact.hertz.formulation' must be a string, not the int 3",
+        ),
     ],
 )
 def test_mistakes_name_the_key(write, old, new, message):

@@ -1,5 +1,6 @@
 """What a command says of numbers and texts that cannot be drawn: one line, no traceback."""
 
+import os
 import shutil
 import sys
 
@@ -42,3 +43,53 @@ def test_characters_that_the_font_of_a_picture_lacks_are_told_in_a_line(solved_c
     assert [line.partition(": ")[0] for line in lines] == ["warning", "warning"]
     assert sys.modules["matplotlib"] is mpl
     assert picture.exists()
+
+
+CASE = """kinematics = "axisymmetric"
+
+[mesh]
+generator = "half-spheres"
+element = "tri3"
+size = 10.0
+
+[[material]]
+E = 20000.0
+nu = 0.3
+
+[contact.hertz]
+secondary = "CONT1"
+primary = "CONT2"
+"""
+
+
+def test_a_case_file_is_told(tmp_path, capsys):
+    path = tmp_path / "a.toml"
+    path.write_text(CASE)
+    assert main(["info", str(path)]) == 0
+    said = capsys.readouterr().out
+    assert "hertz" in said
+    assert "CONT1" in said
+
+
+def test_what_is_written_otherwise_is_told(tmp_path, capsys):
+    path = tmp_path / "a.toml"
+    path.write_text(CASE.replace("[[material]]", "[material]"))
+    assert main(["run", str(path), "-o", str(tmp_path / "a.vtkhdf")]) == 1
+    assert "write [[material]] in place of [material]" in capsys.readouterr().err
+    path.write_text(CASE)
+    assert main(["sweep", str(path), "--set", "friction=0.1,0.2", "--json", str(tmp_path / "a.json")]) == 1
+    assert capsys.readouterr().err == "error: 'friction' belongs to a pair: write contact.hertz.friction\n"
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+def test_a_case_from_a_pipe_is_told(tmp_path, capsys):
+    os.mkfifo(tmp_path / "a.toml")
+    assert main(["run", str(tmp_path / "a.toml"), "-o", str(tmp_path / "a.vtkhdf")]) == 1
+    assert "is a pipe or a terminal, and a case is read more than once" in capsys.readouterr().err
+
+
+def test_warnings_take_one_line(tmp_path, capsys):
+    assert main(["mesh", "box", "-o", str(tmp_path / "a.stl")]) == 1
+    warned, refused = capsys.readouterr().err.splitlines()
+    assert warned.startswith("warning: stl files have no named groups")
+    assert refused.startswith("error: ")

@@ -39,7 +39,7 @@ def test_boxes_hold_the_two_below_them_and_the_facets_come_last(dim, n):
 def test_every_box_is_halved_along_its_longest_side(dim):
     points = np.random.default_rng(4).uniform(0, 1, (64, dim)) * ([1.0, 0.8, 0.6][:dim])
     points[:20] = points[5]  # many equal ones
-    order = tree_order(points)
+    order = tree_order(points, 1)
     assert np.array_equal(np.sort(order), np.arange(64))
     for size in (64, 32, 16, 8, 4, 2):
         for part in points[order].reshape(-1, size, dim):
@@ -54,8 +54,8 @@ def test_the_order_is_a_permutation_whatever_the_points(dim):
     points = np.random.default_rng(1).normal(size=(1001, dim))
     points[::7] = points[0]
     points[5], points[6], points[11] = np.nan, np.inf, -1e300
-    assert np.array_equal(np.sort(tree_order(points)), np.arange(1001))
-    assert len(tree_order(points[:0])) == 0
+    assert np.array_equal(np.sort(tree_order(points, 1)), np.arange(1001))
+    assert len(tree_order(points[:0], 1)) == 0
 
 
 @pytest.mark.parametrize("dim", [2, 3])

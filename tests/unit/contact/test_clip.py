@@ -23,7 +23,7 @@ def facing(secondary, primary, room=1000, reach=2.0):
     """Pairs of polygons (n, n_corners, 3) that face each other."""
     (origin, axes), (_, other_axes) = planes(secondary), planes(primary)
     radius = np.linalg.norm(secondary - origin[:, None], axis=2).max(axis=1)
-    numbers = tree_order(primary[:, 0].copy())
+    numbers = tree_order(primary[:, 0].copy(), 1)
     tree = build(primary.min(axis=1)[numbers], primary.max(axis=1)[numbers])
     pairs = np.empty((room, 2), np.intp)
     count = _cut_faces_kernels.facing_pairs(
@@ -52,6 +52,7 @@ def integrated(secondary, primary, kinds, reference=None, heights=None):
     )]  # fmt: skip
     factor = np.full((len(pairs), 2), 0.5)
     wrong = _cut_faces_kernels.integrate(
+        0, len(corners), np.searchsorted(pairs[:, 0], np.arange(len(corners) + 1)),
         corners, one.n_corners, origin, axes, to_terms @ secondary, to_terms @ reference, to_terms,
         one.nodes[: one.n_corners].mean(axis=0), opposite, other.n_corners, other_to_terms @ primary,
         other_to_terms, other.nodes[: other.n_corners].mean(axis=0), pairs, *quadrature.triangle(8), *above, factor,

@@ -8,7 +8,7 @@ from fastcontact.errors import CaseError, FileError
 
 def read(folder, text, name="a.inp"):
     (folder / name).write_text(text, encoding="utf-8")
-    return blocks.read_blocks(folder / name)
+    return list(blocks.read_blocks(folder / name))
 
 
 def test_a_block_has_keyword_parameters_and_lines(tmp_path):

@@ -176,18 +176,6 @@ top, 3, 3, -0.001
     assert found == pytest.approx({1.0: -0.002, 1.5: -0.002, 2.0: -0.001}, rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("lines", "said"),
-    [
-        ("*Boundary, op=NEW\nbottom, 3\n", r"line 57, \*BOUNDARY: step 2 leaves out 16 supports"),
-        ("*Boundary\ntop, 3\n", r"line 58, \*BOUNDARY: step 2 has 4 supports that were not there before"),
-    ],
-)
-def test_supports_stay_through_all_steps(tmp_path, lines, said):
-    with pytest.raises(fc.CaseError, match=said):
-        deck_of(tmp_path, WHOLE + f"*Step\n*Static\n{lines}*End Step\n")
-
-
 def test_weight_and_centrifugal_force(tmp_path):
     loads = "*Dload\n, GRAV, 10., 0., 0., -2.\nup, CENTRIF, 4., 0., 0., 0., 0., 0., 1.\n*End Step\n"
     text = WHOLE.replace("*Elastic\n", "*Density\n3.\n*Elastic\n").replace("*Dsload\nroof, P, 100.\n*End Step\n", loads)

@@ -98,23 +98,7 @@ def test_supports_along_skew_axes(tmp_path):
     )  # forces of the equation are no reactions
 
 
-def test_supports_on_skew_axes_must_stay(tmp_path):
-    turned = "*Transform, nset=bottom, type=R\n1., 0., 1., 0., 1., 0.\n"
-    text = before("*Boundary\n", turned).replace("bottom, 3\n", "bottom, 1\n")
-    text += "*Step\n*Static\n*Boundary, op=NEW\ntop, 3\nx0, 1\ny0, 2\n*End Step\n"
-    with pytest.raises(fc.CaseError, match=r"leaves out 2 supports .*first: component 1 of node 2"):
-        deck_of(tmp_path, text)
-
-
 RIGID = "*Node, nset=ref\n90, 0.5, 0.5, 2.5\n*Rigid Body, elset=up, ref node=90\n"
-
-
-def test_supports_of_rotations_must_stay(tmp_path):
-    text = NODES + RIGID + MATERIAL + CONTACT + "*Boundary\nbottom, 1, 3\nref, 1, 2\nref, 4, 6\n"
-    steps = STEP.replace("*Dsload\nroof, P, 100.\n", "*Cload\nref, 3, -1.\n")
-    dropped = "*Step\n*Static\n*Boundary, op=NEW\nbottom, 1, 3\nref, 1, 2\nref, 4, 5\n*End Step\n"
-    with pytest.raises(fc.CaseError, match=r"leaves out 1 supports .*first: rotation 3 of a reference node"):
-        deck_of(tmp_path, text + steps + dropped)
 
 
 def test_a_rotation_node_of_a_rigid_body_in_its_own_place(tmp_path):

@@ -43,16 +43,52 @@ def test_beams_carry_a_force_and_a_moment(tmp_path):
     assert force[:, 2] @ points[bottom, 0] == pytest.approx(70.0)
 
 
+STACK = (
+    NODES[: NODES.index("*Surface")].replace("11, 12, 13, 14, 15", "5, 6, 7, 8, 15")
+    + "*Node\n20, 0., 0., 1.\n*Material, name=steel\n*Elastic\n1000., 0.3\n"
+    + "*Solid Section, elset=low, material=steel\n*Solid Section, elset=up, material=steel\n"
+)
+LOADS = "*Cload\n15, 3, -0.01\n17, 1, 0.02\n*End Step\n"
+LOADED = "*Boundary\nbottom, 1, 3\n*Step\n*Static\n*Boundary\n20, 1, 1, 0.0001\n" + LOADS
+# Displacements of nodes 5 to 8 and 15 to 18 by CalculiX 2.20 [1e-5].
+CALCULIX = [
+    [16.32646, -3.067850, 6.241834], [18.07036, -1.526219, -11.99051], [10.45942, 1.678312, -7.905223],
+    [12.41006, -5.252675, 10.32622], [44.63075, -13.38602, 2.934954], [42.55859, -0.6385982, -13.78184],
+    [40.33827, -1.345495, -13.17047], [32.12612, -13.87342, 15.23307],
+]  # fmt: skip
+
+
+def test_a_mean_rotation_and_a_plane_as_in_calculix(tmp_path):
+    """Its constraints follow the rotation, ours are linear: 3e-4 of the largest displacement."""
+    lines = "*Mpc\nMEANROT, 15, 15, 15, 16, 16, 16, 17, 17, 17,\n18, 18, 18, 20\n*Mpc\nPLANE, 5, 6, 7, 8\n"
+    deck = deck_of(tmp_path, STACK + lines + LOADED)
+    (step,) = deck.solve()
+    found = step.displacement[[deck.point(n) for n in (5, 6, 7, 8, 15, 16, 17, 18)]] * 1e5
+    assert found == pytest.approx(np.array(CALCULIX), abs=3e-4 * 44.6)
+
+
+def test_a_line_stays_straight(tmp_path):
+    deck = deck_of(tmp_path, STACK + "*Mpc\nSTRAIGHT, 1, 5, 15\n" + LOADED.replace("20, 1, 1", "16, 1, 1"))
+    (step,) = deck.solve()
+    low, middle, high = step.displacement[[deck.point(n) for n in (1, 5, 15)], :2]
+    assert np.abs(high).max() > 1e-5
+    assert middle == pytest.approx(0.5 * (low + high), abs=1e-15)
+
+
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("LINEAR, 11, 5, 6\n", r"line 48, \*MPC: an MPC of type LINEAR is not supported, only PIN, TIE and BEAM"),
+        ("LINEAR, 11, 5, 6\n", r"line 48, \*MPC: an MPC of type LINEAR is not supported, only PIN, TIE, BEAM, PLANE"),
         ("PIN, 11\n", "PIN needs two nodes"),
         ("PIN, 11, 5, 6\n", "PIN needs two nodes"),
         ("PIN, low_face, x0\n", "'low_face' and 'x0' have 4 and 8 nodes"),
         ("PIN, 11, 11\n", "'11' and '11' have 1 and 1 nodes"),
         ("TIE, 99, 5\n", "node 99"),
         ("BEAM, 11, top\n", "'top' holds 4 nodes where one is needed"),
+        ("PLANE, 5, 6, 7\n", r"line 48, \*MPC: PLANE needs 4 different nodes or more"),
+        ("PLANE, 5, 1, 11, 7\n", "the first three nodes of PLANE lie on a line"),
+        ("STRAIGHT, 5, 11, 6\n", "the first two nodes of STRAIGHT are at one place"),
+        ("MEANROT, 5, 5, 5, 6, 6, 6, 1\n", "the last node of MEANROT are the direction of the axis, and all zero"),
     ],
 )
 def test_what_is_refused(line, message, tmp_path):

@@ -181,7 +181,7 @@ CONTACTS = {
     ),
     "nodes that are no faces": (
         before("*Surface, name=roof", "*Surface, name=few, type=NODE\n15\n16\n", instead("ss, sm", "few, sm")),
-        "the nodes of surface 'few' make up no whole faces: 2 of 2 belong to none",
+        "no facet of 'few' faces 'sm'",
     ),
 }
 RELATIONS = {

@@ -1,0 +1,161 @@
+"""Which kernels the usual kinds of runs call: writes ``fastcontact/_jit/kernels.json``, from which they are compiled ahead.
+
+Run it after a change of a kernel's arguments: ``python bench/kernels.py``. It solves a small model of each kind, in a
+process of its own and with kernels that stay Python, and notes what is called, with which types, in which order.
+"""
+
+from __future__ import annotations
+
+import argparse
+import functools
+import json
+import os
+import subprocess
+import sys
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+import fastcontact as fc
+from fastcontact._jit import ahead, decorators
+
+
+def spheres(element: str, formulation: str) -> fc.Model:
+    model = fc.Model(fc.generate.half_spheres(element, size=10.0), "axisymmetric")
+    model.fix("A1A2", "x")
+    model.prescribe("A2B2", y=-0.1)
+    model.prescribe("A1B1", y=0.1)
+    model.add_contact("pair", secondary="CONT1", primary="CONT2", formulation=formulation)
+    return model
+
+
+def blocks(formulation: str, friction: float) -> fc.Model:
+    sizes = {"size_lower": (4.0, 2.0), "size_upper": (2.0, 2.0), "shift": 1.0}
+    divisions = {"divisions_lower": (8, 4), "divisions_upper": (5, 4)}
+    model = fc.Model(fc.generate.block_on_block("quad4", **sizes, **divisions), "plane_strain")
+    model.fix("LOWER_BOTTOM", "xy")
+    model.prescribe("UPPER_TOP", x=0.001, y=-0.01)
+    model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", formulation=formulation, friction=friction)
+    return model
+
+
+def on_plane(friction: float, formulation: str) -> fc.Model:
+    model = fc.Model(fc.generate.block((2.0, 1.0), (6, 3), "quad4"), "plane_strain")
+    model.prescribe("TOP", x=0.001, y=-0.01)
+    plane = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
+    model.add_obstacle("pair", secondary="BOTTOM", obstacle=plane, formulation=formulation, friction=friction)
+    return model
+
+
+def ball(element: str, formulation: str, friction: float) -> fc.Model:
+    mesh = fc.generate.sphere_on_block(element, R=1.0, size=0.4, contact_size=0.2, contact_radius=0.2)
+    model = fc.Model(mesh, "3d")
+    model.fix("SYMMETRY_X", "x")
+    model.fix("SYMMETRY_Z", "z")
+    model.fix("BLOCK_BOTTOM", "y")
+    model.prescribe("SPHERE_TOP", y=-0.02)
+    options = {"formulation": formulation, "friction": friction}
+    model.add_contact("pair", secondary="CONT_SPHERE", primary="CONT_BLOCK", **options)
+    return model
+
+
+def octant(friction: float, formulation: str) -> fc.Model:
+    model = fc.Model(fc.generate.sphere_octant("hex8", size=12.5, contact_size=4.0, contact_radius=6.0), "3d")
+    model.fix("SYMMETRY_X", "x")
+    model.fix("SYMMETRY_Z", "z")
+    model.prescribe("SPHERE_TOP", y=-0.5)
+    plane = fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    model.add_obstacle("pair", secondary="CONT_SPHERE", obstacle=plane, formulation=formulation, friction=friction)
+    return model
+
+
+def models() -> list[tuple[Callable[..., fc.Model], tuple[Any, ...], str]]:
+    """Return functions that make models, their arguments, and the linear solver."""
+    formulations = ("node_to_segment", "mortar", "continuous")
+    return [
+        *((spheres, ("tri3", formulation), "auto") for formulation in formulations),
+        (blocks, ("mortar", 0.1), "auto"),
+        (on_plane, (0.0, "continuous"), "auto"),
+        *((ball, ("hex8", formulation, 0.0), "auto") for formulation in formulations),
+        (octant, (0.0, "node_to_segment"), "auto"),
+        (octant, (0.0, "node_to_segment"), "amg"),
+        (ball, ("hex8", "mortar", 0.1), "amg"),
+    ]
+
+
+def entry(given: Any) -> Any:
+    """Return the type of an argument as `ahead.numba_type` reads it; None if the table cannot hold it."""
+    if isinstance(given, np.ndarray):
+        plain = given.flags.c_contiguous and given.flags.aligned and given.dtype.kind in "biuf"
+        return [given.dtype.str[1:], given.ndim, *([] if given.flags.writeable else ["r"])] if plain else None
+    if isinstance(given, tuple):
+        members, named = [entry(member) for member in given], hasattr(given, "_fields")
+        name = f"{type(given).__module__}.{type(given).__qualname__}" if named else ""
+        return None if None in members else {name: members}
+    for kind, scalar in ((bool | np.bool_, "b1"), (int | np.integer, "i8"), (float | np.floating, "f8")):
+        if isinstance(given, kind):
+            return scalar
+    return None
+
+
+def noting(found: list[list[Any]]) -> Callable[..., Any]:
+    """Return what stands in for the compiler: kernels stay Python, and those that no other one calls are noted."""
+    inside: list[str] = []
+
+    def plain(function: Callable[..., Any], **_: Any) -> Callable[..., Any]:
+        @functools.wraps(function)
+        def called(*arguments: Any) -> Any:
+            kernel = [function.__module__, function.__qualname__, [entry(given) for given in arguments]]
+            if not inside and None not in kernel[2] and kernel not in found:
+                found.append(kernel)
+            inside.append(function.__name__)
+            try:
+                return function(*arguments)
+            finally:
+                inside.pop()
+
+        return called
+
+    return plain
+
+
+def called(number: int) -> dict[str, Any]:
+    """Solve a model; return the kind of run that it stands for, and the kernels that it calls in their order."""
+    found: list[list[Any]] = []
+    decorators._compile = noting(found)
+    make, arguments, solver = models()[number]
+    model = make(*arguments)
+    model.add_material(fc.LinearElastic(E=1.0, nu=0.3))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # Python's floating-point arithmetic tells what NumPy's does not
+        fc.solve(model, 1, linear_solver=solver)
+    return {"kind": f"{model.mesh.dim}d{' amg' if solver == 'amg' else ''}", "kernels": found}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--one", type=int, help="print what one model calls")
+    options = parser.parse_args()
+    if options.one is not None:
+        print(json.dumps(called(options.one)))
+        return
+    kernels: list[list[Any]] = []
+    runs: dict[str, list[int]] = {}
+    for number, (make, arguments, solver) in enumerate(models()):
+        plain = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
+        given = [sys.executable, __file__, "--one", str(number)]
+        done = subprocess.run(given, stdout=subprocess.PIPE, check=True, env=plain)
+        said = json.loads(done.stdout)
+        kernels.extend(kernel for kernel in said["kernels"] if kernel not in kernels)
+        numbers = [kernels.index(kernel) for kernel in said["kernels"]]
+        runs[said["kind"]] = sorted({*runs.get(said["kind"], []), *numbers})
+        print(f"{make.__name__}{arguments} {solver}: {len(numbers)} kernels, {len(kernels)} in all", flush=True)
+    lines = ",\n".join(json.dumps(kernel) for kernel in kernels)
+    of_runs = ",\n".join(f"{json.dumps(name)}: {json.dumps(numbers)}" for name, numbers in sorted(runs.items()))
+    ahead.TABLE.write_text(f'{{"kernels": [\n{lines}\n],\n"runs": {{\n{of_runs}\n}}}}\n', encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,85 @@
+"""Multi-point constraints of many nodes: in a plane, on a straight line, with a mean rotation; for small displacements."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fastcontact.arrays import Array
+from fastcontact.cases.decks.content import MultiPoint
+from fastcontact.cases.decks.meshing import DeckMesh
+from fastcontact.model.couplings import Term
+
+# Numbers of nodes that the kinds need.
+LEAST = {"PLANE": 4, "STRAIGHT": 3, "MEANROT": 3}
+# Points whose distance from a line or a point is less than this part of their size have no direction from it.
+FLAT = 1e-9
+
+
+def multi_point_rows(found: DeckMesh, own: MultiPoint) -> list[list[Term]]:
+    """Return the equations of a multi-point constraint; CaseError where its nodes do not determine it."""
+    nodes = [point for name in own.nodes for point in found.made.nodes(name, own.place)]
+    nodes = [*dict.fromkeys(nodes[:-1] if own.kind == "MEANROT" else nodes), *nodes[-1:]]
+    nodes = nodes if own.kind == "MEANROT" else nodes[:-1]
+    if len(nodes) < LEAST[own.kind] or found.dim == 2:
+        raise own.place.refuse(f"{own.kind} needs {LEAST[own.kind]} different nodes or more, in space")
+    where = found.made.points[nodes]
+    if own.kind == "MEANROT":
+        return [_mean_rotation(own, nodes, where)]
+    first = where[1] - where[0]
+    if own.kind == "STRAIGHT":
+        across = _directions(own, first)
+        along = (where - where[0]) @ first / (first @ first)
+        weights = np.column_stack([1.0 - along, along])
+    else:
+        across = np.cross(first, where[2] - where[0])[None]
+        if np.linalg.norm(across) <= FLAT * (first @ first):
+            raise own.place.refuse("the first three nodes of PLANE lie on a line")
+        edges = np.array([first, where[2] - where[0]])
+        inside = np.linalg.lstsq(edges.T, (where - where[0]).T, rcond=None)[0].T
+        weights = np.column_stack([1.0 - inside.sum(axis=1), inside])
+    k = weights.shape[1]
+    across = across / np.linalg.norm(across, axis=1, keepdims=True)
+    return [
+        _terms([nodes[i], *nodes[:k]], np.outer([1.0, *-weights[i]], normal))
+        for i in range(k, len(nodes))
+        for normal in across
+    ]
+
+
+def _directions(own: MultiPoint, line: Array) -> Array:
+    """Return two directions (2, 3) across a line [-]."""
+    if not line.any():
+        raise own.place.refuse("the first two nodes of STRAIGHT are at one place")
+    return np.asarray(np.linalg.svd(line[None])[2][1:])
+
+
+def _mean_rotation(own: MultiPoint, nodes: list[int], where: Array) -> list[Term]:
+    """Return the equation between nodes and the first component of the last one, their mean rotation about its direction.
+
+    That is the mean of the angles by which they turn about their centre, as in CalculiX: with the axis a, offsets p from the
+    centre across it, ``mean(a . (p x u) / p . p)``; the last node's coordinates are the direction of the axis.
+    """
+    axis, places = where[-1], where[:-1] - where[:-1].mean(axis=0)
+    length = np.linalg.norm(axis)
+    if length == 0.0:
+        raise own.place.refuse(
+            "the coordinates of the last node of MEANROT are the direction of the axis, and all zero"
+        )
+    axis = axis / length
+    offset = places - np.outer(places @ axis, axis)
+    squared = np.einsum("nd,nd->n", offset, offset)
+    if squared.min() <= FLAT * squared.max():
+        raise own.place.refuse("a node of MEANROT lies in the middle of the others, where it has no angle")
+    arms = np.cross(axis, offset) / squared[:, None] / len(offset)
+    arms -= arms.mean(axis=0)
+    return [*_terms(nodes[:-1], arms), (nodes[-1], 0, -1.0)]
+
+
+def _terms(points: list[int], coefficients: Array) -> list[Term]:
+    """Return the terms of an equation with coefficients (n, 3) of the displacements of points."""
+    return [
+        (point, axis, value)
+        for point, row in zip(points, coefficients.tolist(), strict=True)
+        for axis, value in enumerate(row)
+        if value
+    ]

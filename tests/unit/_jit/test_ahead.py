@@ -1,0 +1,125 @@
+"""Kernels compiled ahead by helpers: the table tells kernels as they are, and helpers leave them on disk."""
+
+import importlib
+import inspect
+import json
+import os
+import subprocess
+import sys
+
+import numba
+import numpy as np
+import pytest
+
+from fastcontact._jit import ahead, compiling, decorators
+from fastcontact.contact.search.box_tree_kernels import Tree
+
+jitted = pytest.mark.skipif(not decorators.compiled(), reason="kernels are not compiled")
+
+
+@pytest.mark.parametrize("run", ["2d", "3d", "3d amg"])
+def test_the_table_tells_kernels_as_they_are(run):
+    numbers = ahead.kernels_of([run])
+    assert len(numbers) > 20
+    for module, name, given in (ahead.table()["kernels"][number] for number in numbers):
+        kernel = getattr(importlib.import_module(module), name)
+        parameters = inspect.signature(getattr(kernel, "py_func", kernel)).parameters
+        assert len(parameters) == len(given), (module, name)
+        for one in given:
+            ahead.numba_type(one)
+
+
+def test_all_kinds_of_runs_together_are_the_whole_table():
+    assert ahead.kernels_of([]) == list(range(len(ahead.table()["kernels"])))
+    assert ahead.kernels_of(["no such kind"]) == []
+
+
+def test_types_are_those_of_arguments():
+    fixed = np.zeros((2, 2), np.int32)
+    fixed.flags.writeable = False
+    low = np.zeros((2, 2))
+    for entry, argument in (
+        ("f8", 1.0), ("i8", 1), ("b1", True), (["f8", 1], np.zeros(2)), (["b1", 2], np.zeros((2, 2), bool)),
+        (["i4", 2, "r"], fixed), ({"": ["i8", "i8"]}, (1, 2)), ({"": ["i8", "f8"]}, (1, 2.0)),
+        ({"fastcontact.contact.search.box_tree_kernels.Tree": [["f8", 2], ["f8", 2]]}, Tree(low, low)),
+    ):  # fmt: skip
+        assert ahead.numba_type(entry) == numba.typeof(argument)
+
+
+@jitted
+def test_a_helper_leaves_kernels_on_disk_and_tells_each(tmp_path):
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    number = next(
+        number for number, (_, name, _) in enumerate(ahead.table()["kernels"]) if name == "largest_difference"
+    )
+    code = (
+        "import sys; from fastcontact._jit import ahead\n"
+        f"ahead.kernels_of = lambda runs: [{number}]\n"
+        "ahead.main(['1', '0'])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout == f"{number}\n"
+    assert [path.name.split(".")[1] for path in tmp_path.rglob("*.nbc")] == ["largest_difference"]
+
+
+@pytest.fixture
+def started(monkeypatch):
+    """What `expect` starts, in a process that has two threads and has compiled nothing yet."""
+    found = []
+    monkeypatch.setattr(ahead, "start", lambda runs, helpers: found.append((runs, helpers)))
+    monkeypatch.setattr(ahead.numba, "get_num_threads", lambda: 2)
+    monkeypatch.setattr(ahead.kernel_files, "kept", True)
+    monkeypatch.setattr(compiling, "count", 0)
+    monkeypatch.setattr(compiling, "helpers", [])
+    monkeypatch.setattr(compiling, "listeners", [])
+    return found
+
+
+def test_help_comes_when_more_than_a_few_kernels_are_compiled(started):
+    ahead.expect(["2d"])
+    for _ in range(ahead.ALONE):
+        compiling.notify()
+    assert started == []
+    compiling.notify()
+    compiling.notify()
+    assert started == [(["2d"], 1)]
+
+
+def test_help_comes_at_once_where_many_were_compiled_before(started, monkeypatch):
+    monkeypatch.setattr(compiling, "count", ahead.ALONE + 1)
+    ahead.expect(["3d"])
+    assert started == [(["3d"], 1)]
+
+
+@pytest.mark.parametrize("spoilt", ["one thread", "works for another", "not kept", "part of a program"])
+def test_no_help(started, monkeypatch, spoilt):
+    if spoilt == "one thread":
+        monkeypatch.setattr(ahead.numba, "get_num_threads", lambda: 1)
+    elif spoilt == "works for another":
+        monkeypatch.setattr(ahead.multiprocessing, "parent_process", object)
+    elif spoilt == "not kept":
+        monkeypatch.setattr(ahead.kernel_files, "kept", False)
+    else:
+        monkeypatch.setattr(ahead.sys, "executable", "/opt/cad/cad")
+    monkeypatch.setattr(compiling, "count", 100)
+    ahead.expect(["2d"])
+    assert started == []
+    assert compiling.helpers == []
+
+
+@jitted
+@pytest.mark.slow
+def test_a_run_finds_all_its_kernels(tmp_path):
+    """Both kinds of elements of the training cases: nothing is left to compile, so no type in the table is another one."""
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "NUMBA_NUM_THREADS": "1"}
+    helper = [sys.executable, "-m", "fastcontact._jit.ahead", "1", "0", "2d"]
+    subprocess.run(helper, env=environment, capture_output=True, check=True)
+    code = (
+        "import json; from fastcontact._jit import compiling; from fastcontact.cli import main\n"
+        "codes = [main(['run', name, '-q', '-o', 'a.vtkhdf']) for name in ('forma04a', 'press-fit')]\n"
+        "print(json.dumps([*codes, compiling.count]))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True, cwd=tmp_path
+    )
+    assert json.loads(done.stdout) == [0, 0, 0]

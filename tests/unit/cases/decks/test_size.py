@@ -1,0 +1,96 @@
+"""Memory and time of decks: at most 20 bytes a byte, and time that grows as the deck does."""
+
+import sys
+import tracemalloc
+
+import numpy as np
+import pytest
+from deck_text import MATERIAL, NODES, SUPPORTS, deck_of
+
+import fastcontact as fc
+
+
+def block(cells):
+    """A cube of cells**3 hexahedra with sets that list all their members."""
+    p = cells + 1
+    grid = np.arange(1, p**3 + 1).reshape(p, p, p)
+    corners = [(0, 0, 0), (0, 0, 1), (0, 1, 1), (0, 1, 0), (1, 0, 0), (1, 0, 1), (1, 1, 1), (1, 1, 0)]
+    of_cells = np.stack([grid[k : k + cells, j : j + cells, i : i + cells].ravel() for k, j, i in corners], axis=1)
+    where = np.stack(np.meshgrid(*[np.arange(p) / cells] * 3, indexing="ij"), axis=-1)[..., ::-1].reshape(-1, 3)
+    lines = ["*Node, nset=nall", *(f"{n}, {x:.9f}, {y:.9f}, {z:.9f}" for n, (x, y, z) in enumerate(where, 1))]
+    lines += ["*Element, type=C3D8, elset=all"]
+    lines += [f"{n}, {', '.join(map(str, row))}" for n, row in enumerate(of_cells.tolist(), 1)]
+    for kind, count in (("n", p**3), ("el", cells**3)):
+        lines.append(f"*{kind}set, {kind}set=listed")
+        lines += [", ".join(map(str, range(k, min(k + 16, count + 1)))) for k in range(1, count + 1, 16)]
+    lines += ["*Surface, name=outside", "all,", "*Material, name=s", "*Elastic", "1000., 0.3"]
+    lines += ["*Solid section, elset=all, material=s", "*Boundary", f"listed, 3\n1, 1, 2\n{p}, 2", "*Step", "*Static"]
+    return "\n".join(lines) + "\n*Dsload\noutside, P, 1.\n*End step\n"
+
+
+def test_twenty_bytes_a_byte(tmp_path):
+    text = block(16)
+    deck_of(tmp_path, block(1))  # imports
+    tracemalloc.start()
+    deck = deck_of(tmp_path, text)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert len(deck.model.mesh.cells["hex8"]) == 16**3
+    assert peak < 20 * len(text), f"{peak / len(text):.1f} bytes a byte"
+
+
+def calls(folder, text):
+    """Calls of Python functions that reading a deck takes."""
+    count = 0
+
+    def counted(frame, event, argument):
+        nonlocal count
+        count += event == "call"
+
+    before = sys.getprofile()
+    sys.setprofile(counted)
+    try:
+        deck_of(folder, text)
+    finally:
+        sys.setprofile(before)
+    return count
+
+
+def many_steps(number):
+    steps = "".join(f"*Step\n*Static\n*Dsload\nroof, P, {k % 7}.\n*End Step\n" for k in range(number))
+    return NODES + MATERIAL + "*Mpc\nTIE, 11, 5\nTIE, 12, 6\nTIE, 13, 7\nTIE, 14, 8\n" + SUPPORTS + steps
+
+
+def many_forces(number):
+    """As many nodes with a force of their own: bars of single cubes, all held."""
+    nodes, cells, forces = [], [], []
+    for k in range(number):
+        first = 8 * k + 1
+        nodes += [f"{first + n}, {2 * k + x}., {y}., {z}." for n, (x, y, z) in enumerate(CORNERS)]
+        cells.append(f"{k + 1}, " + ", ".join(str(first + n) for n in range(8)))
+        forces += [f"{first + 4}, 3, {k + 1}."]
+    text = "*Node, nset=nall\n" + "\n".join(nodes) + "\n*Element, type=C3D8, elset=all\n" + "\n".join(cells)
+    text += "\n*Material, name=s\n*Elastic\n1000., 0.\n*Solid section, elset=all, material=s\n*Boundary\n"
+    text += "".join(f"{8 * k + n}, 1, 3\n" for k in range(number) for n in (1, 2, 3, 4))
+    return text + "*Step\n*Static\n*Cload\n" + "\n".join(forces) + "\n*End step\n"
+
+
+CORNERS = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
+
+
+@pytest.mark.parametrize("text", [many_steps, many_forces])
+def test_time_grows_as_the_deck(text, tmp_path):
+    small, large = calls(tmp_path, text(100)), calls(tmp_path, text(400))
+    assert large < 4.4 * small
+
+
+def test_forces_and_displacements_of_their_own(tmp_path):
+    """Nodes with forces and displacements that differ have those: two cubes on each other, coincident points included."""
+    text = many_forces(3).replace("*Cload\n", "*Boundary\n3, 1, 1, 0.001\n4, 1, 1, 0.002\n*Cload\n")
+    deck = deck_of(tmp_path, text)
+    (step,) = deck.solve()
+    for k in range(3):
+        held = [deck.point(8 * k + n) for n in (1, 2, 3, 4)]
+        assert step.reaction[held, 2].sum() == pytest.approx(-(k + 1.0))
+    assert step.displacement[[deck.point(3), deck.point(4)], 0] == pytest.approx([0.001, 0.002], abs=1e-18)
+    assert isinstance(deck, fc.Deck)

@@ -1,0 +1,71 @@
+"""Environments in which libraries would end with a traceback: one line, exit code 1."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+import fastcontact as fc
+
+
+def run(arguments, folder, options=(), **environment):
+    """Run a command in a process of its own; return its exit code and standard error."""
+    done = subprocess.run(
+        [sys.executable, *options, "-m", "fastcontact", *arguments], cwd=folder, capture_output=True, text=True,
+        env={**os.environ, **environment}, check=False,
+    )  # fmt: skip
+    return done.returncode, done.stderr
+
+
+def test_no_threads(tmp_path):
+    code, told = run(["cases"], tmp_path, NUMBA_NUM_THREADS="0")
+    assert code == 1
+    assert told == (
+        "error: the environment variable NUMBA_NUM_THREADS is 0: set it to a number of threads, 1 or more, or unset it\n"
+    )
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows keeps folders that a process works in")
+def test_a_working_folder_that_is_gone(tmp_path):
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    script = "import os, sys; os.rmdir(os.getcwd()); os.execv(sys.executable, [sys.executable, '-m', 'fastcontact', 'cases'])"
+    done = subprocess.run([sys.executable, "-c", script], cwd=gone, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr.startswith("error: the working folder is no longer there")
+    assert done.stderr.count("\n") == 1
+
+
+def test_an_unknown_backend_and_no_docstrings(tmp_path):
+    """Python without assertions and docstrings solves, and tells a backend of matplotlib that nobody knows."""
+    model = fc.Model(fc.generate.block((1.0, 1.0), (1, 1), "quad4"), "plane_strain")
+    fc.write_mesh(tmp_path / "block.med", model.mesh)
+    (tmp_path / "case.toml").write_text(CASE, encoding="utf-8")
+    assert run(["run", "case.toml", "-q"], tmp_path, ["-OO"]) == (0, "")
+    code, told = run(["plot", "case.vtkhdf", "--png", "a.png"], tmp_path, ["-OO"], MPLBACKEND="nonsense")
+    assert code == 1
+    assert told == (
+        "error: matplotlib does not know the backend 'nonsense' of the environment variable MPLBACKEND: unset it, or set it "
+        "to Agg\n"
+    )
+    assert run(["plot", "case.vtkhdf", "--png", "a.png", "-q"], tmp_path, ["-OO"]) == (0, "")
+
+
+CASE = """title = "a block"
+kinematics = "plane_strain"
+[mesh]
+file = "block.med"
+[[material]]
+E = 1.0
+nu = 0.3
+[[support]]
+group = "LEFT"
+x = 0.0
+y = 0.0
+[[pressure]]
+group = "RIGHT"
+value = 0.01
+[ramp]
+steps = 1
+"""
