@@ -12,10 +12,8 @@ from fastcontact.analysis.wear import worn_in_step
 from fastcontact.arrays import Array
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
-from fastcontact.contact.integration import facet_measure, fine_rule
-from fastcontact.contact.surface import Surface
+from fastcontact.contact.integration import lumped_areas
 from fastcontact.errors import ContactError, unknown
-from fastcontact.mesh import elements
 from fastcontact.mesh.argument_types import typed
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
@@ -60,8 +58,9 @@ class ContactAnswers:
     moment : ndarray (1,) or (3,)
         Of it about the middle of the contact, see `contact_moment`; zero in axisymmetry [force times length].
     area : float
-        Reference area of the closed nodes, each with its share of its facets; in the plane a length times the unit of
-        thickness, in axisymmetry that of the full circle [length^2]. Off by less than a row of facets at the edge.
+        Of the closed nodes, each with its share of its facets, in finite strain of the deformed ones; in the plane a length
+        times the unit of thickness, in axisymmetry that of the full circle [length^2]. Off by less than a row of facets at
+        the edge.
     centre : ndarray (dim,)
         Centre of pressure, of the normal forces of this model; NaN without any [length]. In axisymmetry its radius means
         nothing.
@@ -103,6 +102,8 @@ def contact_answers(model: Model, steps: Iterable[StepResult], name: str) -> lis
     areas, work, found = lumped_areas(pair.secondary, pair.points, pair.axisymmetric), 0.0, []
     for step in steps:
         contact = _of_pair(pair, step, name)
+        if model.strain == "finite":
+            areas = lumped_areas(pair.secondary, pair.points + step.displacement, pair.axisymmetric)
         work += contact.dissipation
         found.append(_answers(contact, areas, pair.axisymmetric, work))
     return found
@@ -217,22 +218,6 @@ def _end_of(before: StepResult | None, step: StepResult, name: str) -> Configura
     )
     angles = [0.0 if own is None else own.obstacle_angle or 0.0 for own in pairs]
     return Configuration(step.displacement, start, now, then, angle=angles[0], angle_start=angles[1])
-
-
-def lumped_areas(side: Surface, points: Array, axisymmetric: bool) -> Array:
-    """Return the share of each node (m,) of a surface in the area of its facets, positive for all elements [length^2].
-
-    By the squares of the shape functions, as for lumped masses (Hinton, Rock and Zienkiewicz, Earthq. Eng. Struct. Dyn. 4,
-    1976). `points` (n_points, dim) [length].
-    """
-    areas = np.zeros(len(side.points))
-    for block in side.blocks:
-        xi, weights = fine_rule(block.element)
-        measure = facet_measure(block.facets, block.element, points, xi, axisymmetric) * weights
-        shares = measure @ elements.get(block.element).shape(xi) ** 2
-        shares *= (measure.sum(axis=1) / shares.sum(axis=1))[:, None]
-        np.add.at(areas, block.local, shares)
-    return areas
 
 
 def _of_pair(pair: Formulation, step: StepResult, name: str) -> ContactResult:

@@ -36,7 +36,8 @@ class Criteria:
     max_geometry_updates, max_active_set_iterations : int
         Limits per step, and per pairing.
     max_halvings : int
-        How many times a load step that does not converge is cut in halves before the analysis gives up (DECOUPE).
+        How many times a load step that does not converge is cut in halves before the analysis gives up (DECOUPE), twice
+        as often with nonlinear bodies. Those go on with parts of that size, and twice it after each that took few iterations.
         Parts of a step are steps of their own, so that friction slides along their path; only the instants of the ramp
         give a result, whose ``iterations["substeps"]`` lists the ends of its parts. 0: never.
     """

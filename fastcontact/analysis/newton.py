@@ -21,7 +21,7 @@ from fastcontact.analysis.iterate import Iterate
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array
-from fastcontact.elasticity.nonlinear_bodies import DeformedBodies
+from fastcontact.elasticity.nonlinear_bodies import WHOLE, DeformedBodies
 from fastcontact.errors import ConvergenceError, ModelError
 
 log = logging.getLogger("fastcontact")
@@ -144,19 +144,22 @@ def _solve(
 
     `at` are the bodies and their displacements (n_dofs,) [length], `scale` the displacement to expect [length] and the last
     relative change: contact geometry settles to a part of that. Where the tangent is not positive definite, there is no
-    equilibrium to lead to, and the part of the pressure that turns is left out.
+    equilibrium of the bodies alone to lead to, and parts of the geometric stiffness are left out.
     """
-    try:
-        return _linear_contact(problem, start, load, at, iterate, scale)
-    except (ModelError, ConvergenceError) as error:
-        log.info("the tangent leaves out how pressure turns: %s", error)
-    try:
-        definite = problem.deformed(at[1], start, geometric=False)
-        return _linear_contact(problem, start, load, (definite, at[1]), iterate, scale)
-    except ModelError as error:
-        raise ConvergenceError(
-            f"the tangent stiffness of the bodies cannot be factorised ({error}): they buckle, or the load step is too large"
-        ) from None
+    bodies, u = at
+    for geometric in range(WHOLE, -1, -1):
+        if geometric < WHOLE:
+            bodies = problem.deformed(u, start, geometric=geometric)
+        try:
+            return _linear_contact(problem, start, load, (bodies, u), iterate, scale)
+        except (ModelError, ConvergenceError) as error:
+            log.info("the tangent leaves out more of the geometric stiffness: %s", error)
+            failed = error
+    if isinstance(failed, ConvergenceError):
+        raise failed
+    raise ConvergenceError(
+        f"the tangent stiffness of the bodies cannot be factorised ({failed}): they buckle, or the load step is too large"
+    )
 
 
 def _linear_contact(

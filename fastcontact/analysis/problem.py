@@ -29,7 +29,7 @@ from fastcontact.elasticity.following_pressure import FollowingPressure
 from fastcontact.elasticity.initial_states import InitialState
 from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.elasticity.material_sides import MaterialSides, material_sides
-from fastcontact.elasticity.nonlinear_bodies import DeformedBodies, NonlinearBodies
+from fastcontact.elasticity.nonlinear_bodies import WHOLE, DeformedBodies, NonlinearBodies
 from fastcontact.elasticity.relations import stacked_rows
 from fastcontact.elasticity.springs import spring_force, stiffened, too_stiff
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
@@ -218,7 +218,7 @@ class Problem:
         depth[self.pairs[name].secondary.points] = state.worn[name].depth
         return depth
 
-    def deformed(self, u: Array, start: State, *, geometric: bool = True) -> DeformedBodies:
+    def deformed(self, u: Array, start: State, *, geometric: int = WHOLE) -> DeformedBodies:
         """Return `NonlinearBodies.at` displacements u (n_dofs,) [length], in a load step that begins at `start`."""
         assert self.bodies is not None
         return self.bodies.at(self.displacement(u), start.history or self.bodies.beginning, geometric=geometric)

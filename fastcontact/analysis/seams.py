@@ -10,9 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from fastcontact.analysis.contact_answers import lumped_areas
 from fastcontact.analysis.problem import Problem
 from fastcontact.arrays import Indices
+from fastcontact.contact.integration import lumped_areas
 from fastcontact.model.periodicity import Seam
 from fastcontact.results.step import ContactResult, StepResult
 

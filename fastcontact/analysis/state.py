@@ -71,6 +71,8 @@ class State:
         Of the temperature over the reference, where heat is conducted [temperature].
     instant : float
         Pseudo-time.
+    halved : int
+        How often load steps of nonlinear bodies are halved before they are tried.
     solver : dict
         All that later solutions owe to earlier ones, see `LinearSolver.snapshot`.
     """
@@ -98,6 +100,7 @@ class State:
     history: Mapping[str, Array] = field(default_factory=dict)
     rise: Array | None = None
     instant: float = 0.0
+    halved: int = 0
     solver: Mapping[str, Any] = field(default_factory=dict)
 
     def after_touching(self, pairs: Iterable[str]) -> State:
@@ -113,6 +116,7 @@ class State:
                 "largest_force": float(self.largest_force),
                 "largest_work": float(self.largest_rigid_force),
                 "round_off": float(self.gap_round_off),
+                "halved": self.halved,
             },
             "obstacles": self.u[n_dofs:].copy(),
             "touched": sorted(self.touched),
@@ -165,6 +169,7 @@ class State:
             history=dict(kept.get("history", {})),
             rise=kept.get("rise"),
             instant=kept.get("instant", 0.0),
+            halved=int(numbers.get("halved", 0)),
             active=dict(kept["active"]),
             pressure=dict(kept["pressure"]),
             obstacles={name: now.copy() for name, now in found["now"].items()},

@@ -1,4 +1,7 @@
-"""Bisection of load steps that do not converge; a failed step leaves the state unchanged."""
+"""Bisection of load steps that do not converge; a failed step leaves the state unchanged.
+
+Parts of steps of nonlinear bodies keep the size of the last one, and double after one that took few iterations.
+"""
 
 from __future__ import annotations
 
@@ -17,6 +20,8 @@ from fastcontact.results.step import StepResult
 log = logging.getLogger("fastcontact")
 # Called with the number of a step, and the instants between which it does not converge and is cut in halves.
 listeners: list[Callable[[int, float, float], None]] = []
+# Newton iterations after which the next part of a step is twice as large.
+FEW = 6
 
 
 def advance(problem: Problem, state: State, index: int, begin: float, end: float) -> tuple[State, StepResult]:
@@ -39,11 +44,14 @@ def _parts(
 ) -> tuple[State, list[StepResult]]:
     begin, end = span
     middle = 0.5 * (begin + end)
+    if halved < state.halved and begin < middle < end:
+        return _both(problem, state, index, (begin, middle, end), halved)
     try:
         state, result = load_step(problem, state, index, end)
-        return state, [result]
+        return _sized(problem, state, result, halved), [result]
     except ConvergenceError as error:
-        if halved == problem.criteria.max_halvings or not begin < middle < end or not error.smaller_steps_help:
+        most = problem.criteria.max_halvings * (1 if problem.bodies is None else 2)
+        if halved >= most or not begin < middle < end or not error.smaller_steps_help:
             where = f"from {begin:.6g} to {end:.6g}"
             often = "once" if halved == 1 else f"{halved} times"
             part = (
@@ -56,9 +64,25 @@ def _parts(
         for listener in listeners:
             listener(index, begin, end)
         log.warning("step %d from %.6g to %.6g does not converge, cut in halves: %s", index, begin, end, reason)
+    return _both(problem, state, index, (begin, middle, end), halved)
+
+
+def _both(
+    problem: Problem, state: State, index: int, span: tuple[float, float, float], halved: int
+) -> tuple[State, list[StepResult]]:
+    """Compute both halves of a span."""
+    begin, middle, end = span
     state, first = _parts(problem, state, index, (begin, middle), halved + 1)
     state, second = _parts(problem, state, index, (middle, end), halved + 1)
     return state, first + second
+
+
+def _sized(problem: Problem, state: State, result: StepResult, halved: int) -> State:
+    """Return the state with how small the next part of a step shall be at least."""
+    if problem.bodies is None:
+        return state
+    few = len(result.iterations["history"]) <= FEW
+    return replace(state, halved=max(halved - few, 0))
 
 
 def _joined(parts: list[StepResult]) -> StepResult:

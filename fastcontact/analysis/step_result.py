@@ -12,6 +12,7 @@ from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.seams import joined
 from fastcontact.analysis.state import State
+from fastcontact.analysis.true_pressure import on_deformed_surface
 from fastcontact.arrays import Array
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.nonlinear_bodies import DeformedBodies
@@ -95,7 +96,10 @@ def contact_results(
         )
         for name, rows in settled.constraints.rows().items()
     }  # fmt: skip
-    return joined(problem, found)
+    found = joined(problem, found)
+    if problem.model.strain == "small":
+        return found
+    return {name: on_deformed_surface(problem.pairs[name], own, displacement) for name, own in found.items()}
 
 
 def counted(settled: SettledContact | None, linear_iterations: int) -> dict[str, Any]:

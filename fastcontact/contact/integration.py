@@ -74,3 +74,19 @@ def mass_matrix(surface: Surface, points: Array, axisymmetric: bool) -> csr_arra
 def nodal_areas(surface: Surface, points: Array, axisymmetric: bool) -> Array:
     """Return the integral of each node's shape function (m,) [area]."""
     return np.asarray(mass_matrix(surface, points, axisymmetric).sum(axis=1)).ravel()
+
+
+def lumped_areas(side: Surface, points: Array, axisymmetric: bool) -> Array:
+    """Return the share of each node (m,) of a surface in the area of its facets, positive for all elements [length^2].
+
+    By the squares of the shape functions, as for lumped masses (Hinton, Rock and Zienkiewicz, Earthq. Eng. Struct. Dyn. 4,
+    1976). `points` (n_points, dim) [length].
+    """
+    areas = np.zeros(len(side.points))
+    for block in side.blocks:
+        xi, weights = fine_rule(block.element)
+        measure = facet_measure(block.facets, block.element, points, xi, axisymmetric) * weights
+        shares = measure @ elements.get(block.element).shape(xi) ** 2
+        shares *= (measure.sum(axis=1) / shares.sum(axis=1))[:, None]
+        np.add.at(areas, block.local, shares)
+    return areas

@@ -69,14 +69,32 @@ def _dilatation(F, finite, G):
 
 
 @kernel
-def _add_volumetric(F, G, geometric, pressure, bulk, P, A):
-    """Add the part of the dilatation to P and A: `pressure` times dJ/dF, and its change, by `bulk` with J and with dJ/dF."""
+def _add_volumetric(F, G, pressure, turning, bulk, P, A):
+    """Add the part of the dilatation: `pressure` times dJ/dF to P; to A its change by `bulk` with J, `turning` with dJ/dF."""
     for row in range(9):
         P[row // 3, row % 3] += pressure * G[row // 3, row % 3]
         for column in range(9):
             A[row, column] += bulk * G[row // 3, row % 3] * G[column // 3, column % 3]
-    if geometric:
-        add_second_derivative(F, pressure, A)
+    if turning != 0.0:
+        add_second_derivative(F, turning, A)
+
+
+@kernel
+def _leave_out_initial_stress(G, J, P, turning, A):
+    """Take delta_ik S_JL out of A, S being the second Piola-Kirchhoff stress of P and `turning` times G = dJ/dF.
+
+    And what pressure, `turning` < 0, does as the dilatation varies inside of a cell.
+    """
+    for row in range(9):
+        for column in range(9):
+            A[row, column] -= turning / J * G[row // 3, row % 3] * G[column // 3, column % 3]
+    for j in range(3):
+        for m in range(3):
+            S = 0.0
+            for k in range(3):
+                S += G[k, j] * (P[k, m] + turning * G[k, m])
+            for i in range(3):
+                A[3 * i + j, 3 * i + m] -= S / J
 
 
 @kernel
@@ -86,7 +104,8 @@ def _through(constants, D, bulk, finite, F, old, new, P, A, G):
     for _ in range(THROUGH):
         energy = respond(constants, D, F, old, new, P, A)
         J = _dilatation(F, finite, G)
-        _add_volumetric(F, G, finite, bulk * (J - 1.0), bulk, P, A)
+        pressure = bulk * (J - 1.0)
+        _add_volumetric(F, G, pressure, pressure if finite else 0.0, bulk, P, A)
         if not A[8, 8] > 0.0:
             return energy, False
         if abs(P[2, 2]) <= ENOUGH * A[8, 8]:
@@ -161,8 +180,8 @@ def linearise(
     Of its cells, those whose first node it has, it fills the history `new` (n_cells, n_q, 9), the Cauchy `stress`
     (n_cells, n_q, n_components) and `energy` (n_cells, 2): elastic, plastic work. With `bulk` (n_materials, 2): bulk
     modulus of the dilatation projected on `polynomials` (n_q, m), and of the rest. Returns a status and the number of a
-    cell, zero and -1 where all went well. Without `geometric` the tangent leaves out how
-    dJ/dF turns under pressure.
+    cell, zero and -1 where all went well. With `geometric` 2 the tangent is whole; 1 leaves out how dJ/dF turns by pressure,
+    0 the initial-stress stiffness and how dJ/dF turns under tension, so that it is positive semidefinite.
     """
     n_cells, n_nodes = cells.shape
     n_q, dim, m = N.shape[0], points.shape[1], polynomials.shape[1]
@@ -216,13 +235,19 @@ def linearise(
                 own, settled = _through(law, moduli[row], rest, finite, F[q], old[c, q], history, P, A, G)
                 if not settled:
                     return NO_PLANE_STRESS, c
+                if finite and geometric == 0:
+                    _leave_out_initial_stress(G, _dilatation(F[q], finite, G), P, 0.0, A)
             else:
                 own = respond(law, moduli[row], F[q], old[c, q], history, P, A) + 0.5 * rest * (J[q] - 1.0) ** 2
                 pressure = rest * (J[q] - 1.0)
                 for k in range(m if whole > 0.0 else 0):
                     pressure += whole * polynomials[q, k] * coefficients[k]
                 _dilatation(F[q], finite, G)
-                _add_volumetric(F[q], G, geometric, pressure, rest, P, A)
+                turning = pressure if finite and geometric == 2 else 0.0
+                if finite and geometric == 0:
+                    turning = min(pressure, 0.0)
+                    _leave_out_initial_stress(G, J[q], P, turning, A)
+                _add_volumetric(F[q], G, pressure, turning, rest, P, A)
             stored += volume[q] * own
             dissipated += volume[q] * history[7]
             _add_tangent(gradient[q], hoop[q], volume[q], A, product, local)

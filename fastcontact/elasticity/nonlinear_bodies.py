@@ -25,6 +25,8 @@ from fastcontact.mesh.mesh import Mesh
 History = dict[str, Array]
 # Numbers of the history of a quadrature point, see `constitutive_kernels`.
 HISTORY, PLASTIC_STRAIN, ACROSS = 9, 6, 8
+# How much of the geometric stiffness a tangent has, see `NonlinearBodies.at`.
+WHOLE = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,11 +108,12 @@ class NonlinearBodies:
         bulk[projected] = np.column_stack([bulk[:, 1] - rest, np.broadcast_to(rest, len(bulk))])[projected]
         return moduli, bulk
 
-    def at(self, displacement: Array, before: Mapping[str, Array], *, geometric: bool = True) -> DeformedBodies:
+    def at(self, displacement: Array, before: Mapping[str, Array], *, geometric: int = WHOLE) -> DeformedBodies:
         """Return the bodies at `displacement` (n_points, dim) [length], with the history `before` the load step.
 
-        Without `geometric` the tangent has no part of the mean pressure that turns: it is positive definite farther from the
-        solution.
+        The tangent is whole, or as `geometric` says without how the mean pressure turns (1), or without initial-stress
+        stiffness (0): it is then positive definite farther from the solution, and where contact alone keeps a body under load
+        from turning.
 
         Raises
         ------
@@ -120,7 +123,7 @@ class NonlinearBodies:
         mesh, dim, pattern = self.mesh, self.mesh.dim, self._pattern
         data, force = np.zeros((len(pattern.indices), dim, dim)), np.zeros((mesh.n_points, dim))
         history, stress, energy = {}, {}, np.zeros(2)
-        finite = self.finite, self.finite and geometric
+        finite = self.finite, geometric
         flags = self.kinematics == "axisymmetric", self.kinematics == "plane_stress", *finite
         for name, cells in mesh.solids.items():
             N, dN, weights = elements.get(name).tables
@@ -157,7 +160,10 @@ class NonlinearBodies:
 
     def _failure(self, status: int, name: str, cell: int, displacement: Array) -> str:
         where = self.mesh.points[self.mesh.cells[name][cell]].mean(axis=0)
-        what = "turns inside out" if status == body_kernels.INVERTED else "finds no strain across its plane stress"
+        measure = np.linalg.det(self._deformation(name, displacement, slice(cell, cell + 1))[0]).min()
+        what = f"turns inside out (J = {measure:.3g})"
+        if status != body_kernels.INVERTED:
+            what = "finds no strain across its plane stress"
         return (
             f"cell {cell} of {name} near {where} {what}: smaller load steps, or a mesh that is coarser there, may help"
         )
@@ -187,23 +193,28 @@ class NonlinearBodies:
 
     def _stretches(self, name: str, bodies: DeformedBodies, displacement: Array) -> tuple[Array, Array]:
         """Return v / V of cells (n_cells,), and their principal logarithmic strain of largest size."""
-        N, dN, weights = elements.get(name).tables
-        points, u = self.mesh.points[self.mesh.cells[name]], displacement[self.mesh.cells[name]]
-        jacobian = np.einsum("qaj,cai->cqij", dN, points)
-        volume, to_reference = weights * np.linalg.det(jacobian), np.linalg.inv(jacobian)
-        F = np.zeros((*to_reference.shape[:2], 3, 3))
-        F[..., range(3), range(3)] = 1.0
-        dim = self.mesh.dim
-        F[..., :dim, :dim] += np.einsum("qak,cai,cqkj->cqij", dN, u, to_reference)
-        if self.kinematics == "axisymmetric":
-            radius = points[:, :, 0] @ N.T
-            F[..., 2, 2] += (u[:, :, 0] @ N.T) / radius
-            volume *= radius
+        F, volume = self._deformation(name, displacement, slice(None))
         if self.kinematics == "plane_stress":
             F[..., 2, 2] += bodies.history[name][..., ACROSS]
         logarithms = np.log(np.linalg.svd(F, compute_uv=False))
         ratio = (volume * np.exp(logarithms.sum(axis=2))).sum(axis=1) / volume.sum(axis=1)
         return ratio, _farthest(logarithms.reshape(len(F), -1))
+
+    def _deformation(self, name: str, displacement: Array, cells: slice) -> tuple[Array, Array]:
+        """Return F (n_cells, n_q, 3, 3) at quadrature points, without the strain across plane stress, and volumes there."""
+        N, dN, weights = elements.get(name).tables
+        nodes, dim = self.mesh.cells[name][cells], self.mesh.dim
+        points, u = self.mesh.points[nodes], displacement[nodes]
+        jacobian = np.einsum("qaj,cai->cqij", dN, points)
+        volume, to_reference = weights * np.linalg.det(jacobian), np.linalg.inv(jacobian)
+        F = np.zeros((*to_reference.shape[:2], 3, 3))
+        F[..., range(3), range(3)] = 1.0
+        F[..., :dim, :dim] += np.einsum("qak,cai,cqkj->cqij", dN, u, to_reference)
+        if self.kinematics == "axisymmetric":
+            radius = points[:, :, 0] @ N.T
+            F[..., 2, 2] += (u[:, :, 0] @ N.T) / radius
+            volume *= radius
+        return F, volume
 
 
 def _farthest(values: Array) -> Array:

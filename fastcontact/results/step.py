@@ -57,7 +57,8 @@ class ContactResult:
         face nothing themselves, as at the edge of a hole, even where the facets around them press [length].
     pressure : ndarray (m,)
         Contact pressure, >= 0 in compression, per reference area; negative only where tied or bilateral contact pulls. With
-        the shape functions of the facets its integral over the whole reference surface is the sum of the normal forces
+        the shape functions of the facets its integral over the whole reference surface is the sum of the normal forces.
+        In finite strain per area of the deformed surface, in plane stress of unit thickness, as `multiplier` and `shear` are
         [pressure].
     multiplier : ndarray (m,)
         The pressure that the formulation finds at the nodes, before closed nodes take over what open ones have of it, and
@@ -72,7 +73,8 @@ class ContactResult:
         Resultant on the secondary side [force].
     radius : (float, float)
         Bracket of the contact radius, in plane problems the half-width along the `tangent`: from the `middle` to the
-        outermost closed constraint, and to the first open one beyond it [length]; NaN without contact.
+        outermost closed constraint, and to the first open one beyond it [length]; NaN without contact. In finite strain
+        that of the deformed shape.
     shear : ndarray (m, dim)
         Tangential traction on the secondary side, zero without friction or tie [pressure].
     sticking : ndarray of bool (m,)

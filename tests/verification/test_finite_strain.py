@@ -299,3 +299,18 @@ def test_cooks_membrane(element: str, n: int, nu: float, error: float) -> None:
     corner = np.linalg.norm(mesh.points - [48.0, 60.0], axis=1).argmin()
     found = fc.solve(model, 4)[-1].displacement[corner, 1]
     assert found == pytest.approx(7.8270 if nu == 0.3 else 6.9078, rel=error)
+
+
+@pytest.mark.parametrize(("element", "n", "error"), [("quad8", 16, 0.01), ("quad4", 32, 0.03)])
+def test_cooks_membrane_yields(element: str, n: int, error: float) -> None:
+    """Cook's membrane with plastic strains of 2 %, against 32 x 32 cells of quad8: 1.0846."""
+    block = fc.generate.block((1.0, 1.0), (n, n), element)
+    x, y = block.points.T
+    mesh = block.replace(points=np.column_stack([48.0 * x, 44.0 * x + y * (44.0 - 28.0 * x)]))
+    model = fc.Model(mesh, "plane_strain")
+    hardening = [(0.0, 0.243), (0.05, 0.31), (0.2, 0.36), (1.0, 0.47)]
+    model.add_material(fc.ElasticPlastic(E=70.0, nu=1.0 / 3.0, yield_stress=0.243, hardening=hardening))
+    model.fix("LEFT", "xy")
+    model.add_force("RIGHT", y=1.8)
+    corner = np.linalg.norm(mesh.points - [48.0, 60.0], axis=1).argmin()
+    assert fc.solve(model, 6)[-1].displacement[corner, 1] == pytest.approx(1.0846, rel=error)

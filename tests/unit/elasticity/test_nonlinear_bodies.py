@@ -151,3 +151,20 @@ def test_temperatures_and_sensitivities_are_refused() -> None:
     model.add_temperature(20.0)
     with pytest.raises(fc.ModelError, match="temperatures and initial states are there for linear elasticity alone"):
         fc.solve(model, 1)
+
+
+@pytest.mark.parametrize("law", [name for name, (_, strain) in LAWS.items() if strain == "finite"])
+@pytest.mark.parametrize(
+    ("kinematics", "element"), [("plane_strain", "quad4"), ("axisymmetric", "tri6"), ("3d", "hex8")]
+)
+def test_the_tangent_without_initial_stress_is_positive_semidefinite(kinematics: str, element: str, law: str) -> None:
+    model, bodies = single(element, kinematics, *LAWS[law])
+    points = model.mesh.points
+    for squeeze in (-0.15, 0.15):
+        u = squeeze * points + 0.02 * np.random.default_rng(1).normal(size=points.shape)
+        definite = bodies.at(u, bodies.beginning, geometric=0)
+        whole = bodies.at(u, bodies.beginning)
+        values = np.linalg.eigvalsh(definite.K.toarray())
+        assert values[0] >= -1e-12 * values[-1]
+        assert np.abs(definite.K.toarray() - whole.K.toarray()).max() >= 1e-3 * values[-1] * abs(squeeze)
+        assert np.array_equal(definite.force, whole.force)

@@ -1,0 +1,54 @@
+"""Contact results of bodies in finite strain, per area of the deformed surface."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastcontact.contact.formulations import Formulation
+from fastcontact.contact.integration import lumped_areas
+from fastcontact.results.step import ContactResult, half_width
+
+Array = NDArray[np.float64]
+
+
+def on_deformed_surface(pair: Formulation, contact: ContactResult, displacement: Array) -> ContactResult:
+    """Return a contact result with tractions and widths of the deformed shape (Cauchy's in place of nominal ones).
+
+    Tractions keep the force of each node's share of the surface (Nanson's formula, lumped: Bonet and Wood, 2008, equation
+    4.68).
+
+    Parameters
+    ----------
+    pair : Formulation
+    contact : ContactResult
+        Per reference area.
+    displacement : ndarray (n_points, dim)
+        Of the mesh [length].
+    """
+    before, after = (
+        lumped_areas(pair.secondary, points, pair.axisymmetric) for points in (pair.points, pair.points + displacement)
+    )
+    ratio, stretch = before / after, _stretch(contact, displacement[contact.points], before, after)
+    return replace(
+        contact, pressure=contact.pressure * ratio, multiplier=contact.multiplier * ratio,
+        shear=contact.shear * ratio[:, None], radius=(contact.radius[0] * stretch[0], contact.radius[1] * stretch[1]),
+    )  # fmt: skip
+
+
+def _stretch(contact: ContactResult, displacement: Array, before: Array, after: Array) -> tuple[float, float]:
+    """Return how much both ends of the bracket of the contact width have grown [-].
+
+    In space as the square root of the closed area does.
+    """
+    if not contact.active.any():
+        return 1.0, 1.0
+    if contact.coordinates.shape[1] == 3:
+        grown = float(np.sqrt(after[contact.active].sum() / before[contact.active].sum()))
+        return grown, grown
+    moved = displacement[:, 0] if contact.tangent is None else displacement @ contact.tangent
+    widths = (half_width(contact.place, contact.active, contact.across + part * moved) for part in (0.0, 1.0))
+    ratios = [now / then if then > 0.0 and np.isfinite(then) else 1.0 for then, now in zip(*widths, strict=True)]
+    return ratios[0], ratios[1]

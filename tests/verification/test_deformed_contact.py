@@ -1,0 +1,151 @@
+"""Contact in finite strain on the deformed surfaces: patch tests, sliding over facets, rings held by contact alone."""
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from tests.verification.test_finite_strain import LAWS
+
+
+def stack(kinematics: str, element: str, law, **options):
+    """Squeeze two blocks whose cells do not match by 30 %; return the last step and the model."""
+    if kinematics == "3d":
+        lower = fc.generate.box((1.0, 1.0, 0.5), (2, 3, 2), element=element)
+        upper = fc.generate.box((1.0, 1.0, 0.5), (3, 2, 2), element=element)
+        faces, axis = ("ZMIN", "ZMAX"), "z"
+    else:
+        lower = fc.generate.block((1.0, 0.5), (4, 2), element=element)
+        upper = fc.generate.block((1.0, 0.5), (3, 2), element=element)
+        faces, axis = ("BOTTOM", "TOP"), "y"
+    upper = fc.generate.transformed(upper, translate=(*[0.0] * (lower.dim - 1), 0.5))
+    names = {faces[0]: "BASE", faces[1]: "JOINT"}, {faces[0]: "SOLE", faces[1]: "HEAD"}
+    mesh = fc.generate.union(*(fc.generate.renamed(part, own) for part, own in zip((lower, upper), names, strict=True)))
+    model = fc.Model(mesh, kinematics, strain="finite")
+    model.add_material(law)
+    for group, component in (("LEFT", "x"), ("XMIN", "x"), ("YMIN", "y"), ("BASE", axis)):
+        if group in mesh.cell_groups:
+            model.fix(group, component)
+    model.prescribe("HEAD", **{axis: -0.3})
+    model.add_contact("joint", secondary="SOLE", primary="JOINT", **options)
+    return fc.solve(model, 3)[-1], model
+
+
+@pytest.mark.parametrize("law", ["neo-Hookean", "Ogden"])
+@pytest.mark.parametrize(
+    ("kinematics", "element"),
+    [
+        ("plane_strain", "quad4"),
+        ("plane_strain", "tri6"),
+        ("plane_stress", "quad8"),
+        ("axisymmetric", "quad4"),
+        ("3d", "hex8"),
+    ],
+)
+def test_pressure_is_the_true_stress_across(kinematics: str, element: str, law: str) -> None:
+    step, model = stack(kinematics, element, LAWS[law][0])
+    contact, axis = step.contact["joint"], model.mesh.dim - 1
+    stress = step.stress[:, {"3d": 2}.get(kinematics, 1)]
+    assert stress == pytest.approx(stress[0], rel=1e-6)
+    side = model.mesh.points[contact.points, 0].argmax()
+    grown = 1.0 + step.displacement[contact.points[side], 0]
+    # In plane stress pressures are forces per length and unit of thickness before.
+    thickness = step.cell_fields["J"][0] / (0.7 * grown) if kinematics == "plane_stress" else 1.0
+    assert contact.pressure == pytest.approx(-stress[0] * thickness, rel=1e-6)
+    # The true area is larger than that of before, by what the body has grown across.
+    answers = fc.contact_answers(model, [step], "joint")[0]
+    area = {"plane_strain": grown, "plane_stress": grown, "axisymmetric": np.pi * grown**2, "3d": grown**2}[kinematics]
+    assert grown > 1.1
+    assert answers.area == pytest.approx(area, rel=1e-6)
+    assert answers.pressure_mean == pytest.approx(-stress[0] * thickness, rel=1e-6)
+    assert abs(contact.force[axis]) == pytest.approx(-stress[0] * thickness * area, rel=1e-6)
+
+
+def test_the_width_of_a_contact_is_that_of_the_deformed_shape() -> None:
+    step, _ = stack("plane_strain", "quad4", LAWS["neo-Hookean"][0])
+    contact = step.contact["joint"]
+    grown = 1.0 + step.displacement[contact.points, 0].max()
+    assert max(contact.radius[0], 0.0) in (pytest.approx(grown, rel=1e-6), pytest.approx(0.5 * grown, rel=1e-6))
+
+
+@pytest.mark.parametrize(("element", "formulation"), [("quad4", "node_to_segment"), ("quad8", None)])
+@pytest.mark.filterwarnings("ignore:contact 'ball' has only")
+def test_a_ball_slides_over_a_rubber_block(element: str, formulation: str | None) -> None:
+    """Pressed in by a quarter of the height, then the block is drawn on by three facets; friction of 0.5."""
+    mesh = fc.generate.block((4.0, 1.0), (40, 10), element=element, origin=(-2.0, 0.0))
+    model = fc.Model(mesh, "plane_strain", strain="finite")
+    model.add_material(fc.NeoHookean(E=1.0, nu=0.4995))
+    model.fix("BOTTOM", "y")
+    model.prescribe("BOTTOM", x=-0.3, ramp=[(0.0, 0.0), (1.0, 0.0), (2.0, 1.0)])
+    model.add_obstacle(
+        "ball", secondary="TOP", obstacle=fc.obstacles.Sphere((0.0, 1.5), 0.5), friction=0.5, motion={"y": -0.25},
+        ramp=[(0.0, 0.0), (1.0, 1.0), (2.0, 1.0)], formulation=formulation,
+    )  # fmt: skip
+    steps = fc.solve(model, [0.5, 1.0, 1.25, 1.5, 1.75, 2.0])
+    bottom = mesh.points_of("BOTTOM")
+    for step in steps:
+        contact = step.contact["ball"]
+        assert step.reaction[bottom].sum(axis=0) == pytest.approx(
+            -contact.force, abs=1e-6 * np.abs(contact.force).max()
+        )
+        # Normals of the ball at the deformed nodes; shear along the surface, in the cone of friction.
+        out = contact.coordinates + step.displacement[contact.points] - [0.0, 1.5 - 0.25 * min(step.load_factor, 1.0)]
+        out /= np.linalg.norm(out, axis=1)[:, None]
+        closed = contact.active
+        assert contact.normal[closed] == pytest.approx(out[closed], abs=1e-6)
+        assert np.einsum("nd,nd->n", contact.shear, contact.normal)[closed] == pytest.approx(0.0, abs=1e-9)
+    last = steps[-1].contact["ball"]
+    slides = last.active & ~last.sticking
+    assert 2 <= slides.sum() < last.active.sum()
+    if formulation == "node_to_segment":  # where the law holds at nodes
+        shear = np.linalg.norm(last.shear, axis=1)
+        assert shear[slides] == pytest.approx(0.5 * last.pressure[slides], rel=1e-3)
+    # The pull grows in every part of the way; the push falls by the few hundredths that sheared rubber sinks.
+    pull = np.array([step.contact["ball"].force[0] for step in steps[1:]])
+    assert (np.diff(pull) > 0.05).all()
+    assert steps[-1].contact["ball"].force[1] == pytest.approx(steps[1].contact["ball"].force[1], rel=0.08)
+    assert steps[-1].contact["ball"].dissipation > 0.0
+
+
+def ring(free: bool):
+    """Return an O-ring between plates that squeeze it by a quarter: half of it, or all, held by contact alone."""
+    part = fc.generate.quarter_disc("tri6", R=2.5, size=0.5, contact_size=0.5, contact_radius=1.25)
+    part = fc.generate.transformed(part, translate=(0.0, 2.5))
+    mesh = fc.generate.union(part, fc.generate.mirrored(part, "x"))
+    if free:
+        mesh = fc.generate.union(mesh, fc.generate.mirrored(mesh, "y"))
+    mesh = fc.generate.transformed(fc.generate.merge_points(mesh, 1e-6), translate=(25.0, 0.0))
+    model = fc.Model(mesh, "axisymmetric", strain="finite")
+    model.add_material(fc.NeoHookean(E=6.0, nu=0.4995))
+    if free:
+        model.add_obstacle("floor", secondary="CONT1", obstacle=fc.obstacles.HalfSpace((0.0, -2.5), (0.0, 1.0)))
+    else:
+        model.fix("A1B1", "y")
+    plate = fc.obstacles.HalfSpace(point=(0.0, 2.5), normal=(0.0, -1.0))
+    model.add_obstacle("plate", secondary="CONT1", obstacle=plate, motion={"y": -0.625 * (1 + free)})
+    return model
+
+
+@pytest.mark.filterwarnings("ignore:contact .* has only 3 elements")
+def test_a_ring_held_by_contact_alone_is_that_of_symmetry() -> None:
+    """Between plates a ring would roll: its stiffness alone is not definite, and it has more iterations."""
+    half, whole = (fc.solve(ring(free), 2) for free in (False, True))
+    for one, other in zip(half, whole, strict=True):
+        assert other.contact["plate"].force[1] == pytest.approx(one.contact["plate"].force[1], rel=1e-5)
+        assert other.contact["floor"].force[1] == pytest.approx(-other.contact["plate"].force[1], rel=1e-5)
+    # Lindley (1967), of a cord with a diameter of 5; the volume is kept.
+    force = -half[-1].contact["plate"].force[1] / (np.pi * 50.0)
+    assert force == pytest.approx(6.0 * 5.0 * (1.25 * 0.25**1.5 + 50.0 * 0.25**6), rel=0.1)
+    points, moved = (ring(False).mesh.points + part * half[-1].displacement for part in (0.0, 1.0))
+    assert volume(ring(False).mesh, moved) == pytest.approx(volume(ring(False).mesh, points), rel=1e-3)
+
+
+def volume(mesh: fc.Mesh, points: np.ndarray) -> float:
+    """Return the volume of revolution of a mesh with other places."""
+    from fastcontact.mesh import elements
+
+    total = 0.0
+    for name, cells in mesh.solids.items():
+        N, dN, weights = elements.get(name).tables
+        jacobian = np.einsum("qaj,cai->cqij", dN, points[cells])
+        total += (weights * np.linalg.det(jacobian) * (points[cells][:, :, 0] @ N.T)).sum()
+    return 2.0 * np.pi * total
