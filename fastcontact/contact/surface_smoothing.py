@@ -221,9 +221,8 @@ class _Fit:
         size = LOWER ** (i + j).max() * np.sqrt(DAMPING * (columns**2).sum(axis=(1, 2)))
         damping = size[:, None, None] * np.eye(len(i), len(i) + 1)
         # By orthogonal factors: in normal equations what the damping determines would be known to 1e-3 only.
-        R = np.linalg.qr(
-            np.concatenate([np.concatenate([columns, rest[..., None]], axis=2), damping], axis=1), mode="r"
-        )
+        both = np.concatenate([np.concatenate([columns, rest[..., None]], axis=2), damping], axis=1)
+        R: Array = np.asarray(np.linalg.qr(both, mode="r"))
         return replace(self, polynomial=lower * np.linalg.solve(R[:, : len(i), :-1], R[:, : len(i), -1:])[..., 0])
 
     def at(self, plane: Array) -> Array:
