@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.integration import lumped_areas
 from fastcontact.results.step import ContactResult, half_width
-
-Array = NDArray[np.float64]
 
 
 def on_deformed_surface(pair: Formulation, contact: ContactResult, displacement: Array) -> ContactResult:
