@@ -379,3 +379,17 @@ def test_stresses_along_the_normal_of_a_contact_in_the_plane():
     depths = np.concatenate([line.get_xdata() for line in ax.get_lines()])
     assert depths.max() <= 1.0 + 1e-9
     assert depths.max() > 0.1
+
+
+def test_a_slice_of_steps_by_no_whole_numbers(tmp_path):
+    block = fc.Model(fc.generate.block((1.0, 1.0), (1, 1), "quad4"), "plane_strain")
+    with fc.ResultWriter(tmp_path / "a.vtkhdf", block):
+        pass
+    with pytest.raises(fc.FileError, match="needs whole numbers, and steps that are not 0"):
+        fc.open_results(tmp_path / "a.vtkhdf")[0.5:2]
+
+
+def test_axes_that_are_no_numbers():
+    block = fc.Model(fc.generate.block((1.0, 1.0), (1, 1), "quad4"), "plane_strain")
+    with pytest.raises(fc.ModelError, match="returned 'text', which are no numbers"):
+        block.fix("LEFT", "x", axes=lambda points: "text")
