@@ -58,11 +58,9 @@ POINT_FIELDS = {
     "contact_pressure": 1,
     "contact_slip": 3,
     "contact_slip_total": 3,
-    "temperature": 1,
-    "heat_reaction": 1,
 }
-# Those of models that conduct heat alone.
-HEAT_FIELDS = ("temperature", "heat_reaction")
+# Further ones of models that conduct heat.
+HEAT_FIELDS = {"temperature": 1, "heat_reaction": 1}
 # Columns of contact tables that only some pairs have.
 OPTIONAL_COLUMNS = ("wear", "heat_flux")
 
@@ -203,10 +201,12 @@ def contact_slip(mesh: Mesh, step: StepResult, name: str) -> Array:
 def point_fields(mesh: Mesh, step: StepResult) -> dict[str, Array]:
     """Return the point data of a step by name, padded to the components of `POINT_FIELDS`."""
     values = {name: getattr(step, name) for name in POINT_FIELDS if not name.startswith("contact_")}
-    values = {name: own for name, own in values.items() if own is not None}
+    values |= {name: getattr(step, name) for name in HEAT_FIELDS if getattr(step, name) is not None}
     values["contact_pressure"] = contact_pressure(mesh, step)
     values |= {f"contact_{name}": contact_slip(mesh, step, name) for name in ("slip", "slip_total")}
-    return {name: padded(values[name], width) for name, width in POINT_FIELDS.items() if name in values}
+    return {
+        name: padded(values[name], width) for name, width in {**POINT_FIELDS, **HEAT_FIELDS}.items() if name in values
+    }
 
 
 def point_flags(mesh: Mesh) -> dict[str, Flags]:

@@ -336,7 +336,7 @@ class Results(Sequence[StepResult]):
     @property
     def point_field_names(self) -> list[str]:
         """Names of the point fields that change from step to step: earlier versions wrote fewer."""
-        return [name for name in layout.POINT_FIELDS if name in self._file["VTKHDF/PointData"]]
+        return [name for name in (*layout.POINT_FIELDS, *layout.HEAT_FIELDS) if name in self._file["VTKHDF/PointData"]]
 
     @property
     def cell_field_names(self) -> list[str]:

@@ -48,7 +48,7 @@ def write_geometry(
     _packed(root, "Offsets", cells.offsets)
     _packed(root, "Types", cells.types)
     point_data, cell_data = root.create_group("PointData"), root.create_group("CellData")
-    widths = {name: k for name, k in layout.POINT_FIELDS.items() if heat or name not in layout.HEAT_FIELDS}
+    widths = layout.POINT_FIELDS | (layout.HEAT_FIELDS if heat else {})
     names = tuple(widths)
     for name, width in widths.items():
         _growing_field(point_data, name, mesh.n_points, width)

@@ -99,7 +99,7 @@ def _geometry(grid: Node, reference: str, sizes: dict[str, int]) -> None:
 
 def _field(grid: Node, address: str, n_points: int, number: int, n_steps: int) -> None:
     name = address.rpartition("/")[2]
-    width, rows = layout.POINT_FIELDS[name], n_points * n_steps
+    width, rows = {**layout.POINT_FIELDS, **layout.HEAT_FIELDS}[name], n_points * n_steps
     parts = [(name, 0, width)]  # label, first column and number of columns of each field
     if name == "stress":  # XDMF orders the components of a symmetric tensor otherwise than VTK: each is a field
         parts = [(f"stress_{component}", column, 1) for column, component in enumerate(STRESS_COMPONENTS)]
