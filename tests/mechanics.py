@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 import fastcontact as fc
-from fastcontact.analysis.contact_answers import lumped_areas
+from fastcontact.contact.integration import lumped_areas
 from fastcontact.contact.surface import surface
 from fastcontact.elasticity.stiffness import stiffness
 
