@@ -64,6 +64,8 @@ class StepLoad:
         By contact pair, by how much its rigid obstacle has turned, where one does [radian].
     following : tuple of float
         What pressures that follow the surface are multiplied with.
+    fluids : dict of str to float
+        By contact pair, the pressure of the fluid at its source [pressure].
     """
 
     lift: Array
@@ -72,6 +74,7 @@ class StepLoad:
     clearance_factors: Mapping[str, float]
     angles: Mapping[str, float] = field(default_factory=dict)
     following: tuple[float, ...] = ()
+    fluids: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +158,11 @@ class Problem:
                 clearances[pair.name] = multiplier(pair.clearance_ramp, self.ramp, instant)
         force = combined(self.forces, self.ramp, instant, self.shape).ravel()
         following = tuple(multiplier(table, self.ramp, instant) for _, table in self.following)
-        return StepLoad(lift, force, obstacles, clearances, angles, following)
+        fluids = {
+            pair.name: pair.fluid.pressure * multiplier(pair.fluid.ramp, self.ramp, instant)
+            for pair in self.model.contact if pair.fluid is not None
+        }  # fmt: skip
+        return StepLoad(lift, force, obstacles, clearances, angles, following, fluids)
 
     def factors(self, histories: Iterable[Temperature | InitialState], instant: float) -> list[float]:
         """Return what temperatures or initial states of the model are multiplied with at an instant of the ramp [-]."""
@@ -196,6 +203,8 @@ class Problem:
             load.angles.get(name, 0.0),
             state.angles.get(name, 0.0),
             self._worn(name, state),
+            state.bonds.get(name),
+            load.fluids.get(name, 0.0),
         )
 
     def _worn(self, name: str, state: State) -> Array | None:
@@ -268,10 +277,11 @@ def prepare(
     held = HeldMotions.of(supported, stacked_rows(model.relations, model.n_dofs))
     pairs = {pair.name: model.bind(pair, held) for pair in model.contact}
     for name, pair in pairs.items():
-        if criteria.keep_pairing and isinstance(pair.options.penalty, OverclosureLaw):
+        table = isinstance(pair.options.penalty, OverclosureLaw)
+        if criteria.keep_pairing and (table or pair.options.cohesion is not None or pair.options.source is not None):
             raise ContactError(
-                f"the penalty of contact '{name}' is a table, which updates of the geometry follow: leave "
-                "keep_pairing out"
+                f"contact '{name}' has a table of penalties, a cohesive layer, adhesion, or a fluid, which updates of the "
+                "geometry follow: leave keep_pairing out"
             )
     solver = choice.make(
         linear_solver, dim=mesh.dim, n_dofs=model.n_dofs, precision=linear_precision,

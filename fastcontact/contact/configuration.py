@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.contact.cohesion import Bond
 from fastcontact.contact.obstacles.rigid_side import Stance
 
 Array = NDArray[np.float64]
@@ -37,6 +38,12 @@ class Configuration:
         By which a rigid obstacle has turned, likewise [radian].
     worn : ndarray (n_points,), optional
         Depth worn off at the secondary nodes before the load step [length]; None for nothing.
+    bond : Bond, optional
+        The cohesive layer at the end of the load step before; None where there is none, or none yet.
+    fluid_pressure : float
+        Of the fluid at its source [pressure].
+    pressure : ndarray (n_nodes,), optional
+        What the last pairing has found at the secondary nodes, fluid included [pressure]; None before.
     """
 
     displacement: Array
@@ -49,6 +56,9 @@ class Configuration:
     angle: float = 0.0
     angle_start: float = 0.0
     worn: Array | None = None
+    bond: Bond | None = None
+    fluid_pressure: float = 0.0
+    pressure: Array | None = None
 
     @property
     def stance(self) -> Stance:

@@ -84,6 +84,20 @@ class NodalField(Protocol):
         return None
 
 
+class Wetted(Protocol):
+    """Where fluid has come; see `fluid_pressure.Wetted`."""
+
+    @property
+    def rows(self) -> Mask:
+        """Constraints (m,)."""
+        ...
+
+    @property
+    def pressure(self) -> Array:
+        """Of the fluid at the secondary nodes (n_nodes,) [pressure]."""
+        ...
+
+
 class Tied(Protocol):
     """Linear equations in the place of contact; see `tied.TiedPair`."""
 
@@ -133,6 +147,8 @@ class Constraints:
         Constraints that supports and obstacles move past the other side by themselves; None stands for none.
     law : OverclosureLaw, optional
         Of which `gap0` and `softness` are a line.
+    wetted : Wetted, optional
+        Where fluid has come between the sides.
     areas : ndarray (m,), optional
         Area that each constraint stands for [area]; infinite where it does nothing.
     nodes : ndarray of int (m,), optional
@@ -140,7 +156,7 @@ class Constraints:
     nodal : NodalField, optional
         What normal forces mean at the secondary nodes.
     tied : Tied, optional
-        Where the constraints are the equations of a tied pair.
+        Where the constraints are the equations of a tied pair, or of a cohesive layer.
     """
 
     B: csr_array
@@ -162,6 +178,7 @@ class Constraints:
     tied: Tied | None = None
     driven: Mask | None = None
     law: OverclosureLaw | None = None
+    wetted: Wetted | None = None
 
     def __len__(self) -> int:
         return len(self.gap0)
@@ -216,6 +233,10 @@ class Constraints:
         """Return the normal forces (m,) at the places of the formulation [force]."""
         return multiplier if self.tied is None else self.tied.forces(multiplier)[0]
 
+    def contact_forces(self, multiplier: Array) -> Array:
+        """Return multipliers (m,) without those of fluid [force]."""
+        return multiplier if self.wetted is None else np.where(self.wetted.rows, 0.0, multiplier)
+
     def pressure(self, multiplier: Array) -> Array:
         """Return nodal pressures (n_nodes,) per reference area from the multipliers (m,) [pressure]."""
         assert self.nodal is not None
@@ -224,6 +245,8 @@ class Constraints:
     def initially_active(self, u: Array, pressure: Array) -> Mask | None:
         """Return the set (m,) to start from; see `NodalField`. `u` (n_dofs,) are displacements [length]."""
         assert self.nodal is not None
+        if self.tied is not None and self.equality is not None:
+            return self.equality | (self.gap0 + self.B @ u < 0.0)
         return self.nodal.initially_active(self.gap0 + self.B @ u, pressure)
 
 

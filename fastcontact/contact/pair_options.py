@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, diags_array, eye_array
 
+from fastcontact.contact.cohesion import CohesiveLaw
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.contact.pairing import Candidates, Pairing, normals
 from fastcontact.contact.projection import places
@@ -48,6 +49,10 @@ class PairOptions:
     search_distance : float, optional
         What is farther off, or deeper inside, now and as the load step begins, is not faced [length]; None: at any
         distance.
+    cohesion : CohesiveLaw, optional
+        Of tension between the sides; None: there is none.
+    source : ndarray of bool (n_points,), optional
+        Nodes that fluid comes from; None: there is none.
     same_place : ndarray of int (n_points,), optional
         For each node, the one whose multiplier it has, too, where the model repeats itself; None where it does not.
     """
@@ -62,6 +67,8 @@ class PairOptions:
     tangential_penalty: Field | None = None
     search_distance: float | None = None
     wear: float | None = None
+    cohesion: CohesiveLaw | None = None
+    source: Mask | None = None
     same_place: NDArray[np.intp] | None = None
 
     @property

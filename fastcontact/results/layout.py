@@ -72,6 +72,9 @@ XDMF_TYPES = {
     **{24: 0x26, 27: 0x27, 26: 0x28, 32: 0x29, 25: 0x30, 29: 0x32},  # tet10, pyramid13, wedge15, wedge18, hex20, hex27
 }
 
+# What the secondary nodes of some contact pairs have beside.
+OPTIONAL = ("wear", "damage", "fluid_pressure")
+
 STEP_ROW = np.dtype([("index", "<i8"), ("load_factor", "<f8"), ("notes_first", "<i8"), ("notes_count", "<i8")])
 
 # Where the rows of nodal stress by material of a step stand.
@@ -86,9 +89,10 @@ def restart_table(number: int) -> str:
     return f"restart{number % 2}"
 
 
-def contact_row(dim: int, wears: bool = False) -> np.dtype[Any]:
-    """Return the type of one row of a contact table: one secondary node in one step; with depth where the pair `wears`."""
-    names = ("abscissa", "place", "gap", "pressure", "multiplier", *(("wear",) if wears else ()))
+def contact_row(dim: int, contact: ContactResult | None = None) -> np.dtype[Any]:
+    """Return the type of one row of a contact table: one secondary node in one step, with what a `contact` has beside."""
+    beside = [name for name in OPTIONAL if contact is not None and getattr(contact, name) is not None]
+    names = ("abscissa", "place", "gap", "pressure", "multiplier", *beside)
     scalars = [(name, "<f8") for name in names]
     vectors = [
         (name, "<f8", (dim,)) for name in ("coordinates", "force_vectors", "normal", "shear", "slip", "slip_total")
@@ -258,7 +262,7 @@ def check_step(mesh: Mesh, step: StepResult, cell_fields: Iterable[str]) -> None
 
 def check_contact(where: str, contact: ContactResult, mesh: Mesh) -> None:
     """Refuse the state of a pair whose arrays do not fit one another or name points that are not in the mesh."""
-    row = contact_row(mesh.dim, contact.wear is not None)
+    row = contact_row(mesh.dim, contact)
     for name in row.names or ():
         found, shape = np.shape(getattr(contact, name)), (len(contact.points), *row[name].shape)
         if found != shape:

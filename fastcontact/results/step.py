@@ -99,6 +99,10 @@ class ContactResult:
         axisymmetry, in 3D, and on a ring that is pressed all round.
     wear : ndarray (m,), optional
         Depth worn off so far, with the option ``wear`` [length]; the next load step begins with it. None without.
+    damage : ndarray (m,), optional
+        Of the cohesive layer with the option ``cohesion``, 0 as new, 1 broken [-]. None without.
+    fluid_pressure : ndarray (m,), optional
+        Of fluid that has come to the nodes [pressure]. None where `Model.add_fluid_pressure` names no source.
     slip, slip_total : ndarray (m, dim)
         Relative tangential displacement of closed nodes over what they face, in this step and the sum of all steps so far;
         zero at nodes that friction holds, and for the step at open ones [length]. NaN in files from before it was told.
@@ -133,6 +137,8 @@ class ContactResult:
     obstacle_angle: float | None = None
     torque: float | None = None
     wear: Array | None = None
+    damage: Array | None = None
+    fluid_pressure: Array | None = None
     slip: Array = None  # type: ignore[assignment]
     slip_total: Array = None  # type: ignore[assignment]
 
@@ -319,7 +325,8 @@ class StepResult:
 
         ``strain_energy``, of springs of the model, too, and of temperatures as if they were forces; ``plastic_work``;
         ``external_work``, of loads, supports and obstacles; ``friction_work``; ``friction_while_touching``, what of it nodes
-        do in the step in which they close, which is too large in long steps; ``penalty_energy``, of springs at contacts;
+        do in the step in which they close, which is too large in long steps; ``penalty_energy``, of springs at contacts
+        and of layers that are stretched; ``energy_released``, what breaking these has taken, as their law has it;
         ``imbalance``, the external work less all others. Empty in files from before it was told, and behind steps of these.
         """
         return dict(self.iterations.get("work", {}))

@@ -197,7 +197,7 @@ def append_tables(
     own = file["fastcontact"]
     for name in step.contact:
         if name not in pairs:
-            pairs[name] = _new_pair(own["contact"], name, mesh.dim, step.contact[name].wear is not None)
+            pairs[name] = _new_pair(own["contact"], name, mesh.dim, step.contact[name])
     for name, pair in pairs.items():
         _append_contact(pair, number, step.contact.get(name))
     if step.material_stress is not None:
@@ -261,10 +261,10 @@ def step_size(mesh: Mesh, step: StepResult) -> int:
     return int(1.01 * fields) + contact + len(as_json([step.iterations, step.warnings]))
 
 
-def _new_pair(parent: Any, name: str, dim: int, wears: bool) -> Any:
+def _new_pair(parent: Any, name: str, dim: int, contact: ContactResult) -> Any:
     pair = parent.create_group(None)  # without a name until it is whole: the program may be interrupted
     pair["name"] = as_json(name)
-    growing_table(pair, "rows", layout.contact_row(dim, wears))
+    growing_table(pair, "rows", layout.contact_row(dim, contact))
     growing_table(pair, "primary", layout.primary_row(dim))
     growing_table(pair, "steps", layout.contact_step(dim))
     parent[str(len(parent))] = pair

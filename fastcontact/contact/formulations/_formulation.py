@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from fastcontact.contact.cohesive_layer import bonded
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Compliance, Constraints
 from fastcontact.contact.held_motions import TOGETHER, HeldMotions, distinct_directions
@@ -123,6 +124,12 @@ class Formulation(ABC):
         return Smoothing.of(self.secondary, self.primary, self.points)
 
     @property
+    def slides(self) -> bool:
+        """Whether what the sides do along each other counts."""
+        cohesion = self.options.cohesion
+        return bool(self.friction) or self.options.tied or not (cohesion is None or cohesion.reversible)
+
+    @property
     def eliminable(self) -> bool:
         """Whether iterative solvers can eliminate closed constraints; penalties, which are springs, do not prevent it."""
         return True
@@ -154,14 +161,23 @@ class Formulation(ABC):
         """
         if self.tied is not None:
             return self.tied.constraints()
-        part = self._softened(self.unilateral(at), at)
+        part = self.unilateral(at)
+        if self.options.cohesion is None:
+            part = self._softened(part, at)
         if self.options.gap_only:
             return part.without(np.ones(len(part), bool))
         if self.options.search_distance is not None:
             # Also as the step begins: what this iterate lets through by itself is not out of reach.
             away = np.minimum(np.abs(part.gaps(at.displacement)), np.abs(part.gaps(at.start)))
             part = part.without(away > self.options.search_distance)
-        return replace(part, equality=self.never_opening(part.positions, at))
+        if self.options.cohesion is not None:
+            return bonded(self.options.cohesion, part, at, self._lying(part.positions))
+        part = replace(part, equality=self.never_opening(part.positions, at))
+        if self.options.source is None:
+            return part
+        from fastcontact.contact.fluid_pressure import wetted
+
+        return wetted(part, at, self.secondary, self.options.source[self.secondary.points], self.points)
 
     def _softened(self, part: Constraints, at: Configuration) -> Constraints:
         """Return constraints that give way by penalties along the normal and along the tangents, where there are any."""
@@ -182,6 +198,19 @@ class Formulation(ABC):
             before = _at_places(at.traction, part.positions)
             elastic = np.stack([-give * np.einsum("md,md->m", t, before) for t in part.directions])
         return replace(part, tangential_softness=give / areas, elastic_slip=elastic)
+
+    def _lying(self, positions: Array) -> Array:
+        """Return the gaps of the bodies as they lie at reference places (m, dim) [length], at which layers are made."""
+        assert self.options.cohesion is not None
+        if self.options.cohesion.reversible:
+            return np.zeros(len(positions))
+        return np.asarray(_at_places(self._gaps_as_they_lie, positions))
+
+    @cached_property
+    def _gaps_as_they_lie(self) -> tuple[Array, Array]:
+        """Places (m, dim) of constraints on the bodies before any load, and their gaps (m,) [length]."""
+        part = self.unilateral(Configuration.undeformed(self.points))
+        return part.positions, part.gap0
 
     @cached_property
     def tied(self) -> TiedPair | None:
@@ -233,7 +262,7 @@ class Formulation(ABC):
         B, gap0 = gap_rows(candidates, pairing, self.primary, self.points)
         gap0 += self.added_gap(candidates, pairing, at) - self.overlap_of_smooth(candidates, pairing, at)
         positions = candidates.positions(self.points)
-        if not (self.friction or self.options.tied):
+        if not self.slides:
             return Constraints(B, gap0, positions, compliance)
         directions, rubbing = self.options.rubbing(tangents(pairing.normal), candidates)
         along, drift = self.slips(candidates, pairing, rubbing, at)

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fastcontact.contact.default_formulation import against_obstacle, default_formulation
 from fastcontact.contact.formulations import FORMULATIONS, Formulation
@@ -18,12 +19,13 @@ from fastcontact.contact.found_contacts import FoundContacts, find_contacts, not
 from fastcontact.contact.held_motions import HeldMotions
 from fastcontact.contact.obstacles import MeshedSurface, Obstacle
 from fastcontact.contact.obstacles.rigid_side import RigidSide
+from fastcontact.contact.pair_options import PairOptions
 from fastcontact.contact.side_checks import check_obstacle, check_sides
 from fastcontact.contact.surface import Surface, surface
 from fastcontact.elasticity.loads import Value, axes_of, check_number
 from fastcontact.errors import ContactError, ModelError, unknown
 from fastcontact.mesh.argument_types import check_fields, typed
-from fastcontact.model.contact_pair import AGAINST_OBSTACLES, ContactPair, Driving, method
+from fastcontact.model.contact_pair import AGAINST_OBSTACLES, ContactPair, Driving, FluidPressure, method
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
 from fastcontact.model.obstacle_rotation import rotation_of
 from fastcontact.model.pair_options import SHARED_OPTIONS, pair_options
@@ -150,6 +152,37 @@ class ModelContact(ModelConnections):
         return FoundContacts(self.mesh, tuple(added))
 
     @typed(ModelError)
+    def add_fluid_pressure(self, contact: str, pressure: float, *, source: str, ramp: History = None) -> None:
+        """Let fluid press the sides of a contact pair apart wherever they are open and connected with its source.
+
+        It enters where the sides have a gap, or press on each other by no more than the fluid does, and comes on from facet to
+        facet. There it acts on both sides along the normal of the contact; results tell where, and ``pressure`` is what
+        the sides press on each other elsewhere. What fluid does to other surfaces are loads, see `add_pressure`.
+
+        Parameters
+        ----------
+        contact : str
+            Name of a pair, or of an obstacle.
+        pressure : float
+            At multiplier 1 [pressure].
+        source : str
+            A group with nodes of the secondary side, from which the fluid comes: its edge, or all of it.
+        ramp : Ramp or iterable of (float, float), optional
+            A history of its own.
+        """
+        check_number(f"the fluid pressure in contact '{contact}'", pressure)
+        if pressure < 0.0:
+            raise ModelError(f"the fluid pressure {pressure} in contact '{contact}' must not be negative")
+        names = [pair.name for pair in self.contact]
+        if contact not in names:
+            raise ModelError(unknown("contact", contact, names))
+        fluid = FluidPressure(float(pressure), source, table_of(ramp, f"the ramp of the fluid in contact '{contact}'"))
+        place = names.index(contact)
+        changed = dataclasses.replace(self.contact[place], fluid=fluid)
+        self.bind(changed)
+        self.contact[place] = changed
+
+    @typed(ModelError)
     def add_obstacle(
         self,
         name: str,
@@ -206,6 +239,24 @@ class ModelContact(ModelConnections):
         self._add_pair(
             ContactPair(name, secondary, "", formulation, options, obstacle, displacement, history, driving, *turned)
         )
+
+    def _source(self, pair: ContactPair, side: Surface, options: PairOptions) -> NDArray[np.bool_] | None:
+        """Return the nodes (n_points,) that the fluid in a pair comes from, None where there is none."""
+        if pair.fluid is None:
+            return None
+        mask = np.zeros(self.mesh.n_points, bool)
+        mask[self.mesh.points_of(pair.fluid.source)] = True
+        if not mask[side.points].any():
+            raise ContactError(
+                f"the source '{pair.fluid.source}' of the fluid in contact '{pair.name}' has no nodes of the secondary side "
+                f"'{side.group}': name a group that has"
+            )
+        if options.kind != "unilateral" or options.cohesion is not None:
+            raise ContactError(
+                f"contact '{pair.name}' is {options.kind if options.cohesion is None else 'cohesive'}, which lets no fluid in: "
+                "name another pair"
+            )
+        return mask
 
     def _facet_kinds(self, group: str) -> tuple[list[str], bool]:
         """Return the kinds of facets of a group, and whether linear triangles or tetrahedra alone have them."""
@@ -283,5 +334,7 @@ class ModelContact(ModelConnections):
         axisymmetric = self.kinematics == "axisymmetric"
         # Tangential fields that turn from one end to the other are not one field of components.
         seams = [seam for seam in self.seams if seam.turn is None or not pair.options.get("friction")]
-        options = dataclasses.replace(options, same_place=same_place(seams, self.mesh.n_points))
+        options = dataclasses.replace(
+            options, same_place=same_place(seams, self.mesh.n_points), source=self._source(pair, secondary, options)
+        )
         return kind(secondary, primary, self.mesh.points, axisymmetric, modulus, options=options, held=held, **own)
