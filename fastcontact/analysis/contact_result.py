@@ -138,7 +138,7 @@ def _along_the_surface(
 ) -> _AlongTheSurface:
     """Return what a pair does along its surface: nothing without friction or tie."""
     multiplier, everywhere = solution.multiplier[rows], np.ones(len(normal), bool)
-    if part.tied is not None:
+    if part.tied is not None and part.tied.directions:
         _, tangential = part.tied.forces(multiplier)
         shear = _nodal_shear(part, part.tied.directions, tangential, normal)
         return _AlongTheSurface(np.where(found.nodes[:, None], shear, 0.0), everywhere)

@@ -66,12 +66,12 @@ def keep_path(
             told[name] = replace(told[name], wear=worn[name].depth)
         if name in end.bonds:
             told[name] = replace(told[name], damage=end.bonds[name].at(contact.coordinates)[1])
-        if not (pair.options.tied or pair.options.gap_only):
+        elif not (pair.options.tied or pair.options.gap_only):
             given = part, settled.solution, rows, at, contact, start.forces.get(name)
             forces[name], found = contact_work(pair, *given)
             told[name] = replace(told[name], dissipation=found[0])
             works += found
-    stored = sum(own.stored for own in forces.values())
+    stored = sum(own.stored for own in forces.values()) + sum(own.stored for own in end.bonds.values())
     released = sum(own.released for own in end.bonds.values())
     work = None if start.work is None else start.work.after(energy, stored, works.tolist(), released)
     return replace(end, worn=worn, slipped=slipped, forces=forces, work=work), told

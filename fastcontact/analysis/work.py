@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 
 from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
-from fastcontact.contact.cohesive_layer import Layer
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations import Formulation
@@ -165,8 +164,6 @@ def contact_work(
         tangents, slip, directions = solution.tangential[rows], solution.slip[rows], np.stack(part.directions, axis=1)
     force, moved = (np.einsum("mk,mkd->md", values, directions) for values in (tangents, slip))
     now = _forces(pair, part, normal, tangents, force, contact, _added(pair, at, contact))
-    if isinstance(part.tied, Layer):  # the law says what work its forces take, whatever the path in between
-        return now, (0.0, 0.0, 0.0)
     before = before or _nothing(now)
     areas = _areas(part)
     pressure, traction = before.at(part.positions)

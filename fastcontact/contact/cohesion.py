@@ -1,8 +1,9 @@
 """Tension between the sides of a contact pair, up to a limit beyond which it falls: cohesive layers, and adhesion.
 
-Traction is ``(1 - damage) stiffness`` times the opening and the sliding of the sides (Camanho and Davila, NASA/TM-2002-211737,
-with the mixed-mode limits of Turon, Camanho, Costa and Davila, 2006, eqs. 24 and 28). Damage grows so that the traction falls
-linearly with the largest separation; unloading follows the secant. What is pressed together gives way by the full stiffness.
+Traction is ``(1 - damage) stiffness`` times the opening and the sliding of the sides (Camanho and Davila,
+NASA/TM-2002-211737, with the mixed-mode limits of Turon, Camanho, Costa and Davila, 2006). Damage grows so that the traction
+falls linearly with the largest separation; unloading follows the secant. What is pressed together gives way by the full
+stiffness.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ class CohesiveLaw:
     reversible: bool = False
 
     def limits(self, opening: Array, sliding: Array) -> tuple[Array, Array]:
-        """Return the separations (m,) at which damage begins and at which it is complete, by the ratio of the modes [length]."""
+        """Return the separations (m,) at which damage begins and ends, by the ratio of opening and sliding (m,) [length]."""
         normal, shear = self.strength / self.stiffness, self.shear_strength / self.stiffness
         square = np.maximum(opening, 0.0) ** 2 + sliding**2
         mixed = np.divide(sliding**2, square, out=np.zeros_like(square), where=square > 0.0) ** self.exponent
@@ -86,13 +87,16 @@ class Bond:
     damage : ndarray (m,)
         0 as new, 1 broken [-].
     released : float
-        Energy that breaking has taken so far [energy].
+        Energy that breaking has taken so far [energy]; of adhesion that of the law less `stored`.
+    stored : float
+        Energy of the springs that are left [energy].
     """
 
     positions: Array
     sliding: Array
     damage: Array
     released: float = 0.0
+    stored: float = 0.0
 
     def at(self, positions: Array) -> tuple[Array, Array]:
         """Return sliding (n, dim) [length] and damage (n,) at the nearest of other places (n, dim) [length]."""

@@ -1,7 +1,7 @@
-"""A cohesive layer between the sides of a contact pair: equations that give way by the secants of its law.
+"""A cohesive layer between the sides of a contact pair: equations that give way by lines of its law.
 
-In each pairing the traction is a line of positive slope, the secant: the energy of a layer is concave in the square of the
-separation, so that the quadratic function of the secant lies above it, and every pairing lowers the energy.
+In each pairing the traction is a line: through zero where the layer has not been stretched as far before, and level where it
+falls. Matrices so stay positive definite, and pairings approach every state that is stable under prescribed displacements.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 
 Array = NDArray[np.float64]
+# Slope of the line where the traction falls, by the stiffness of the layer.
+LEVEL = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +35,9 @@ class Layer:
     before : Bond
         At the beginning of the load step.
     damage : ndarray (m,)
-        That the rows give way by [-].
+        At which the law is linearised [-].
+    rest : ndarray (1 + k, m)
+        Separations at which the lines of the law have no traction [length].
     """
 
     law: CohesiveLaw
@@ -41,6 +45,7 @@ class Layer:
     areas: Array
     before: Bond
     damage: Array
+    rest: Array
 
     def forces(self, multiplier: Array) -> tuple[Array, Array]:
         """Return normal (m,) and tangential (m, k) forces [force]."""
@@ -49,26 +54,33 @@ class Layer:
 
     def after(self, part: Constraints, u: Array) -> Bond:
         """Return the layer at the end of a step with displacements u (n_dofs,) [length]."""
-        opening, *along = (part.gap0 + part.B @ u).reshape(-1, len(self.damage))
-        slides = np.stack(along) if along else np.zeros((0, len(opening)))
+        opening, *slides = (part.gap0 + part.B @ u).reshape(-1, len(self.damage)) + self.rest
         sliding = sum((s[:, None] * t for s, t in zip(slides, self.directions)), np.zeros_like(self.before.sliding))
-        size, law = np.sqrt((slides**2).sum(axis=0)), self.law
-        if law.reversible:
-            return replace(self.before, damage=self.damage)
-        grown = law.released(opening, size, self.damage) - law.released(opening, size, self.before.damage)
+        size, law = np.linalg.norm(sliding, axis=1), self.law
         areas = np.where(np.isfinite(self.areas), self.areas, 0.0)
-        return Bond(self.before.positions, sliding, self.damage, self.before.released + float(areas @ grown))
+        whole = np.where(self.damage < 1.0, 1.0 - self.damage, 0.0)
+        stretched = np.where(opening < 0.0, 1.0, whole) * opening**2 + whole * size**2
+        grown = law.released(opening, size, self.damage) - law.released(opening, size, self.before.damage)
+        released = self.before.released + float(areas @ grown)
+        return Bond(
+            self.before.positions, sliding, self.damage, released, 0.5 * law.stiffness * float(areas @ stretched)
+        )
 
 
-def bonded(law: CohesiveLaw, part: Constraints, at: Configuration, lying: Array | float) -> Constraints:
-    """Return constraints `part`, with tangents, as a cohesive layer: equations that give way by its secants.
+def bonded(law: CohesiveLaw, part: Constraints, at: Configuration, lying: Array) -> Constraints:
+    """Return constraints `part`, with tangents, as a cohesive layer: equations that give way by lines of its law.
 
-    `lying` (m,) are the gaps at which the layer is without traction [length]. What is broken may close again, and gives way
-    by the full stiffness then.
+    `lying` (m,) are the gaps of the bodies as they lie [length]: cohesive layers have no traction there, adhesion acts across
+    them. What is broken may close again, and gives way by the full stiffness then.
     """
     assert part.areas is not None
     m, u, start = len(part), at.displacement.ravel(), at.start.ravel()
-    before = at.bond or Bond(part.positions, np.zeros_like(part.positions), np.zeros(m))
+    none = np.zeros(m)
+    before = at.bond
+    if before is None:
+        begun = law.damage(lying, none, none) if law.reversible else none
+        before = Bond(part.positions, np.zeros_like(part.positions), begun)
+    lying = none if law.reversible else lying
     sliding, damage = before.at(part.positions)
     before = Bond(part.positions, sliding, damage, before.released)
     drifts = np.zeros((len(part.tangents), m)) if part.drift is None else part.drift
@@ -76,19 +88,25 @@ def bonded(law: CohesiveLaw, part: Constraints, at: Configuration, lying: Array 
     along = [drift + np.einsum("md,md->m", t, sliding) - T @ start for T, t, drift in known]
     slides = [rest + T @ u for T, rest in zip(part.tangents, along, strict=True)]
     opening = part.gaps(at.displacement) - lying
-    damage = law.damage(opening, np.sqrt(sum((s**2 for s in slides), np.zeros(m))), damage)
-    whole, stiffness = damage < 1.0, law.stiffness * part.areas
-    secant = np.where(whole, 1.0 - damage, 1.0) * stiffness
-    pressed = np.where(opening < 0.0, stiffness, secant)
-    layer = Layer(law, part.directions, part.areas, before, damage)
+    damage = law.damage(opening, np.sqrt(sum((s**2 for s in slides), none)), damage)
+    if at.bond is not None and np.array_equal(
+        u, start
+    ):  # an obstacle has moved, and the body follows in this pairing only
+        damage = np.minimum(damage, before.damage)
+    whole, now = damage < 1.0, np.stack([opening, *slides])
+    secant = np.tile(np.where(whole, 1.0 - damage, 1.0), (len(now), 1))
+    secant[0, opening < 0.0] = 1.0
+    falls = whole & (damage > (0.0 if law.reversible else before.damage)) & (secant > LEVEL)
+    slope = np.where(falls, LEVEL, secant)
+    layer = Layer(law, part.directions, part.areas, before, damage, now * (1.0 - secant / slope))
     return replace(
         part,
         B=csr_array(vstack([part.B, *part.tangents], format="csr")),
-        gap0=np.concatenate([part.gap0 - np.where(whole, lying, 0.0), *along]),
-        equality=np.tile(whole, 1 + len(along)),
-        softness=1.0 / np.concatenate([pressed, *[secant] * len(along)]),
-        positions=np.tile(part.positions, (1 + len(along), 1)),
-        areas=np.tile(part.areas, 1 + len(along)),
-        nodes=None if part.nodes is None else np.tile(part.nodes, 1 + len(along)),
+        gap0=np.concatenate([part.gap0 - np.where(whole, lying, 0.0), *along]) - layer.rest.ravel(),
+        equality=np.tile(whole, len(now)),
+        softness=1.0 / (slope * law.stiffness * part.areas).ravel(),
+        positions=np.tile(part.positions, (len(now), 1)),
+        areas=np.tile(part.areas, len(now)),
+        nodes=None if part.nodes is None else np.tile(part.nodes, len(now)),
         compliance=None, tangents=(), directions=(), drift=None, friction=None, tied=layer,
-    ).without(np.concatenate([np.zeros(m, bool), *[~whole] * len(along)]))  # fmt: skip
+    ).without(np.concatenate([none > 0.0, *[~whole] * len(along)]))  # fmt: skip

@@ -69,6 +69,13 @@ class NodalField(Protocol):
         """
         return self.over_whole_side(force) * self.nodal_areas
 
+    def weighted_gaps(self, gaps: Array) -> tuple[Array, NDArray[np.intp]]:
+        """Return gaps at the nodes (n_nodes,), of those (m,) of constraints, and the nearest node of each of these (m,).
+
+        Infinite where nothing is faced [length].
+        """
+        return gaps, np.arange(len(gaps))
+
     def closed_nodes(self, active: Mask, gap: Array, pressure: Array) -> Mask:
         """Return the nodes in contact (n_nodes,) for active constraints (m,), nodal gaps [length], pressures [pressure].
 

@@ -1,7 +1,7 @@
-"""Fluid that penetrates between the sides of a contact pair: its pressure acts where they are open and connected with a source.
+"""Fluid that penetrates between the sides of a contact pair, wherever they are open and connected with its source.
 
-A node is open to the fluid if its gap is, or if what presses it together is no more than the fluid does; it is reached through
-facets all of whose nodes on the way are. There the force is that of the fluid, on both sides alike, in the place of contact.
+A node is open to the fluid if its gap is, or if what presses it together is no more than the fluid; such nodes of one facet
+are connected. There the force is that of the fluid, on both sides alike, in the place of that of contact.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from scipy.sparse.csgraph import connected_components
 
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
-from fastcontact.contact.formulations._pressure_field import PressureField
 from fastcontact.contact.surface import Surface
 
 Array = NDArray[np.float64]
@@ -43,45 +42,33 @@ class Wetted:
 
 
 def wetted(part: Constraints, at: Configuration, side: Surface, source: Mask, points: Array) -> Constraints:
-    """Return constraints `part` under the fluid pressure of a configuration; `source` (n_nodes,) are nodes that it comes from.
+    """Return constraints `part` under the fluid pressure of a configuration.
 
-    `points` (n_points, dim) are reference coordinates [length]. Contact pressures are those of the last pairing; before the
-    first one what is closed counts as tight.
+    The fluid comes from the nodes `source` (n_nodes,) of the secondary side; `points` (n_points, dim) are reference
+    coordinates [length]. Contact pressures are those of the last pairing; before the first one what is closed is tight.
     """
     if not at.fluid_pressure > 0.0:
         return part
     assert part.areas is not None
+    assert part.nodal is not None
     size = float(np.linalg.norm(np.ptp(points[side.points], axis=0)))
     gaps = part.gaps(at.displacement)
-    nodal, rows_of = _nodal(part, gaps)
+    nodal, node = part.nodal.weighted_gaps(np.where(part.usable, gaps, np.inf))
     loose = np.zeros(len(nodal), bool) if at.pressure is None else at.pressure <= (1.0 + ALIKE) * at.fluid_pressure
     nodes = reached(side, source, (nodal > CLOSED * size) | (loose & (nodal > -CLOSED * size)))
-    rows = nodes[rows_of] & part.usable
-    if not rows.any():
-        return replace(part, wetted=Wetted(rows, np.zeros(len(nodes))))
+    rows = nodes[node] & part.usable
     far = FAR * size
     none = np.zeros(len(part))
     return replace(
         part,
         gap0=np.where(rows, part.gap0 - gaps - far, part.gap0),
-        softness=np.where(rows, far / (at.fluid_pressure * part.areas), none if part.softness is None else part.softness),
+        softness=np.where(
+            rows, far / (at.fluid_pressure * part.areas), none if part.softness is None else part.softness
+        ),
         equality=rows if part.equality is None else part.equality | rows,
         friction=None if part.friction is None else np.where(rows, 0.0, part.friction),
         wetted=Wetted(rows, np.where(nodes, at.fluid_pressure, 0.0)),
     )
-
-
-def _nodal(part: Constraints, gaps: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Return the weighted gaps (n_nodes,) of nodes, infinite where they face nothing, and the node nearest to each row (m,)."""
-    usable = part.usable
-    if not isinstance(part.nodal, PressureField):
-        return np.where(usable, gaps, np.inf), np.arange(len(part))
-    field, n = part.nodal, len(part.nodal.nodal_areas)
-    weight = np.where(usable, field.projection.areas, 0.0)[:, None] * field.shape
-    total = np.bincount(field.around.ravel(), weight.ravel(), n)
-    sums = np.bincount(field.around.ravel(), (weight * np.where(usable, gaps, 0.0)[:, None]).ravel(), n)
-    mean = np.divide(sums, total, out=np.full(n, np.inf), where=np.abs(total) > CLOSED * np.abs(total).max(initial=0.0))
-    return mean, field.around[np.arange(len(part)), field.shape.argmax(axis=1)]
 
 
 def reached(side: Surface, source: Mask, passable: Mask) -> Mask:

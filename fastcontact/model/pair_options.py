@@ -70,25 +70,30 @@ def _cohesion(name: str, options: Mapping[str, Any]) -> CohesiveLaw | None:
     beside = ("adhesion", "friction", "penalty", "tangential_penalty", "wear")
     excess = [option for option in beside if option in options and option != chosen[0]]
     if excess or options.get("kind", "unilateral") != "unilateral":
-        raise ContactError(f"contact '{name}' has {chosen[0]}, which knows no {(excess or ['kind'])[0]}: leave out one of both")
+        other = (excess or ["kind"])[0]
+        raise ContactError(f"contact '{name}' has {chosen[0]}, which knows no {other}: leave out one of both")
     option, given = chosen[0], options[chosen[0]]
     needed, allowed = LAWS[option]
     if not isinstance(given, Mapping) or not set(needed) <= set(given):
-        raise ContactError(f"the {option} of contact '{name}' must give its {' and its '.join(needed)}, each by its name")
+        raise ContactError(
+            f"the {option} of contact '{name}' must give its {' and its '.join(needed)}, each by its name"
+        )
     for key, value in given.items():
         if key not in needed + allowed:
             raise ContactError(unknown(f"number of the {option} of contact '{name}'", str(key), needed + allowed))
         check_number(f"the {key} in the {option} of contact '{name}'", value)
         if not value > 0:
             raise ContactError(f"the {key} {value} in the {option} of contact '{name}' must be positive")
-    law = cohesive_law(*(float(given[key]) for key in needed), reversible=option == "adhesion", **{
-        key: float(value) for key, value in given.items() if key in allowed
-    })
+    law = cohesive_law(
+        *(float(given[key]) for key in needed),
+        reversible=option == "adhesion",
+        **{key: float(value) for key, value in given.items() if key in allowed},
+    )
     for strength, energy in ((law.strength, law.energy), (law.shear_strength, law.shear_energy)):
         if not strength**2 < 2.0 * energy * law.stiffness:
             raise ContactError(
-                f"the {option} of contact '{name}' would break before its traction falls: its stiffness {law.stiffness:g} must be "
-                f"above {strength**2 / (2.0 * energy):g}, strength^2 / (2 energy)"
+                f"the {option} of contact '{name}' would break before its traction falls: its stiffness "
+                f"{law.stiffness:g} must be above {strength**2 / (2.0 * energy):g}, strength^2 / (2 energy)"
             )
     return law
 

@@ -171,7 +171,7 @@ class Formulation(ABC):
             away = np.minimum(np.abs(part.gaps(at.displacement)), np.abs(part.gaps(at.start)))
             part = part.without(away > self.options.search_distance)
         if self.options.cohesion is not None:
-            return bonded(self.options.cohesion, part, at, self._lying(part.positions))
+            return bonded(self.options.cohesion, part, at, _at_places(self._gaps_as_they_lie, part.positions))
         part = replace(part, equality=self.never_opening(part.positions, at))
         if self.options.source is None:
             return part
@@ -198,13 +198,6 @@ class Formulation(ABC):
             before = _at_places(at.traction, part.positions)
             elastic = np.stack([-give * np.einsum("md,md->m", t, before) for t in part.directions])
         return replace(part, tangential_softness=give / areas, elastic_slip=elastic)
-
-    def _lying(self, positions: Array) -> Array:
-        """Return the gaps of the bodies as they lie at reference places (m, dim) [length], at which layers are made."""
-        assert self.options.cohesion is not None
-        if self.options.cohesion.reversible:
-            return np.zeros(len(positions))
-        return np.asarray(_at_places(self._gaps_as_they_lie, positions))
 
     @cached_property
     def _gaps_as_they_lie(self) -> tuple[Array, Array]:

@@ -81,6 +81,13 @@ class ModelContact(ModelConnections):
               (overclosure, pressure) that ascend from no pressure [length, pressure]; results tell the penetration. It does
               not soften friction; ``tangential_penalty`` does: shear by slip of what sticks, a number or a function of the
               secondary position [pressure / length].
+            - ``cohesion``: a layer between the sides that stretches up to its ``strength`` [pressure] and then breaks, which
+              takes its ``energy`` by area [pressure length]: a mapping of these, and of ``shear_strength``, ``shear_energy``
+              (by default as in opening), ``stiffness`` (by default the strength is reached at a hundredth of the opening at
+              break) [pressure / length], and ``exponent``, that of Benzeggagh and Kenane between the modes (2) [-]. It is
+              without stress as the sides lie, also across gaps, and gives way by its stiffness where it is pressed. Damage
+              is in the results. ``adhesion``: attraction without memory, a mapping of ``work``, of adhesion by area,
+              ``strength`` and ``stiffness``, likewise; along the sides it has no resistance.
             - ``slip``: ``"symmetric"`` (default): closing a gap along the mean of both sides' normals is no slip;
               ``"primary"``: all relative motion along the tangents to the primary side is, as in code_aster.
             - ``wear``: Archard's coefficient by hardness: ``coefficient * pressure * slip`` is worn off the secondary side in
@@ -155,9 +162,10 @@ class ModelContact(ModelConnections):
     def add_fluid_pressure(self, contact: str, pressure: float, *, source: str, ramp: History = None) -> None:
         """Let fluid press the sides of a contact pair apart wherever they are open and connected with its source.
 
-        It enters where the sides have a gap, or press on each other by no more than the fluid does, and comes on from facet to
-        facet. There it acts on both sides along the normal of the contact; results tell where, and ``pressure`` is what
-        the sides press on each other elsewhere. What fluid does to other surfaces are loads, see `add_pressure`.
+        It enters where the sides have a gap, or press on each other by no more than the fluid, and comes on from facet to
+        facet. There it acts on both sides along the normal of the contact: ``fluid_pressure`` of the results, whose
+        ``pressure`` is what the sides press on each other elsewhere. What fluid does to other surfaces are loads, see
+        `add_pressure`.
 
         Parameters
         ----------
@@ -253,8 +261,8 @@ class ModelContact(ModelConnections):
             )
         if options.kind != "unilateral" or options.cohesion is not None:
             raise ContactError(
-                f"contact '{pair.name}' is {options.kind if options.cohesion is None else 'cohesive'}, which lets no fluid in: "
-                "name another pair"
+                f"contact '{pair.name}' is {'glued' if options.cohesion else options.kind}, which lets no fluid in: name "
+                "another pair"
             )
         return mask
 
