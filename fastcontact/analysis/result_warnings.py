@@ -233,7 +233,7 @@ def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
 
 def _lost(pair: Formulation, contact: ContactResult, touched: bool, loaded: bool) -> list[str]:
     """Return a warning where a pair never closed, or is open although the loads are still there."""
-    if contact.active.any():
+    if contact.active.any() or contact.damage is not None or contact.fluid_pressure is not None:  # these tell it
         return []
     name, reach = contact.name, pair.options.search_distance
     facing = contact.gap[np.isfinite(contact.gap)]

@@ -35,9 +35,9 @@ class Layer:
     before : Bond
         At the beginning of the load step.
     damage : ndarray (m,)
-        At which the law is linearised [-].
-    rest : ndarray (1 + k, m)
-        Separations at which the lines of the law have no traction [length].
+        There [-].
+    separation, rest : ndarray (1 + k, m)
+        Opening and slidings at which the law is linearised, and those at which its lines have no traction [length].
     """
 
     law: CohesiveLaw
@@ -45,6 +45,7 @@ class Layer:
     areas: Array
     before: Bond
     damage: Array
+    separation: Array
     rest: Array
 
     def forces(self, multiplier: Array) -> tuple[Array, Array]:
@@ -54,7 +55,10 @@ class Layer:
 
     def after(self, part: Constraints, u: Array) -> Bond:
         """Return the layer at the end of a step with displacements u (n_dofs,) [length]."""
-        opening, *slides = (part.gap0 + part.B @ u).reshape(-1, len(self.damage)) + self.rest
+        end = (part.gap0 + part.B @ u).reshape(self.rest.shape) + self.rest
+        opening, *slides = np.where(
+            self.damage < 1.0, end, self.separation
+        )  # what is broken has no rows along the sides
         sliding = sum((s[:, None] * t for s, t in zip(slides, self.directions)), np.zeros_like(self.before.sliding))
         size, law = np.linalg.norm(sliding, axis=1), self.law
         areas = np.where(np.isfinite(self.areas), self.areas, 0.0)
@@ -98,7 +102,7 @@ def bonded(law: CohesiveLaw, part: Constraints, at: Configuration, lying: Array)
     secant[0, opening < 0.0] = 1.0
     falls = whole & (damage > (0.0 if law.reversible else before.damage)) & (secant > LEVEL)
     slope = np.where(falls, LEVEL, secant)
-    layer = Layer(law, part.directions, part.areas, before, damage, now * (1.0 - secant / slope))
+    layer = Layer(law, part.directions, part.areas, before, damage, now, now * (1.0 - secant / slope))
     return replace(
         part,
         B=csr_array(vstack([part.B, *part.tangents], format="csr")),
@@ -109,4 +113,5 @@ def bonded(law: CohesiveLaw, part: Constraints, at: Configuration, lying: Array)
         areas=np.tile(part.areas, len(now)),
         nodes=None if part.nodes is None else np.tile(part.nodes, len(now)),
         compliance=None, tangents=(), directions=(), drift=None, friction=None, tied=layer,
+        branches=(falls + 2 * (opening < 0.0) + 4 * ~whole).ravel().astype(np.int8),
     ).without(np.concatenate([none > 0.0, *[~whole] * len(along)]))  # fmt: skip

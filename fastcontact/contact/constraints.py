@@ -154,6 +154,8 @@ class Constraints:
         Constraints that supports and obstacles move past the other side by themselves; None stands for none.
     law : OverclosureLaw, optional
         Of which `gap0` and `softness` are a line.
+    branches : ndarray of int, optional
+        On which line of its law each place of a cohesive layer is.
     wetted : Wetted, optional
         Where fluid has come between the sides.
     areas : ndarray (m,), optional
@@ -185,6 +187,7 @@ class Constraints:
     tied: Tied | None = None
     driven: Mask | None = None
     law: OverclosureLaw | None = None
+    branches: NDArray[np.int8] | None = None
     wetted: Wetted | None = None
 
     def __len__(self) -> int:
@@ -268,6 +271,11 @@ class StackedConstraints(Constraints):
     """
 
     parts: Mapping[str, Constraints] = field(default_factory=dict)
+
+    def state(self, active: Mask) -> NDArray[np.int8]:
+        """Return the set `active` (m,) with the `branches` of all pairs: what is smooth as long as they are the same."""
+        found = (part.branches for part in self.parts.values() if part.branches is not None)
+        return np.concatenate([active.astype(np.int8), *found])
 
     def rows(self) -> dict[str, slice]:
         """Return the rows of each pair, by its name."""

@@ -6,33 +6,32 @@ import pytest
 import fastcontact as fc
 
 FORMULATIONS = (
-    {}, {"formulation": "mortar", "multipliers": "standard"}, {"formulation": "continuous"}, {"formulation": "node_to_segment"},
-)  # fmt: skip
+    {},
+    {"formulation": "mortar", "multipliers": "standard"},
+    {"formulation": "continuous"},
+    {"formulation": "node_to_segment"},
+)
 STRENGTH, ENERGY, STIFFNESS, E = 10.0, 0.5, 1000.0, 1000.0
 ONSET, END = STRENGTH / STIFFNESS, 2.0 * ENERGY / STRENGTH
 
 
 def glued(element="quad4", motion=None, E=E, **options):
-    """Return two blocks of 2 (by 2) by 1 with a cohesive layer between, moved apart at the top."""
-    if element == "hex8":
-        make, size, divisions, up = fc.generate.box, (2.0, 2.0, 1.0), (2, 2, 1), "Z"
-        bottom, top, axes = f"{up}MIN", f"{up}MAX", "xyz"
-    else:
-        make, size, divisions = fc.generate.block, (2.0, 1.0), (3, 1)
-        bottom, top, axes = "BOTTOM", "TOP", "xy"
-    bodies = [
-        make(size, divisions, element, (*[0.0] * (len(size) - 1), z), name=n) for n, z in (("A", 0.0), ("B", 1.0))
-    ]
+    """Return two blocks of 2 (by 2) by 1, glued; the top is moved, by 1 upwards, or by a motion over a wider lower block."""
+    make = fc.generate.box if element == "hex8" else fc.generate.block
+    bottom, top, axes = ("ZMIN", "ZMAX", "xyz") if element == "hex8" else ("BOTTOM", "TOP", "xy")
+    size, divisions = ((2.0, 2.0, 1.0), (2, 2, 1)) if element == "hex8" else ((2.0, 1.0), (3, 1))
+    origin = (0.0,) * (len(size) - 1)
+    lower = make(size, divisions, element, (*origin, 0.0), name="A")
+    if motion:
+        lower = make((4.0, 1.0), (6, 1), element, (-1.0, 0.0), name="A")
+    bodies = (lower, make(size, divisions, element, (*origin, 1.0), name="B"))
     mesh = fc.generate.union(*(fc.generate.renamed(b, lambda g, n=n: f"{n} {g}") for b, n in zip(bodies, "AB")))
     model = fc.Model(mesh, "3d" if element == "hex8" else "plane_strain")
     model.add_material(fc.LinearElastic(E=E, nu=0.0))
     model.fix(f"A {bottom}", axes)
-    held = dict.fromkeys(axes, 0.0)
-    model.prescribe(f"B {top}", **{**held, **(motion or {axes[-1]: 1.0})})
-    law = {"strength": STRENGTH, "energy": ENERGY, "stiffness": STIFFNESS}
-    model.add_contact(
-        "glue", secondary=f"B {bottom}", primary=f"A {top}", cohesion={**law, **options.pop("law", {})}, **options
-    )
+    model.prescribe(f"B {top}", **{**dict.fromkeys(axes, 0.0), **(motion or {axes[-1]: 1.0})})
+    law = {"strength": STRENGTH, "energy": ENERGY, "stiffness": STIFFNESS, **options.pop("law", {})}
+    model.add_contact("glue", secondary=f"B {bottom}", primary=f"A {top}", cohesion=law, **options)
     return model
 
 
@@ -56,7 +55,6 @@ def exact(moved, damage):
     return stiffness * opening, opening, damage
 
 
-@pytest.mark.filterwarnings("ignore:.*is lost at the end")
 @pytest.mark.parametrize("element", ["quad4", "quad8", "hex8"])
 @pytest.mark.parametrize("options", FORMULATIONS)
 def test_the_law_is_traced_exactly(options, element):
@@ -75,7 +73,6 @@ def test_the_law_is_traced_exactly(options, element):
     assert damage == 1.0
 
 
-@pytest.mark.filterwarnings("ignore:.*is lost at the end")
 @pytest.mark.parametrize("angle", [0.0, 30.0, 60.0, 90.0])
 def test_mixed_modes_take_the_energy_of_benzeggagh_and_kenane(angle):
     """Between stiff blocks: the largest traction and the energy at break, by the ratio of opening and sliding."""
@@ -92,14 +89,14 @@ def test_mixed_modes_take_the_energy_of_benzeggagh_and_kenane(angle):
     for step, traction in zip(steps, expected):
         force = step.contact["glue"].force
         assert np.abs(force + 2.0 * traction * np.array([s, c])).max() < 1e-5 * strength
-    assert abs(steps[-1].work["energy_released"] / (2.0 * energy) - 1.0) < 1e-9
+    assert abs(steps[-1].work["energy_released"] / (2.0 * energy) - 1.0) < 1e-6  # the blocks give way by as much
 
 
 @pytest.mark.filterwarnings("ignore:.*in steps of|.*bends")
-@pytest.mark.parametrize("options", FORMULATIONS)
+@pytest.mark.parametrize("options", [{}, *(pytest.param(own, marks=pytest.mark.slow) for own in FORMULATIONS[1:])])
 def test_a_double_cantilever_beam_follows_beam_theory(options):
     """P = sqrt(G E I) / l and d = 2 P l^3 / (3 E I), per width, once the crack runs (Williams, 1989); elastic before."""
-    n, h, a, E, G = 35, 1.5, 30.0, 120e3, 0.26
+    n, h, a, E, G = 70, 1.5, 30.0, 120e3, 0.26
     beams = [fc.generate.block((70.0, h), (n, 1), "quad8", (0.0, y), name=k) for k, y in (("UP", 0.0), ("LOW", -h))]
     mesh = fc.generate.union(*(fc.generate.renamed(b, lambda g, k=k: f"{k} {g}") for b, k in zip(beams, ("UP", "LOW"))))
     mesh = mesh.with_facet_group("GLUE", lambda x: (np.abs(x[:, 1]) < 1e-9) & (x[:, 0] > a - 1e-9), of="UP UP")
@@ -109,17 +106,17 @@ def test_a_double_cantilever_beam_follows_beam_theory(options):
     model.prescribe("LOW BOTTOM_LEFT", y=-2.0)
     for corner in ("UP BOTTOM_RIGHT", "LOW TOP_RIGHT"):
         model.fix(corner, "xy")
-    model.add_contact("glue", secondary="GLUE", primary="LOW TOP", cohesion={"strength": 6.0, "energy": G}, **options)
-    steps = fc.solve(model, 6)
+    model.add_contact("glue", secondary="GLUE", primary="LOW TOP", cohesion={"strength": 10.0, "energy": G}, **options)
+    steps = fc.solve(model, 5)
     pull = [step.reaction[mesh.points_of("UP TOP_LEFT"), 1].sum() for step in steps]
     inertia, opened = h**3 / 12.0, 4.0
     length = np.sqrt(1.5 * E * inertia * opened / np.sqrt(G * E * inertia))
-    assert abs(pull[-1] / (np.sqrt(G * E * inertia) / length) - 1.0) < 0.015
+    assert abs(pull[-1] / (np.sqrt(G * E * inertia) / length) - 1.0) < 0.01
     released = steps[-1].work["energy_released"]
     contact = steps[-1].contact["glue"]
     broken = contact.coordinates[contact.damage >= 1.0, 0].max() - a
     assert G * broken < released < G * (broken + 12.0)  # the rest is in the zone of partial damage
-    external = np.trapezoid([0.0, *pull], np.linspace(0.0, opened, 7))
+    external = np.trapezoid([0.0, *pull], np.linspace(0.0, opened, 6))
     assert abs(steps[-1].work["external_work"] / external - 1.0) < 0.02
 
 
@@ -151,8 +148,7 @@ def test_a_ball_is_pulled_off_with_the_force_of_johnson_kendall_and_roberts(form
         adhesion={"work": w, "strength": strength}, formulation=formulation,
     )  # fmt: skip
     ramp = fc.Ramp((1, 2, 3, 4, 5), ((0, 0), (1, -0.2), (2, 0.25), (3, 0.3), (4, 0.35), (5, 1.5)))
-    with pytest.warns(fc.FastcontactWarning, match="lost at the end"):
-        steps = fc.solve(model, ramp, criteria=fc.Criteria(max_geometry_updates=400))
+    steps = fc.solve(model, ramp, criteria=fc.Criteria(max_geometry_updates=400))
     pulls = [step.contact["ball"].force[1] for step in steps]
     assert abs(max(pulls) / (1.5 * np.pi * w * R) - 1.0) < 0.03
     assert pulls[-1] == 0.0

@@ -35,7 +35,6 @@ def seal(element="quad4", push=-0.02, source="B BOTTOM_LEFT", **options):
     return model
 
 
-@pytest.mark.filterwarnings("ignore:.*is lost at the end")
 @pytest.mark.parametrize("element", ["quad4", "quad8", "hex8"])
 @pytest.mark.parametrize("options", FORMULATIONS)
 def test_a_flat_seal_opens_at_the_pressure_of_statics(options, element):
