@@ -24,6 +24,7 @@ from typing import Any
 import numba
 import numpy as np
 from scipy.sparse import csr_array
+from threadpoolctl import threadpool_limits
 
 import fastcontact as fc
 from fastcontact.analysis.criteria import Criteria
@@ -111,12 +112,13 @@ def linear_solution(problem: Problem, tolerance: float) -> dict[str, Any]:
 
 
 def peer(problem: Problem) -> dict[str, Any]:
-    """Return what preparation and solution cost with pyamg's multigrid and SciPy's conjugate gradients."""
+    """Return what preparation and solution cost with pyamg's multigrid and SciPy's conjugate gradients, one BLAS thread."""
     solver, lift = Pyamg(1e-8), problem.load_at(1.0).lift
     K, modes = problem.solver.K.restored(), problem.system.unknowns_of(near_nullspace(problem.model))
-    _, setup, _ = timed(lambda: solver.prepare(K, modes))
-    loaded = solver.load(problem.system.right(np.zeros_like(lift), lift))
-    _, cpu, wall = timed(lambda: loaded.solve(csr_array((0, len(lift))), np.empty(0)))
+    with threadpool_limits(1):
+        _, setup, _ = timed(lambda: solver.prepare(K, modes))
+        loaded = solver.load(problem.system.right(np.zeros_like(lift), lift))
+        _, cpu, wall = timed(lambda: loaded.solve(csr_array((0, len(lift))), np.empty(0)))
     return {"setup_cpu_s": setup, "cpu_s": cpu, "wall_s": wall, "iterations": solver.counters.iterations}
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
+from pairwise import mark_the_rest
 
 import fastcontact as fc
 from fastcontact.linear import choice as linear
@@ -37,6 +38,12 @@ def pytest_configure(config: pytest.Config) -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if config.getoption("--linear-solver"):
         config.addinivalue_line("filterwarnings", "ignore:multigrid gave up")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """See `pairwise`; before marks are chosen from."""
+    mark_the_rest(items)
 
 
 @pytest.fixture(autouse=True)

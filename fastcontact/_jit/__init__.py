@@ -1,1 +1,1 @@
-"""The one place that compiles kernels, keeps them on disk, and shares work between threads."""
+"""Compilation of kernels, their cache on disk, and threads."""

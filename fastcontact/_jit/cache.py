@@ -1,4 +1,4 @@
-"""Compiled kernels on disk: each in a file, used only if it is whole, nobody else's, and of the sources as they are.
+"""Cache of compiled kernels on disk: a file is used only if intact, owned by the user and built from the present sources.
 
 Numba knows a kernel by the time and size of its own source file, reads whatever lies in its cache, and stops where that is
 damaged. Here the name of a file tells the contents of all sources that the kernel depends on, so that kernels outlive another

@@ -1,4 +1,4 @@
-"""Who is told that kernels are being compiled, which takes up to a minute where all were silent."""
+"""Notification that kernels are being compiled, which may take a minute."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How kernels are compiled: disk cache, arithmetic as written, threads.
+"""Decorators of kernels: disk cache, strict floating-point arithmetic, threads.
 
 Kernels compile at their first call, never at import. Where no folder is writable for the cache, they compile
 in every process instead, and one line in the log says so.

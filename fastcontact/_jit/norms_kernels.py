@@ -1,14 +1,10 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Norms of long vectors, without the copies that NumPy makes of them."""
+"""Norms of long vectors without temporary copies."""
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from fastcontact._jit.decorators import kernel
-
-Array = NDArray[np.float64]
+from fastcontact.arrays import Array
 
 
 def largest(x: Array) -> float:

@@ -1,4 +1,4 @@
-"""Work shared by threads, with the same bits whatever their number.
+"""Deterministic multithreading: results do not depend on the number of threads.
 
 Compiled loops release the interpreter, so plain threads run them side by side. Each has its own rows of a matrix, or its
 own cells; nothing is added across threads.

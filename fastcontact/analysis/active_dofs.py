@@ -1,4 +1,4 @@
-"""The displacement components that a pairing solves for: all of them, or those of the contact surfaces alone.
+"""Degrees of freedom of the contact problem: all of them, or those of the contact surfaces after static condensation.
 
 A direct solver condenses the stiffness to the contact surfaces; then all other displacements follow once, when the contact
 forces of the load step are known.
@@ -10,16 +10,13 @@ import copy
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from fastcontact._jit.norms_kernels import largest
+from fastcontact.arrays import Array, Indices
 from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.constrained_system import System
 from fastcontact.linear.protocol import Loaded
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 
 class ActiveDofs:

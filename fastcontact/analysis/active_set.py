@@ -1,4 +1,4 @@
-"""The inequality solver: ``K u = f + B.T multiplier``, ``multiplier >= 0``, ``gap >= 0``, product zero.
+"""Frictionless contact by a primal-dual active set: ``K u = f + B.T multiplier``, ``0 <= multiplier _|_ gap >= 0``.
 
 The gap is ``gap0 + B u + C multiplier``; the compliance C of the constraints themselves, symmetric and positive
 semidefinite, is absent in most formulations.
@@ -18,14 +18,11 @@ once, and what follows is the method above from some start. A state counts as se
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.solution import Accuracy, Equilibrium
+from fastcontact.arrays import Array, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.linear.protocol import Loaded
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 def solve(

@@ -1,11 +1,10 @@
-"""Acceleration of a fixed point iteration by what its last changes tell (Anderson, 1965)."""
+"""Anderson acceleration of a fixed-point iteration (Anderson, 1965)."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from fastcontact.arrays import Array, Indices
 
 # Changes of the residual that point along the same line to more than this tell nothing apart.
 DEPENDENT = 1e-8
@@ -28,9 +27,9 @@ class Anderson:
         Whether the others are mixed, too; they need not be where G finds them without a first guess.
     """
 
-    def __init__(self, depth: int, where: NDArray[np.intp], all_mixed: bool = True) -> None:
+    def __init__(self, depth: int, where: Indices, all_mixed: bool = True) -> None:
         self.depth, self.where = depth, where
-        self.mixes: slice | NDArray[np.intp] = slice(None) if all_mixed else where
+        self.mixes: slice | Indices = slice(None) if all_mixed else where
         self._residuals: list[Array] = []
         self._images: list[Array] = []
 

@@ -1,4 +1,4 @@
-"""The balance of forces at the end of a load step: reactions, and what is left out of balance."""
+"""Equilibrium at the end of a load step: reactions and the residual."""
 
 from __future__ import annotations
 
@@ -7,16 +7,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._jit.norms_kernels import largest
 from fastcontact.analysis.criteria import LOOSEST
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.unsupported_bodies import SLACK
+from fastcontact.arrays import Array
 from fastcontact.elasticity.springs import ground_force
 from fastcontact.errors import ConvergenceError
 
-Array = NDArray[np.float64]
 # Round-off of a sum of internal forces, in units of the sum of their sizes.
 ROUND_OFF = 16 * float(np.finfo(float).eps)
 # Forces are there beyond so much round-off from elsewhere.
@@ -57,7 +56,7 @@ class Balance:
 
     @property
     def excess(self) -> float:
-        """The residual in units of what is allowed."""
+        """Residual relative to its tolerance."""
         return self.residual / self.bound if self.bound else float(np.inf if self.residual else 0.0)
 
     @property

@@ -1,4 +1,4 @@
-"""What engineers ask of a contact: force, moment, area, centre of pressure, mean gap, work of friction, wear."""
+"""Contact summary: resultant force and moment, area, centre of pressure, mean gap, frictional work, wear."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastcontact.analysis.wear import worn_in_step
+from fastcontact.arrays import Array
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.integration import facet_measure, fine_rule
@@ -19,12 +20,10 @@ from fastcontact.mesh.argument_types import typed
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
 
-Array = NDArray[np.float64]
-
 
 @typed(ContactError)
 def contact_moment(contact: ContactResult, about: ArrayLike | None = None) -> Array:
-    """Return the moment of the contact forces on the secondary side, of reference places.
+    """Return the moment of the contact forces on the secondary side, about a point, on the reference configuration.
 
     Parameters
     ----------
@@ -49,7 +48,7 @@ def contact_moment(contact: ContactResult, about: ArrayLike | None = None) -> Ar
 
 @dataclass(frozen=True, eq=False)
 class ContactAnswers:
-    """What a contact pair does in one load step.
+    """Contact summary of one pair in one load step.
 
     Attributes
     ----------
@@ -88,7 +87,7 @@ class ContactAnswers:
 
 @typed(ContactError)
 def contact_answers(model: Model, steps: Iterable[StepResult], name: str) -> list[ContactAnswers]:
-    """Return what a contact pair does in each of the load steps.
+    """Return the contact summary of a pair in each load step.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The result of one contact pair at the end of a load step: pressures, closed nodes, forces, friction, middle and width."""
+"""Result of one contact pair at the end of a load step: pressures, contact status, forces, friction, centre and width."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
+from fastcontact.arrays import Array, Mask, Numbers
 from fastcontact.contact.closed_nodes import carried
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
@@ -18,9 +18,6 @@ from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pairing import normals
 from fastcontact.contact.surface import Surface
 from fastcontact.results.step import ContactResult, half_width
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 def contact_result(
@@ -90,7 +87,7 @@ def _fluid(part: Constraints, count: int) -> Array:
 
 
 def _obstacle(pair: Formulation, at: Configuration, deformed: Array, forces: Array) -> dict[str, Any]:
-    """Return where a rigid obstacle stands, and its torque by `forces` at the places `deformed`; nothing of bodies."""
+    """Return the position of a rigid obstacle, and the torque of `forces` acting at `deformed`; empty for bodies."""
     side = pair.primary
     if not isinstance(side, RigidSide):
         return {}
@@ -109,7 +106,7 @@ class _Forces:
 
     secondary: Array
     total: Array
-    primary_points: NDArray[np.int32]
+    primary_points: Numbers
     primary: Array
 
 
@@ -136,7 +133,7 @@ class _AlongTheSurface:
 def _along_the_surface(
     part: Constraints, solution: Solution, rows: slice, normal: Array, found: _Closed
 ) -> _AlongTheSurface:
-    """Return what a pair does along its surface: nothing without friction or tie."""
+    """Return the tangential results of a pair; empty without friction or tie."""
     multiplier, everywhere = solution.multiplier[rows], np.ones(len(normal), bool)
     if part.tied is not None and part.tied.directions:
         _, tangential = part.tied.forces(multiplier)
@@ -166,7 +163,7 @@ class _Closed:
 
     @property
     def kept(self) -> Array:
-        """What part of the pressures found (m,) closed nodes keep: friction keeps as much.
+        """Part of the raw pressures (m,) that closed nodes keep; tractions are scaled alike.
 
         At most all where a field undershoots: next to nothing of it may then be left at a node, and its shear anything.
         """
@@ -188,7 +185,7 @@ def _closed(
 
 
 def nodal_pressure(pair: Formulation, part: Constraints, multiplier: Array, closed: Mask) -> Array:
-    """Return the pressures (n_nodes,) that results tell for multipliers (m,) [force] and `closed` nodes [pressure]."""
+    """Return the reported nodal pressures (n_nodes,) for multipliers (m,) [force] and `closed` nodes [pressure]."""
     assert part.nodal is not None
     forces = part.normal_forces(part.contact_forces(multiplier))
     return _carried(pair, part, closed, part.nodal.over_whole_side(forces), part.nodal.shares(forces))[1]

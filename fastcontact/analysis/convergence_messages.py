@@ -1,4 +1,4 @@
-"""What a load step that does not converge says: the culprit with its nodes, and the remedy."""
+"""Messages of load steps that do not converge: the cause, with its nodes, and the remedy."""
 
 from __future__ import annotations
 
@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
 from fastcontact.analysis.unsupported_bodies import RigidPosition, UnsupportedBodies
+from fastcontact.arrays import Array, Indices
 from fastcontact.contact.constraints import StackedConstraints
 
-Array = NDArray[np.float64]
 Nodes = dict[str, list[int]]
 # So many updates whose changes are alike go round in circles.
 CIRCLE = 8
@@ -68,7 +67,7 @@ def no_contact_stops(bodies: UnsupportedBodies, work: Array) -> str:
 
 
 def friction_exceeded(bodies: UnsupportedBodies, work: Array, friction: tuple[float, float]) -> str:
-    """Return the message for loads beyond what `friction`, the coefficient needed and the largest that is there, holds."""
+    """Return the message for loads beyond the friction cone; `friction` are the coefficients needed and given."""
     needed, largest = friction
     return (
         f"friction cannot hold {', '.join(bodies.motions.by_body())} against loads of up to {np.abs(work).max():.3g}: that "
@@ -88,7 +87,7 @@ def not_balanced(bodies: UnsupportedBodies, found: RigidPosition, load: float, f
     )
 
 
-def nearest_nodes(problem: Problem, constraints: StackedConstraints, rows: NDArray[np.intp]) -> Nodes:
+def nearest_nodes(problem: Problem, constraints: StackedConstraints, rows: Indices) -> Nodes:
     """Return, by contact pair, the secondary nodes next to constraints, counted through the pairs."""
     found: Nodes = {}
     for name, own in constraints.rows().items():
@@ -108,7 +107,7 @@ def _most_moved(problem: Problem, change: Array) -> Nodes:
 
 
 def named_nodes(problem: Problem, nodes: Mapping[str, list[int]]) -> str:
-    """Return nodes by contact pair in words, with the places of the first three."""
+    """Return nodes by contact pair in words, with the coordinates of the first three."""
     texts = []
     for name, points in nodes.items():
         listed = ", ".join(f"{p} {np.array2string(problem.model.mesh.points[p], precision=4)}" for p in points[:3])
@@ -118,7 +117,7 @@ def named_nodes(problem: Problem, nodes: Mapping[str, list[int]]) -> str:
 
 
 def _smoother(problem: Problem) -> str:
-    """Return the advice for pairs that may flip between the facets at a node, or between what dual functions cover."""
+    """Return the advice for pairs that may oscillate between facets at a node, or between supports of dual functions."""
     faceted = [name for name, pair in problem.pairs.items() if pair.normals == "facet" and len(pair.primary.points)]
     dual = [name for name, pair in problem.pairs.items() if getattr(pair, "multipliers", "") == "dual"]
     options = {'normals="averaged"': faceted, 'multipliers="standard"': dual}

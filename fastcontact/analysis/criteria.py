@@ -1,4 +1,4 @@
-"""When a load step counts as converged, and what happens where it does not."""
+"""Convergence criteria and limits of a load step."""
 
 from __future__ import annotations
 

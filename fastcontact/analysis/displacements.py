@@ -1,17 +1,15 @@
-"""All displacements of a load step, once its contact forces are known."""
+"""Displacements of a load step for known contact forces."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
+from fastcontact.arrays import Array
 from fastcontact.linear.protocol import Loaded
-
-Array = NDArray[np.float64]
 
 
 def with_loads(problem: Problem, load: StepLoad) -> Loaded:

@@ -1,4 +1,4 @@
-"""Where a load step starts: displacements and contact forces of the last two steps, extended along the load."""
+"""Predictor of a load step: displacements and contact forces extrapolated linearly in the load."""
 
 from __future__ import annotations
 
@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from fastcontact.arrays import Array, Mask
+
 # Gaps [length] and multipliers (m,) of a pair.
 GapsAndForces = tuple[Array, Array]
 # Loads that grow by more than so many last increments at once are not extrapolated to.

@@ -1,4 +1,4 @@
-"""Warnings about facets of curved sides where the gap follows chords: the pressure error beside the pressure.
+"""Warnings about straight facets on curved surfaces: the estimated error in pressure due to their sag.
 
 Chords that stand off the arc by up to h push sides of modulus E apart by pressures of the order of E h / L, whatever the
 interference is: L is the length of the facets where both sides have some, which do not match, and that of the contact where
@@ -8,10 +8,10 @@ the other side is an exact shape.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
+from fastcontact.arrays import Array, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.integration import fine_rule
@@ -20,7 +20,6 @@ from fastcontact.contact.pairing import Candidates
 from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.results.step import ContactResult, StepResult
 
-Array = NDArray[np.float64]
 # The estimate over the mean pressure above which there is a warning, by the order of facets. On rings nodal pressures were
 # off by 0.02 to 0.5 of it on linear facets, by up to 3 on quadratic ones; against rigid shapes by 1.1 to 1.3.
 DOUBTFUL, AGAINST_RIGID = {1: 0.5, 2: 0.1}, 0.2
@@ -43,7 +42,7 @@ def sag_warnings(problem: Problem, state: State, last: StepResult) -> dict[str, 
 
 
 def _text(pair: Formulation, spread: float, contact: ContactResult) -> str:
-    """Return what a `spread` [length] of the distance between chords and arcs does to pressures; empty where little."""
+    """Return the effect on pressures of a `spread` [length] of the distance between chords and arcs; empty where small."""
     side, order = pair.secondary, pair.secondary.order
     size = float(
         np.median(np.concatenate([np.linalg.norm(np.ptp(pair.points[b.facets], axis=1), axis=1) for b in side.blocks]))
@@ -66,8 +65,8 @@ def _text(pair: Formulation, spread: float, contact: ContactResult) -> str:
     )
 
 
-def _standing_off(pair: Formulation, at: Configuration, active: NDArray[np.bool_]) -> Array:
-    """Return how far facets stand off their arcs where the gap of closed facets is measured (n,) [length]."""
+def _standing_off(pair: Formulation, at: Configuration, active: Mask) -> Array:
+    """Return the sag of facets where the gap of closed facets is evaluated (n,) [length]."""
     points, deformed, closed = _points(pair), pair.points + at.displacement, np.zeros(len(pair.points), bool)
     closed[pair.secondary.points[active]] = True
     if isinstance(pair.primary, RigidSide):

@@ -1,4 +1,4 @@
-"""Settle the contact geometry of a load step: pair, constrain, solve, mix, until the surfaces stand still."""
+"""Contact geometry of a load step: detect, constrain, solve, accelerate, until displacements are stationary."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.analysis.anderson import Anderson
@@ -20,12 +19,11 @@ from fastcontact.analysis.scatter import Scatter, Watch
 from fastcontact.analysis.shared_nodes import SharedNodes
 from fastcontact.analysis.solution import Accuracy, Solution
 from fastcontact.analysis.tolerances import PATIENT_UPDATES, Tolerances
+from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.errors import ConvergenceError
 
 log = logging.getLogger("fastcontact")
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 # One active-set iteration per pairing is cheapest near the solution but may cycle; after so many, settle the set first.
 SEMISMOOTH_UPDATES = 8
 # Earlier geometries that are mixed into the next one.
@@ -97,7 +95,7 @@ class SettledContact:
 def settle_geometry(
     step: StepContext, extrapolation: Extrapolation, expected: float, begun: Iterate | None = None
 ) -> SettledContact:
-    """Alternate between pairing the surfaces and solving their inequalities until both stand still.
+    """Alternate between pairing and solving the contact problem until both are stationary.
 
     Parameters
     ----------
@@ -160,6 +158,11 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
             iterate.begin_again(step.state)
             mixing.restart()
             watch.forget()
+        if update == max(plan.limit // 2, PATIENT_UPDATES) and any(pair.faceted for pair in problem.pairs.values()):
+            log.info("nodes flip between facets: from now on the edges of facets are rounded")
+            iterate.rounded = True
+            mixing.restart()
+            watch.forget()
     if plan.until_settled:
         changed = step.dofs.put(np.zeros_like(iterate.u), part - moved.before)
         raise ConvergenceError(geometry_moves(problem, iterate.history, changed, plan.limit), iterate.history)
@@ -207,6 +210,7 @@ def _move(
             "active": int(solution.active.sum()),
             "active_set_iterations": solution.iterations,
             "settled": solution.settled,
+            **({"rounded": True} if iterate.rounded else {}),
         }
     )
     return moved
@@ -235,7 +239,7 @@ class _Mixing:
 
     def __init__(self, accelerated: Anderson) -> None:
         self._accelerated = accelerated
-        self._known: NDArray[np.int8] | None = None
+        self._known: AnyArray | None = None
 
     def restart(self) -> None:
         """Forget the geometries so far."""

@@ -1,4 +1,4 @@
-"""The inequalities of one pairing: active set without friction, friction cone with it, rigid positions where needed."""
+"""Contact problem with fixed geometry: active set without friction, friction cone with it, positions of floating bodies."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._jit.norms_kernels import largest
 from fastcontact.analysis import active_set
@@ -17,21 +16,20 @@ from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import Accuracy, Solution
 from fastcontact.analysis.state import State
 from fastcontact.analysis.unsupported_bodies import UnsupportedBodies
+from fastcontact.arrays import Array, Mask
 from fastcontact.contact.constraints import Constraints, StackedConstraints
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.protocol import Loaded
 from fastcontact.model.rigid_motions import generalised, needed_friction, resisting, stopped_at
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 # Of the largest prescribed motion, what counts as none.
 ROUND_OFF = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class StepContext:
-    """What stays the same through all pairings of a load step.
+    """Data that do not change between the pairings of a load step.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Warnings about bodies that lie inside each other at the end of an analysis: where no contact is defined, and beside it."""
+"""Warnings about bodies that interpenetrate at the end of an analysis, where no contact is defined or beside it."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
+from fastcontact.arrays import Array, Mask
 from fastcontact.contact.obstacles.rigid_side import RigidSide, Stance
 from fastcontact.contact.surface import Surface
 from fastcontact.mesh.topology import bodies, outer_facets
@@ -16,9 +17,7 @@ from fastcontact.model.body_overlap import depths
 from fastcontact.model.rigid_motions import body_name
 from fastcontact.results.step import StepResult
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.signedinteger]
-Mask = NDArray[np.bool_]
 # Bodies by their numbers, and nodes on the outside of the first (n,) with their depths (n,) in the second [length].
 Inside = tuple[int, int, Indices, Array]
 # Depths worth a warning where no contact is defined, relative to the size of the model.

@@ -1,4 +1,4 @@
-"""The iterate of a load step: what one pairing hands to the next."""
+"""Iterate of the geometry loop: the data passed from one contact detection to the next."""
 
 from __future__ import annotations
 
@@ -7,23 +7,20 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
 from fastcontact.analysis.state import State
 from fastcontact.analysis.unsupported_bodies import RigidPosition
+from fastcontact.arrays import Array, Mask
 from fastcontact.contact.constraints import Constraints, StackedConstraints, stacked
 from fastcontact.contact.obstacles.rigid_side import RigidSide
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(eq=False)
 class Iterate:
-    """Where a load step stands between two pairings; it belongs to the geometry loop, which changes it.
+    """Iterate of a load step between two pairings, owned and modified by the geometry loop.
 
     Attributes
     ----------
@@ -39,6 +36,8 @@ class Iterate:
         The last position of unsupported bodies.
     history : list of dict
         An entry for each pairing.
+    rounded : bool
+        Whether edges between facets are rounded by now, since nodes flipped between facets.
     """
 
     u: Array
@@ -47,6 +46,7 @@ class Iterate:
     frictional: FrictionalEquilibrium | None = None
     rigid: RigidPosition | None = None
     history: list[dict[str, Any]] = field(default_factory=list)
+    rounded: bool = False
 
     @classmethod
     def of(cls, state: State) -> Iterate:
@@ -77,7 +77,7 @@ def pair_surfaces(problem: Problem, state: State, load: StepLoad, iterate: Itera
         at = replace(problem.configuration(name, state, load, paired_at, u), pressure=iterate.pressure.get(name))
         turns = isinstance(pair.primary, RigidSide) and pair.primary.rotation is not None
         moved = at.obstacle - at.obstacle_start if turns else None
-        part = pair.constraints(at)
+        part = pair.constraints(replace(at, rounded=True) if iterate.rounded else at)
         parts[name] = problem.force_driven.constraints(name, part, positions.get(name, still), moved)
     return stacked(parts)
 

@@ -1,11 +1,10 @@
-"""Keep of the contact of a load step what later steps start from."""
+"""Save contact history for the next load step."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.iterate import gaps_and_forces
@@ -15,11 +14,10 @@ from fastcontact.analysis.solution import FrictionalEquilibrium
 from fastcontact.analysis.state import State
 from fastcontact.analysis.wear import Worn
 from fastcontact.analysis.work import contact_work
+from fastcontact.arrays import Array, Mask
 from fastcontact.contact.cohesion import Bond
 from fastcontact.contact.cohesive_layer import Layer
 from fastcontact.results.step import ContactResult
-
-Array = NDArray[np.float64]
 
 
 def keep_contact(problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State) -> State:
@@ -92,10 +90,8 @@ def first_contacts(problem: Problem, start: State, load: StepLoad, u: Array) -> 
     }
 
 
-def never_opening(
-    problem: Problem, start: State, settled: SettledContact
-) -> dict[str, tuple[Array, NDArray[np.bool_]]]:
-    """Return by contact pair that is bilateral once closed the places of its constraints, and which are closed for good."""
+def never_opening(problem: Problem, start: State, settled: SettledContact) -> dict[str, tuple[Array, Mask]]:
+    """Return, for pairs without separation, the positions of their constraints and which of them have closed."""
     found = dict(start.never_opening)
     for name, rows in settled.constraints.rows().items():
         if problem.pairs[name].options.kind == "bilateral_once_closed":
@@ -107,7 +103,7 @@ def never_opening(
 
 
 def tractions(problem: Problem, settled: SettledContact) -> dict[str, tuple[Array, Array]]:
-    """Return by contact pair with a tangential penalty the places of its constraints, and the tangential tractions there."""
+    """Return, for pairs with a tangential penalty, the positions of their constraints and the tangential tractions there."""
     found = {}
     for name, rows in settled.constraints.rows().items():
         part, solution = settled.constraints.parts[name], settled.solution

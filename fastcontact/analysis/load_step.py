@@ -1,4 +1,4 @@
-"""One load step: prepare, settle the contact geometry, balance, recover. Start reading the code here.
+"""One load step: predict, solve the contact problem, check equilibrium, recover. Start reading the code here.
 
 First the loads and the prescribed displacements at the end of the step are evaluated. Then the contact geometry is settled:
 the surfaces are paired on the deformed configuration, the inequalities of contact are solved, and both are repeated until
@@ -12,7 +12,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._jit import parallel
 from fastcontact._jit.norms_kernels import largest
@@ -25,12 +24,11 @@ from fastcontact.analysis.newton import newton
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
 from fastcontact.analysis.step_result import contact_results, counted, recover
+from fastcontact.arrays import Array
 from fastcontact.elasticity.nonlinear_bodies import DeformedBodies
 from fastcontact.linear.protocol import Loaded
 from fastcontact.model.rigid_motions import generalised
 from fastcontact.results.step import ContactResult, StepResult
-
-Array = NDArray[np.float64]
 
 
 @parallel.on_one_blas_thread
@@ -53,8 +51,8 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
         If the step does not converge.
     """
     load = problem.load_at(instant)
-    solved_before = problem.solver.counters.iterations
     problem.solver.put_back(state.solver)
+    solved_before = problem.solver.counters.iterations
     loaded = with_loads(problem, load)
     start, expected = prepare_start(problem, state, load, loaded)
     if problem.bodies is not None:
@@ -151,7 +149,7 @@ def equilibrium(
 def after_contact(
     problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State, energy: tuple[float, float]
 ) -> tuple[State, dict[str, ContactResult]]:
-    """Return the end of the step with what later steps start from, and the results of all contact pairs."""
+    """Return the state at the end of the step with its contact history, and the results of all contact pairs."""
     end = keep_contact(problem, start, load, settled, end)
     results = contact_results(problem, start, load, settled, end)
     end, results = keep_path(problem, start, load, settled, end, results, energy)

@@ -1,4 +1,4 @@
-"""Pretension sections that are locked at the end of a load step: from then on the problem has a relation more for each."""
+"""Pretension sections locked at the end of a load step: each adds a multi-point constraint to later steps."""
 
 from __future__ import annotations
 

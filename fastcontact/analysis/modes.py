@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import bsr_array
 
 from fastcontact._jit import parallel
@@ -16,6 +15,7 @@ from fastcontact.analysis.modal.eigenpairs import lowest
 from fastcontact.analysis.modal.held_contact import held_contact
 from fastcontact.analysis.modal.reduced import Reduced
 from fastcontact.analysis.problem import near_nullspace
+from fastcontact.arrays import Array
 from fastcontact.contact.held_motions import HeldMotions
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.cell_stress import CellStress
@@ -33,7 +33,6 @@ from fastcontact.mesh.html_table import html_table
 from fastcontact.model.model import Model
 from fastcontact.results.step import StepResult
 
-Array = NDArray[np.float64]
 # The shift that makes free bodies regular, by the eigenvalue of a uniform deformation: below those of all but thin bodies.
 SHIFT = 1e-4
 
@@ -66,7 +65,7 @@ class Modes(Sequence[StepResult]):
 
     @property
     def effective_mass(self) -> Array:
-        """Effective modal masses (n, dim) [mass]: squares of the participation, which add up to all of the mass."""
+        """Effective modal masses (n, dim) [mass], the squares of the participation factors, whose sum is the total mass."""
         return np.asarray(self.participation**2)
 
     def __len__(self) -> int:

@@ -1,4 +1,4 @@
-"""Newton iterations of a load step with nonlinear bodies: linearise, solve, until displacement and forces stand still.
+"""Newton-Raphson iterations of a load step with nonlinear bodies.
 
 Bodies alone are linearised; contact, with its geometry, is solved as for linear bodies (the Newton method of Josephy, 1979,
 for generalised equations). So iterations converge quadratically, and few matrices are factorised.
@@ -10,9 +10,6 @@ import logging
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.analysis.balance import Balance, balance
 from fastcontact.analysis.criteria import LOOSEST
@@ -23,11 +20,11 @@ from fastcontact.analysis.inequalities import StepContext
 from fastcontact.analysis.iterate import Iterate
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
+from fastcontact.arrays import Array
 from fastcontact.elasticity.nonlinear_bodies import DeformedBodies
 from fastcontact.errors import ConvergenceError, ModelError
 
 log = logging.getLogger("fastcontact")
-Array = NDArray[np.float64]
 # Newton iterations of a load step, and how often one is halved where it turns cells inside out.
 MOST, HALVINGS = 40, 6
 # Trials of a line search, what it takes for an overshot of the slope at the beginning, and the least part of the way to go.
@@ -166,7 +163,7 @@ def _linear_contact(
     problem: Problem, start: State, load: StepLoad, at: tuple[DeformedBodies, Array], iterate: Iterate,
     scale: tuple[float, float],
 ) -> tuple[SettledContact | None, Array, Array]:  # fmt: skip
-    """Return what `_solve` does, with the tangent as it is."""
+    """Return the result of `_solve` for the full tangent."""
     tangent, linear = problem.linearised(*at, load, iterate.rigid)
     iterate.u, iterate.history = at[1].copy(), []
     loaded, settled = with_loads(tangent, linear), None
@@ -199,7 +196,7 @@ def _searched(
     problem: Problem, start: State, load: StepLoad, begin: tuple[Array, DeformedBodies], end: tuple[Array, DeformedBodies],
     contact_force: Array,
 ) -> tuple[Array, DeformedBodies, float]:  # fmt: skip
-    """Return what `_reach` does, after a line search between two displacements (Crisfield, 1991, section 9.2).
+    """Return the result of `_reach` after a line search between two displacements (Crisfield, 1991, section 9.2).
 
     Under contact forces (n_dofs,) [force] as they are, the potential falls along the way at its beginning; where it rises at
     the end by much of that, the end lies too far.

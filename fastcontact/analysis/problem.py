@@ -1,4 +1,4 @@
-"""The problem that an analysis solves: built once from a model, never changed after."""
+"""The discrete problem of an analysis: built once from a model and immutable."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array, eye_array, kron
 
 from fastcontact._jit import parallel
@@ -18,6 +17,7 @@ from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.state import State
 from fastcontact.analysis.unsupported_bodies import RigidPosition, UnsupportedBodies
 from fastcontact.analysis.work import Work
+from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.held_motions import HeldMotions
@@ -42,7 +42,6 @@ from fastcontact.model.obstacle_rotation import angle_at
 from fastcontact.model.ramp import Ramp, Table, combined, multiplier
 from fastcontact.model.rigid_motions import free_motions
 
-Array = NDArray[np.float64]
 ByRamp = Mapping[Table | None, Array]
 
 
@@ -106,6 +105,8 @@ class Problem:
         Rigid obstacles that forces move.
     prescribed, forces : dict of ramp table to ndarray (n_points + n_driven, dim)
         By history, displacements [length] and nodal forces [force] at multiplier 1.
+    solver_at_rest : dict
+        The snapshot of the solver before the first step.
     doubtful : tuple of str
         Warnings about the stiffness.
     bodies : NonlinearBodies, optional
@@ -124,16 +125,17 @@ class Problem:
     system: System
     unsupported_bodies: UnsupportedBodies | None
     dofs: ActiveDofs
-    contact_dofs: NDArray[np.intp]
+    contact_dofs: Indices
     force_driven: ForceDrivenObstacles
     prescribed: ByRamp
     forces: ByRamp
+    solver_at_rest: Mapping[str, Any]
     doubtful: tuple[str, ...] = ()
     bodies: NonlinearBodies | None = None
     following: Sequence[tuple[FollowingPressure, Table | None]] = ()
 
     @cached_property
-    def material_of_cells(self) -> NDArray[np.int32]:
+    def material_of_cells(self) -> Numbers:
         """Material of every solid cell (n_solids,), equal ones under one number."""
         return np.concatenate(list(self.field.distinct.values()))
 
@@ -165,7 +167,7 @@ class Problem:
         return StepLoad(lift, force, obstacles, clearances, angles, following, fluids)
 
     def factors(self, histories: Iterable[Temperature | InitialState], instant: float) -> list[float]:
-        """Return what temperatures or initial states of the model are multiplied with at an instant of the ramp [-]."""
+        """Return the load factors of temperatures or initial states at an instant of the ramp [-]."""
         return [multiplier(own.ramp, self.ramp, instant) for own in histories]
 
     def displacement(self, u: Array) -> Array:
@@ -208,7 +210,7 @@ class Problem:
         )
 
     def _worn(self, name: str, state: State) -> Array | None:
-        """Return what has been worn off a contact pair at all points (n_points,) [length], None for nothing."""
+        """Return the wear depth of a contact pair at all points (n_points,) [length], None without wear."""
         if name not in state.worn:
             return None
         depth = np.zeros(self.model.mesh.n_points)
@@ -258,7 +260,7 @@ class Problem:
         """Return the state before the first load step."""
         # Gaps are differences of coordinates and no more accurate than those.
         round_off = 8 * np.finfo(float).eps * float(np.abs(self.model.mesh.points).max())
-        return State(np.zeros(self.force_driven.n_dofs), round_off, solver=self.solver.snapshot(), work=Work())
+        return State(np.zeros(self.force_driven.n_dofs), round_off, solver=self.solver_at_rest, work=Work())
 
 
 @parallel.on_one_blas_thread
@@ -310,12 +312,12 @@ def prepare(
         model, ramp, criteria, solver, pairs, field, sides, system, bodies,
         active_dofs(system, contact_dofs, involved, pairs, bodies, solver),
         contact_dofs, driven, driven.prescribed(prescribed), driven.forces(_forces(model)),
-        tuple(doubtful), model.nonlinear_bodies(field), model.following_pressures(),
+        solver.snapshot(), tuple(doubtful), model.nonlinear_bodies(field), model.following_pressures(),
     )  # fmt: skip
 
 
 def active_dofs(
-    system: System, contact_dofs: NDArray[np.intp], involved: NDArray[np.intp], pairs: Mapping[str, Formulation],
+    system: System, contact_dofs: Indices, involved: Indices, pairs: Mapping[str, Formulation],
     bodies: UnsupportedBodies | None, solver: LinearSolver,
 ) -> ActiveDofs:  # fmt: skip
     """Return the displacement components that a pairing solves for."""
@@ -333,8 +335,8 @@ def _forces(model: Model) -> dict[Table | None, Array]:
 
 
 def _prepare_solver(
-    solver: LinearSolver, system: System, bodies: UnsupportedBodies | None, modes: Array, involved: NDArray[np.intp]
-) -> NDArray[np.intp]:
+    solver: LinearSolver, system: System, bodies: UnsupportedBodies | None, modes: Array, involved: Indices
+) -> Indices:
     """Give the linear solver the matrix, with the springs of unsupported bodies; return the unknowns of contact."""
     matrix = system.matrix if bodies is None else bodies.with_springs(system.matrix)
     if bodies is not None:
@@ -346,7 +348,7 @@ def _prepare_solver(
     return involved
 
 
-def _contact_dofs(mesh: Any, pairs: Mapping[str, Formulation], n_driven: int) -> NDArray[np.intp]:
+def _contact_dofs(mesh: Any, pairs: Mapping[str, Formulation], n_driven: int) -> Indices:
     """Return the displacement components of all points on contact surfaces, and of obstacles that forces drive."""
     sides = [side.points for pair in pairs.values() for side in (pair.secondary, pair.primary)]
     points = np.unique(np.concatenate(sides)) if sides else np.empty(0, np.intp)

@@ -1,4 +1,4 @@
-"""Restart data: what a later process needs to continue an analysis, as plain numbers, strings and arrays.
+"""Restart data, as plain numbers, strings and arrays.
 
 It is the state at the end of a step, but for the displacements, which the result of the step holds; what the linear solver
 has learnt; and what tells the case from others. The state includes what later iterates owe to earlier ones in their last
@@ -30,7 +30,7 @@ SAME_INSTANT = 1e-12
 
 
 def identity(model: Model, ramp: Ramp, criteria: Criteria) -> dict[str, Any]:
-    """Return what tells a case from another one: digests of its parts, and its load history."""
+    """Return the identity of a case: digests of its parts, and its load history."""
     options = {name: getattr(criteria, name) for name in ANSWER}
     return {"parts": fingerprint(model, options), "table": [list(row) for row in ramp.table]}
 
@@ -63,10 +63,10 @@ def _formulations(then: dict[str, str], now: dict[str, str], model: Model) -> st
 
 
 def taken(problem: Problem, state: State, case: dict[str, Any]) -> dict[str, Any]:
-    """Return what a later process needs to continue after a step; `case` from `identity`."""
-    solver, kept = problem.solver, state.to_dict(problem.model.n_dofs)
-    extrapolation = kept.pop("extrapolation")
-    kept = {"format": FORMAT, "case": case, **kept, "solver": {"kind": _kind(solver), "memory": solver.memory()}}
+    """Return the restart data after a step; `case` from `identity`."""
+    kept = state.to_dict(problem.model.n_dofs)
+    extrapolation, memory = kept.pop("extrapolation"), kept.pop("solver")
+    kept = {"format": FORMAT, "case": case, **kept, "solver": {"kind": _kind(problem.solver), "memory": memory}}
     if _extrapolates(problem):
         kept["extrapolation"] = extrapolation
     return kept
@@ -74,14 +74,14 @@ def taken(problem: Problem, state: State, case: dict[str, Any]) -> dict[str, Any
 
 @on_one_blas_thread
 def put_back(problem: Problem, step: StepResult, touched: frozenset[str]) -> State:
-    """Return the state after `step`, which `check` has found to fit; the linear solver remembers what it had learnt.
+    """Return the state after `step`, which `check` has accepted; the linear solver continues from its snapshot.
 
     `touched` are the contact pairs that were closed at the end of a step so far.
     """
     kept = step.restart
     assert kept is not None
     if kept["solver"]["kind"] == _kind(problem.solver):
-        problem.solver.remember(kept["solver"]["memory"])
+        problem.solver.put_back(kept["solver"]["memory"])
     state = State.from_dict(kept, step.displacement, touched)
     if not _extrapolates(problem):
         state = replace(state, extrapolation=Extrapolation())
@@ -109,5 +109,5 @@ def _history(table: Sequence[Sequence[float]], end: float, other: Sequence[Seque
 
 
 def _kind(solver: Any) -> list[Any]:
-    """Return what solvers that take each other's memory share."""
+    """Return the kind of a solver: solvers of one kind can continue from each other's snapshots."""
     return [getattr(solver, "name", type(solver).__name__), solver.tolerance if solver.asked is None else solver.asked]

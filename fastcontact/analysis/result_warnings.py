@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.facet_sag import sag_warnings
 from fastcontact.analysis.interpenetration import interpenetration
@@ -14,7 +15,9 @@ from fastcontact.analysis.seams import seam_warnings
 from fastcontact.analysis.state import State
 from fastcontact.analysis.stress_scatter import scatter_warnings
 from fastcontact.analysis.volumetric_locking import locking_warning
+from fastcontact.analysis.wavering_pressure import wavering
 from fastcontact.analysis.wear import too_fast
+from fastcontact.arrays import Array, Mask
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity import element_kernels, recovery
@@ -23,7 +26,6 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.step import ContactResult, StepResult
 
-Array = NDArray[np.float64]
 # Penetration under a penalty that is worth a warning, relative to the largest displacement.
 DEEP = 0.01
 # Equivalent strain beyond which linear kinematics are worth a warning.
@@ -48,9 +50,9 @@ IMBALANCE = 0.02
 
 def result_warnings(problem: Problem, state: State, last: StepResult) -> list[str]:
     """Return the warnings about an analysis whose `last` step ended in a state."""
-    found = interpenetration(problem, state, last) + _carrying_springs(problem, state)
+    found = [*interpenetration(problem, state, last), *_carrying_springs(problem, state)]
     if problem.model.strain == "small":
-        found += _large_strain(problem, last) + _large_rotation(problem, state)
+        found += [*_large_strain(problem, last), *_large_rotation(problem, state)]
     if problem.bodies is None:
         found += locking_warning(problem, state.u) or scatter_warnings(problem, last)
     found += [problem.solver.gave_up] if problem.solver.gave_up else []
@@ -60,107 +62,109 @@ def result_warnings(problem: Problem, state: State, last: StepResult) -> list[st
         contact = last.contact[name]
         if pair.options.gap_only:
             continue
-        found += _deep(pair, contact, state.u) + _lost(pair, contact, name in state.touched, loaded)
+        found += [*_deep(pair, contact, state.u), *_lost(pair, contact, name in state.touched, loaded)]
         found += [sagging[name]] if name in sagging else _unresolved(name, pair, contact)
-        found += _too_fast(name, pair, state)
-    return found + seam_warnings(problem, last) + _unsettled(state) + _loose(problem, last) + _unbalanced(state)
+        found += [*wavering(pair, contact), *_too_fast(name, pair, state)]
+    return [
+        *found, *seam_warnings(problem, last), *_unsettled(state), *_loose(problem, last), *_unbalanced(state)
+    ]  # fmt: skip
 
 
-def _deep(pair: Formulation, contact: ContactResult, displacement: Array) -> list[str]:
-    """Return a warning where a penalty lets the sides penetrate by much of the largest displacement."""
+def _deep(pair: Formulation, contact: ContactResult, displacement: Array) -> Iterator[str]:
+    """Yield a warning where a penalty lets the sides penetrate by much of the largest displacement."""
     size = float(np.abs(displacement).max(initial=0.0))
     penalty, depth = pair.options.penalty, contact.penetration
-    if not isinstance(penalty, float) or depth <= DEEP * size:
-        return []
-    return [
-        f"contact '{contact.name}' penetrates by {depth:.4g}, which is {depth / size:.1%} of the largest displacement: "
-        f"raise its penalty from {penalty:.4g} to about {penalty * depth / (DEEP * size):.2g}, or leave it out"
-    ]
+    if isinstance(penalty, float) and depth > DEEP * size:
+        yield (
+            f"contact '{contact.name}' penetrates by {depth:.4g}, which is {depth / size:.1%} of the largest displacement: "
+            f"raise its penalty from {penalty:.4g} to about {penalty * depth / (DEEP * size):.2g}, or leave it out"
+        )
 
 
-def _too_fast(name: str, pair: Formulation, state: State) -> list[str]:
-    """Return a warning where a contact wears faster than its load steps can follow."""
-    many = too_fast(pair, state.worn[name]) if name in state.worn else 0.0
-    if many <= 1.0:
-        return []
+def _too_fast(name: str, pair: Formulation, state: State) -> Iterator[str]:
+    """Yield a warning where a contact wears faster than its load steps can follow."""
+    if name not in state.worn or (many := too_fast(pair, state.worn[name])) <= 1.0:
+        return
     depth, size = float(state.worn[name].depth.max()), float(np.ptp(pair.points, axis=0).max())
     if many > MANY_STEPS or depth > WORN * size:
-        return [
+        yield (
             f"contact '{name}' wears off {depth:.3g}, {depth / size:.2g} times the size of the model, in steps "
             f"{many:.2g} times as long as pressures can follow: is its wear Archard's coefficient by the hardness, in the "
             "unit of one over pressure?"
-        ]
-    return [
-        f"contact '{name}' wears so much in a load step that pressures may waver from node to node and depths are too large: "
-        f"take {math.ceil(many)} times as many steps, or larger elements"
-    ]
+        )
+    else:
+        yield (
+            f"contact '{name}' wears so much in a load step that pressures may waver from node to node and depths are too "
+            f"large: take {math.ceil(many)} times as many steps, or larger elements"
+        )
 
 
-def _unbalanced(state: State) -> list[str]:
-    """Return a warning where energies and works of all steps do not add up, but for what is round-off beside forces."""
-    work = state.work
-    if work is None or not abs(work.imbalance) > IMBALANCE * work.largest:
-        return []
-    if work.largest <= ROUND_OFF * state.largest_force * float(np.abs(state.u).max(initial=0.0)):
-        return []
-    return [
-        f"the works of these load steps do not add up: {work.imbalance:.3g} of the external work {work.external:.4g} is "
-        f"neither strain energy ({work.strain_energy:.4g}), nor work of friction ({work.friction:.4g}), nor in penalties, "
-        f"{abs(work.imbalance) / work.largest:.1%} of the largest of them: take more load steps where works matter"
-    ]
+def _unbalanced(state: State) -> Iterator[str]:
+    """Yield a warning where the energy balance of all steps is violated by more than round-off."""
+    work, round_off = state.work, ROUND_OFF * state.largest_force * float(np.abs(state.u).max(initial=0.0))
+    if work is not None and abs(work.imbalance) > IMBALANCE * work.largest and work.largest > round_off:
+        yield (
+            f"the works of these load steps do not add up: {work.imbalance:.3g} of the external work {work.external:.4g} is "
+            f"neither strain energy ({work.strain_energy:.4g}), nor work of friction ({work.friction:.4g}), nor in "
+            f"penalties, {abs(work.imbalance) / work.largest:.1%} of the largest of them: take more load steps where works "
+            "matter"
+        )
 
 
-def _unsettled(state: State) -> list[str]:
-    """Return a warning where the last of a fixed number of geometry updates still changed much."""
+def _unsettled(state: State) -> Iterator[str]:
+    """Yield a warning where the last of a fixed number of geometry updates still changed much."""
     update, change = state.last_change or (0, 0.0)
-    if change <= UNSETTLED:
-        return []
-    return [
-        f"the contact geometry had not settled after the {update} updates asked for: the last one changed the displacement "
-        f"by {change:.1%} of its largest component. Allow more geometry_updates, or leave them out"
-    ]
+    if change > UNSETTLED:
+        yield (
+            f"the contact geometry had not settled after the {update} updates asked for: the last one changed the "
+            f"displacement by {change:.1%} of its largest component. Allow more geometry_updates, or leave them out"
+        )
 
 
-def _loose(problem: Problem, last: StepResult) -> list[str]:
-    """Return warnings where loose criteria let the last step end early."""
-    history, criteria = last.iterations["history"], problem.criteria
+def _loose(problem: Problem, last: StepResult) -> Iterator[str]:
+    """Yield warnings where loose criteria let the last step end early."""
+    history, criteria, scatter = last.iterations["history"], problem.criteria, last.iterations.get("scatter")
     if not history:
-        return []
-    found, change, residual = [], history[-1]["displacement_change"], history[-1]["residual"]
+        return
+    change, residual = history[-1]["displacement_change"], history[-1]["residual"]
     until_settled = criteria.geometry_updates is None and not criteria.keep_pairing
     if until_settled and change > LOOSE:
-        found.append(
+        yield (
             f"the contact geometry counts as settled although the displacement still changed by {change:.1e} of its largest "
             f"component (Criteria.geometry = {criteria.geometry:g}): results are no more accurate than that"
         )
-    scatter = last.iterations.get("scatter")
+    flipped = next((before for before, after in pairwise(history) if "rounded" in after), None)
+    if flipped is not None:
+        yield (
+            "nodes flipped between two facets of the primary side, which changed the displacement by "
+            f"{flipped['displacement_change']:.1e} of its largest component, until normals were made to turn from one to "
+            'the other over a tenth of either; normals="averaged" needs no such help'
+        )
     if scatter is not None and scatter["force"] > criteria.relative:
-        found.append(
+        yield (
             f"round-off makes contact forces scatter by {scatter['force']:.1e} of the largest one from update to update, and "
             f"displacements by {scatter['displacement']:.1e}: results are no more accurate than that"
         )
     if residual > min(LOOSE, criteria.relative):
         cause = "by round-off of a stiff body that moves far, in whose place a rigid obstacle may stand, "
-        found.append(
+        yield (
             f"forces are out of balance by {residual:.1e} of the largest force (Criteria.relative = {criteria.relative:g}): "
             f"{cause if residual > criteria.relative else ''}results are no more accurate than that"
         )
-    return found
 
 
-def _carrying_springs(problem: Problem, state: State) -> list[str]:
+def _carrying_springs(problem: Problem, state: State) -> Iterator[str]:
     if problem.unsupported_bodies is None or state.rigid is None:
-        return []
+        return
     told = problem.unsupported_bodies.report(state.rigid, state.largest_rigid_force)
-    if told["relative_to_load"] <= problem.criteria.relative:
-        return []
-    return [
-        f"the springs that regularise {'; '.join(told['motions'])} still carry {told['relative_to_load']:.1e} of "
-        "the load: rigid motions are so much larger than deformations that round-off leaves no more"
-    ]
+    if told["relative_to_load"] > problem.criteria.relative:
+        yield (
+            f"the springs that regularise {'; '.join(told['motions'])} still carry {told['relative_to_load']:.1e} of "
+            "the load: rigid motions are so much larger than deformations that round-off leaves no more"
+        )
 
 
-def _large_strain(problem: Problem, last: StepResult) -> list[str]:
+def _large_strain(problem: Problem, last: StepResult) -> Iterator[str]:
     laws, field = [material for material, _ in problem.model.materials], problem.field
     isotropic = np.array([isinstance(law, LinearElastic) and not law.graded for law in laws])
     shear = np.array([_shear_modulus(law) for law in laws])
@@ -178,25 +182,25 @@ def _large_strain(problem: Problem, last: StepResult) -> list[str]:
         mean = last.stress[block[others]].mean(axis=1)
         strains = np.einsum("cij,cj->ci", field.compliance[field.rows[name][others]], mean)
         strain = max(strain, float(recovery.equivalent_strain(strains).max(initial=0.0)))
-    if strain <= STRAIN:
-        return _large_stress_free_strain(problem, last)
-    return [f"the largest equivalent strain is {strain:.3f}, beyond the {STRAIN} where linear kinematics hold well"]
+    if strain > STRAIN:
+        yield f"the largest equivalent strain is {strain:.3f}, beyond the {STRAIN} where linear kinematics hold well"
+    else:
+        yield from _large_stress_free_strain(problem, last)
 
 
-def _large_stress_free_strain(problem: Problem, last: StepResult) -> list[str]:
-    """Return a warning where temperatures or initial states strain bodies by much, of which stresses need not tell."""
+def _large_stress_free_strain(problem: Problem, last: StepResult) -> Iterator[str]:
+    """Yield a warning where temperatures or initial states cause large strains, which stresses need not show."""
     model = problem.model
     if not (model.temperatures or model.initial_states):
-        return []
+        return
     moduli = np.eye(problem.field.moduli.shape[1])[None]  # of which stresses are strains
     rows = {name: np.zeros(len(block), np.int32) for name, block in model.mesh.solids.items()}
     strain = float(np.abs(recovery.nodal_stress(model.mesh, model.kinematics, moduli, rows, last.displacement)).max())
-    if strain <= STRAIN:
-        return []
-    return [
-        f"temperatures and initial states bring strains of {strain:.3g}, beyond the {STRAIN} where linear kinematics hold "
-        "well: are they in the units of the model?"
-    ]
+    if strain > STRAIN:
+        yield (
+            f"temperatures and initial states bring strains of {strain:.3g}, beyond the {STRAIN} where linear kinematics "
+            "hold well: are they in the units of the model?"
+        )
 
 
 def _shear_modulus(law: Material) -> float:
@@ -204,14 +208,13 @@ def _shear_modulus(law: Material) -> float:
     return law.shear_modulus if isinstance(law, LinearElastic) and not law.graded else math.inf
 
 
-def _large_rotation(problem: Problem, state: State) -> list[str]:
+def _large_rotation(problem: Problem, state: State) -> Iterator[str]:
     angle, where = largest_rotation(problem.model.mesh, problem.displacement(state.u))
-    if angle <= ROTATION:
-        return []
-    return [
-        f"the largest rotation is {angle:.3f} radian, near {np.array2string(where, precision=4)}: linear kinematics take "
-        f"it for small, which leaves out strains of about {0.5 * angle**2:.3f}"
-    ]
+    if angle > ROTATION:
+        yield (
+            f"the largest rotation is {angle:.3f} radian, near {np.array2string(where, precision=4)}: linear kinematics take "
+            f"it for small, which leaves out strains of about {0.5 * angle**2:.3f}"
+        )
 
 
 def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
@@ -231,42 +234,42 @@ def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
     return float(square**0.5), place
 
 
-def _lost(pair: Formulation, contact: ContactResult, touched: bool, loaded: bool) -> list[str]:
-    """Return a warning where a pair never closed, or is open although the loads are still there."""
+def _lost(pair: Formulation, contact: ContactResult, touched: bool, loaded: bool) -> Iterator[str]:
+    """Yield a warning where a pair never closed, or is open although the loads are still there."""
+    name, reach, facing = contact.name, pair.options.search_distance, contact.gap[np.isfinite(contact.gap)]
+    least = float(facing.min(initial=np.inf))
+    gap = f"the smallest gap is {least:.4g}" if len(facing) else "no node faces the other side"
     if contact.active.any() or contact.damage is not None or contact.fluid_pressure is not None:  # these tell it
-        return []
-    name, reach = contact.name, pair.options.search_distance
-    facing = contact.gap[np.isfinite(contact.gap)]
-    gap = f"the smallest gap is {facing.min():.4g}" if len(facing) else "no node faces the other side"
-    if reach is not None and len(facing) and facing.min() < -reach:
-        return [
-            f"contact '{name}' carries nothing where its sides penetrate by {-facing.min():.4g}, more than its "
+        return
+    if reach is not None and least < -reach:
+        yield (
+            f"contact '{name}' carries nothing where its sides penetrate by {-least:.4g}, more than its "
             f"search_distance {reach:.4g}: raise that, or use more load steps"
-        ]
-    if len(facing) and facing.min() < 0.0 and not touched:
-        return [
-            f"contact '{name}' carries nothing although its sides penetrate by {-facing.min():.4g}: supports or relations "
+        )
+    elif least < 0.0 and not touched:
+        yield (
+            f"contact '{name}' carries nothing although its sides penetrate by {-least:.4g}: supports or relations "
             "hold its nodes there; leave these nodes free, or out of the contact as 'excluded'"
-        ]
-    if not touched:
-        return [f"contact '{name}' never closed: {gap}. Check its sides and which way the loads push"]
-    return [f"contact '{name}' is lost at the end, after it was closed: {gap}"] if loaded else []
+        )
+    elif not touched:
+        yield f"contact '{name}' never closed: {gap}. Check its sides and which way the loads push"
+    elif loaded:
+        yield f"contact '{name}' is lost at the end, after it was closed: {gap}"
 
 
-def _unresolved(name: str, pair: Formulation, contact: ContactResult) -> list[str]:
-    """Return a warning where too few elements lie across the radius of a contact."""
+def _unresolved(name: str, pair: Formulation, contact: ContactResult) -> Iterator[str]:
+    """Yield a warning where too few elements lie across the radius of a contact."""
     if pair.options.always_closed or not contact.active.any():
-        return []
+        return
     count = across(pair.secondary, contact.active, pair.options.excluded_nodes(pair.secondary))
-    if count is None or count >= ACROSS:
-        return []
-    return [
-        f"contact '{name}' has only {count} {'elements' if count > 1 else 'element'} across its radius: its pressure needs "
-        f"{ACROSS} or more; refine '{pair.secondary.group}'"
-    ]
+    if count is not None and count < ACROSS:
+        yield (
+            f"contact '{name}' has only {count} {'elements' if count > 1 else 'element'} across its radius: its pressure "
+            f"needs {ACROSS} or more; refine '{pair.secondary.group}'"
+        )
 
 
-def across(side: Surface, closed: NDArray[np.bool_], excluded: NDArray[np.bool_]) -> int | None:
+def across(side: Surface, closed: Mask, excluded: Mask) -> int | None:
     """Return how many facets lie between the innermost closed node and the edge of the contact; None without an edge.
 
     That is the radius in elements, whatever the shape of the contact, and also where symmetry cuts it. The edge lies

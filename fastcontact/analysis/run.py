@@ -1,4 +1,4 @@
-"""The ramp: load steps one after the other, from the beginning or where others stopped, each handed over when it is done."""
+"""Run an analysis: load steps in order, from the beginning or from a restart, each yielded as it converges."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ def solve_steps(
 
 
 def _touched(steps: Sequence[StepResult]) -> frozenset[str]:
-    """Return the names of the contact pairs that were closed in any of the steps: mostly the last one tells all."""
+    """Return the names of the contact pairs that were closed in any of the steps; usually the last step suffices."""
     touched: set[str] = set()
     for step in reversed(steps):
         touched |= {name for name, found in step.contact.items() if found.active.any()}

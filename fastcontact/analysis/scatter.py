@@ -1,4 +1,4 @@
-"""The accuracy that a geometry loop can attain: where displacements only scatter, round-off decides, and the loop ends.
+"""Attainable accuracy of the geometry loop: it ends where further changes are round-off.
 
 How much round-off there is depends on the condition of the stiffness and of the constraints, which nothing tells beforehand;
 the last displacements show it. An iteration that still converges, however slowly, goes on in one direction: over a window
@@ -11,11 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._jit.norms_kernels import largest, largest_difference
+from fastcontact.arrays import Array
 
-Array = NDArray[np.float64]
 # Updates to look at, and how far apart their displacements may lie in units of the typical change: WINDOW in one direction.
 WINDOW, APART = 8, 4.0
 # Where changes may be what linear solutions leave, fewer will do, closer together: 3 in one direction.

@@ -1,4 +1,4 @@
-"""Contact at the ends of a part that repeats itself, where two nodes are one place.
+"""Contact at the ends of a period or cyclic sector, where two nodes represent one material point.
 
 Their gaps are one and the same condition (`shared_nodes`) or one value of a field of pressures, which fixes the sum of their
 forces alone. Their traction is that of the place: the sum of both forces over both areas.
@@ -9,10 +9,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.contact_answers import lumped_areas
 from fastcontact.analysis.problem import Problem
+from fastcontact.arrays import Indices
 from fastcontact.model.periodicity import Seam
 from fastcontact.results.step import ContactResult, StepResult
 
@@ -21,7 +21,7 @@ APART = 0.02
 
 
 def joined(problem: Problem, results: dict[str, ContactResult]) -> dict[str, ContactResult]:
-    """Return the results of contact pairs with one traction for each place, and closed where one of its nodes is."""
+    """Return the results of contact pairs with one traction for both nodes of a point, closed where one of them is."""
     found = dict(results)
     for name, contact in results.items() if problem.model.seams else ():
         pair = problem.pairs[name]
@@ -38,8 +38,8 @@ def joined(problem: Problem, results: dict[str, ContactResult]) -> dict[str, Con
     return found
 
 
-def _rows(problem: Problem, contact: ContactResult, seam: Seam) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the rows of the nodes of one place among those of a contact, where it has both."""
+def _rows(problem: Problem, contact: ContactResult, seam: Seam) -> tuple[Indices, Indices]:
+    """Return the rows of a contact that belong to the two nodes of one point."""
     row = np.full(problem.model.mesh.n_points, -1, np.intp)
     row[contact.points] = np.arange(len(contact.points))
     both = (row[seam.first] >= 0) & (row[seam.second] >= 0)
@@ -47,7 +47,7 @@ def _rows(problem: Problem, contact: ContactResult, seam: Seam) -> tuple[NDArray
 
 
 def seam_warnings(problem: Problem, last: StepResult) -> list[str]:
-    """Return a warning for each contact whose forces are split unevenly between nodes of one place.
+    """Return a warning for each contact whose forces are split unevenly between the two nodes of a point.
 
     Formulations with a condition a node know of such nodes (`shared_nodes`), fields of pressures unless tractions turn.
     """
@@ -67,6 +67,6 @@ def seam_warnings(problem: Problem, last: StepResult) -> list[str]:
                     f"forces are split unevenly between the two nodes of one place, by {apart[worst]:.4g} in pressure "
                     f"(points {contact.points[a[worst]]} and {contact.points[b[worst]]}). Their pressure is the mean, but "
                     "that of neighbours may waver: let the period end where the contact is open, or use "
-                    'formulation="mortar", against an obstacle "node_to_segment"'
+                    'formulation="mortar" with multipliers="dual"'
                 )
     return found

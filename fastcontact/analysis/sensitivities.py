@@ -1,4 +1,4 @@
-"""Sensitivities: derivatives of one quantity by any number of parameters, by one adjoint linear solution.
+"""Sensitivities: derivatives of one quantity with respect to many parameters from one adjoint solution.
 
 Where a load step has settled, ``K u = f + B.T multiplier`` and ``gap0 + B u + C multiplier = 0`` of the active constraints
 are smooth equations as long as the active set stands. The adjoint solution for a quantity, with the transposed matrix of
@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from fastcontact._jit import parallel
@@ -22,13 +21,13 @@ from fastcontact.analysis.sensitivity.moving_contact import REMEDY, MovingContac
 from fastcontact.analysis.sensitivity.parameters import change_by, check_parameter
 from fastcontact.analysis.sensitivity.quantities import check_quantity, with_gradient
 from fastcontact.analysis.sensitivity.settled_step import checked_margin, settled_step
+from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 from fastcontact.mesh.argument_types import typed
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import RampLike, ramp_of
 from fastcontact.results.step import StepResult
 
-Array = NDArray[np.float64]
 # What points between two facets may make of a derivative, relative to it.
 BETWEEN = 1e-6
 

@@ -1,4 +1,4 @@
-"""Nodes in several contact pairs, and at both ends of a period or sector: one condition, whose forces are shared.
+"""Nodes shared by contact pairs, or by both ends of a period or sector: one constraint, whose force is shared.
 
 A node of several pairs behaves as that of one pair over all their facets. Its conditions are one and the same, which fixes
 the sum of their forces alone, and equations that repeat each other cannot be eliminated: their mean is solved for. It stands
@@ -21,12 +21,10 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints, StackedConstraints
 from fastcontact.model.periodicity import Seam
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-Indices = NDArray[np.intp]
 # Entries of rows [-] that differ by less are the same.
 SAME = 1e-9
 # Gaps that differ by less than this part of the coordinates are the same.
@@ -35,7 +33,7 @@ SAME_GAP = 64 * float(np.finfo(float).eps)
 
 @dataclass(frozen=True, eq=False)
 class SharedNodes:
-    """Which constraints repeat others, and what part of their forces each carries.
+    """Constraints that repeat others, and the share of the force that each carries.
 
     Attributes
     ----------
@@ -167,7 +165,7 @@ def _frame(constraints: StackedConstraints, seams: Sequence[Seam]) -> Array:
 
 
 def _at_seams(constraints: StackedConstraints, seams: Sequence[Seam], behind: Indices) -> Indices:
-    """Return constraints (2, k) of a pair at the two nodes of one place."""
+    """Return constraints (2, k) of a pair at the two nodes of one point."""
     nodes, usable = _nodes(constraints), np.isfinite(_areas(constraints)) & constraints.usable
     usable[behind] = False
     found = [np.empty((2, 0), np.intp)]
@@ -195,7 +193,7 @@ def _places(constraints: Constraints, pairs: Indices) -> Indices:
 
 
 def _stiffness(softness: Array) -> Array:
-    """Return the inverse (m,) of what constraints give way, infinite where they do not [force / length]."""
+    """Return the own stiffness (m,) of constraints, infinite without compliance [force / length]."""
     return np.divide(1.0, softness, out=np.full_like(softness, np.inf), where=softness > 0.0)
 
 
@@ -221,14 +219,14 @@ def _parts(constraints: StackedConstraints, place: Indices) -> tuple[Array, Arra
 
 
 def _areas(constraints: StackedConstraints) -> Array:
-    """Return the area of each constraint (m,), NaN where it stands for none [area]."""
+    """Return the area of each constraint (m,), NaN without one [area]."""
     return np.concatenate(
         [np.full(len(part), np.nan) if part.areas is None else part.areas for part in constraints.parts.values()]
     )
 
 
 def _nodes(constraints: StackedConstraints) -> Indices:
-    """Return the node of each constraint (m,), -1 where it has none, or gives way together with others."""
+    """Return the node of each constraint (m,), -1 without one or where a compliance couples it with others."""
     found = []
     for part in constraints.parts.values():
         coupled = part.compliance is not None or part.low_rank_compliance is not None

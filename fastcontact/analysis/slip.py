@@ -1,16 +1,15 @@
-"""Slip of the secondary nodes of a contact pair: their motion in a load step along what they face."""
+"""Slip increment of the secondary nodes of a contact pair."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.pairing import Candidates, tangents
 from fastcontact.results.step import ContactResult
 
-Array = NDArray[np.float64]
 # In facet lengths: nodes that stand out as far beyond the other side may still be pressed, by parts of their facets.
 STANDS_OUT = 3.0
 
@@ -24,7 +23,7 @@ def slip_in_step(pair: Formulation, at: Configuration, contact: ContactResult) -
 
 
 def slip_of_nodes(pair: Formulation, at: Configuration) -> Array:
-    """Return the slip (m, dim) of the secondary nodes in a step along what they face, else zero [length]."""
+    """Return the slip increment (m, dim) of the secondary nodes, zero where they face nothing [length]."""
     nodes = Candidates.nodes_of(pair.secondary)
     pairing = pair.facing(nodes, at, max(pair.projection_tolerance or 0.0, STANDS_OUT))
     directions = tangents(pairing.normal)

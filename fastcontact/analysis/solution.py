@@ -1,14 +1,12 @@
-"""The inequalities of contact: how accurately they are solved, and their solutions without and with friction."""
+"""Solutions of the contact problem, without and with friction, and their accuracy."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from fastcontact.arrays import Array, Mask
 
 
 @dataclass(frozen=True)

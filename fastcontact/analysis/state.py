@@ -1,4 +1,4 @@
-"""The state of an analysis: everything that a load step changes, in one place."""
+"""State of an analysis: everything that a load step changes."""
 
 from __future__ import annotations
 
@@ -8,16 +8,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.unsupported_bodies import RigidPosition
 from fastcontact.analysis.wear import Worn
 from fastcontact.analysis.work import ContactForces, Work
+from fastcontact.arrays import Array, Mask
 from fastcontact.contact.cohesion import Bond
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +69,8 @@ class State:
         Rigid position of unsupported bodies in the last step.
     history : dict of str to ndarray (n_cells, n_q, 9)
         By solid element of nonlinear bodies, see `constitutive_kernels`; none before the first step.
-    solver : object
-        What the linear solver keeps from step to step, see `LinearSolver.snapshot`.
+    solver : dict
+        All that later solutions owe to earlier ones, see `LinearSolver.snapshot`.
     """
 
     u: Array
@@ -98,16 +95,16 @@ class State:
     last_change: tuple[int, float] | None = None
     rigid: RigidPosition | None = None
     history: Mapping[str, Array] = field(default_factory=dict)
-    solver: Any = None
+    solver: Mapping[str, Any] = field(default_factory=dict)
 
     def after_touching(self, pairs: Iterable[str]) -> State:
-        """Return the state when these contact pairs are closed; places of first contact count of pairs that have been."""
+        """Return the state with these contact pairs closed; pairs that have touched keep their first contact."""
         touched = self.touched.union(pairs)
         met = {name: place for name, place in self.first_contact.items() if name in touched}
         return dataclasses.replace(self, touched=touched, first_contact=met)
 
     def to_dict(self, n_dofs: int) -> dict[str, Any]:
-        """Return what a later process needs to continue, beside the displacements of the `n_dofs` components of the mesh."""
+        """Return the restart data, without the displacements of the `n_dofs` components of the mesh."""
         return {
             "numbers": {
                 "largest_force": float(self.largest_force),
@@ -138,6 +135,7 @@ class State:
                 for name in self.active
             },
             "extrapolation": self.extrapolation.to_dict(),
+            "solver": self.solver,
         }
 
     @classmethod

@@ -1,4 +1,4 @@
-"""Load steps that do not converge are cut in halves; a step that fails leaves its state as it was."""
+"""Bisection of load steps that do not converge; a failed step leaves the state unchanged."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def _parts(
 
 
 def _joined(parts: list[StepResult]) -> StepResult:
-    """Return the last part with what adds up over all of them."""
+    """Return the last part with the sums over all parts."""
     end = parts[-1]
     if len(parts) == 1:
         return end

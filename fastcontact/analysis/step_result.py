@@ -1,4 +1,4 @@
-"""Recover the result of a load step from its displacements: stresses, contact results, work of the solvers."""
+"""Recover the result of a load step: stresses, contact results, iteration counts."""
 
 from __future__ import annotations
 
@@ -6,21 +6,19 @@ import dataclasses
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.contact_result import contact_result
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.seams import joined
 from fastcontact.analysis.state import State
+from fastcontact.arrays import Array
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.nonlinear_bodies import DeformedBodies
 from fastcontact.model.pretension import section_results
 from fastcontact.model.ramp import multiplier
 from fastcontact.results.material_stress import by_largest_von_mises
 from fastcontact.results.step import ContactResult, StepResult
-
-Array = NDArray[np.float64]
 
 
 def recover(

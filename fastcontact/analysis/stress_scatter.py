@@ -1,4 +1,4 @@
-"""Stresses of linear elements against recovered ones, which are continuous: a measure of locking on the solution itself.
+"""A posteriori measure of locking: stresses of linear elements against recovered, continuous ones.
 
 The energy of the difference, over that of the solution, estimates the error (Zienkiewicz and Zhu, Int. J. Numer.
 Meth. Engng 24, 1987). Where cells are nearly incompressible the mean stress alone tells: the deviator stays smooth, while the
@@ -9,9 +9,9 @@ section 4.3.7).
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.problem import Problem
+from fastcontact.arrays import Array
 from fastcontact.elasticity.cell_stress import CellStress
 from fastcontact.elasticity.energy import cell_volumes, elastic_energy, integration_rule
 from fastcontact.elasticity.incompatible_modes import BENDING as BENDING_ELEMENTS
@@ -20,7 +20,6 @@ from fastcontact.elasticity.smoothed_stress import smoothed_stress
 from fastcontact.mesh import elements
 from fastcontact.results.step import StepResult
 
-Array = NDArray[np.float64]
 # Poisson's ratio from which on the mean stress is looked at. Under a ball it scatters by 14 to 23 % at nu = 0.3, where the
 # pressure is right, by 38 to 47 % at 0.45 and by 66 to 75 % at 0.48, where the pole's is 15 to 27 % and 27 to 43 % off.
 SUSPICIOUS, ALTERNATING = 0.45, 0.3
@@ -34,7 +33,7 @@ BATCH = 50_000
 
 
 class StressScatter:
-    """What linear cells have of the energy and of the mean stress, and how much of it recovered stresses lack.
+    """Energy and mean stress of linear cells, and their difference from the recovered stresses.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Forces of supports by group, of springs, and of bolts over the load: what engineers read off the ends of a model."""
+"""Reaction resultants by support group, spring forces, and bolt forces over the load history."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 from scipy.sparse.linalg import lsqr
 
+from fastcontact.arrays import Array, Mask
 from fastcontact.elasticity.springs import ground_force
 from fastcontact.errors import ModelError
 from fastcontact.mesh.argument_types import typed
 from fastcontact.model.model import Model
 from fastcontact.results.step import StepResult
-
-Array = NDArray[np.float64]
 
 
 @typed(ModelError)
@@ -62,7 +61,7 @@ def support_forces(model: Model, step: StepResult) -> dict[str, Array]:
     return found
 
 
-def multipliers(reaction: Array, rows: Sequence[csr_array], held: NDArray[np.bool_]) -> list[Array]:
+def multipliers(reaction: Array, rows: Sequence[csr_array], held: Mask) -> list[Array]:
     """Return the forces (m,) of relations with rows (m, n_dofs), found where no support acts [force].
 
     `reaction` (n_dofs,) are those of supports and relations [force]; `held` (n_dofs,) is where supports act.
@@ -76,7 +75,7 @@ def multipliers(reaction: Array, rows: Sequence[csr_array], held: NDArray[np.boo
 
 @typed(ModelError)
 def spring_forces(model: Model, step: StepResult) -> dict[str, Array]:
-    """Return the tension (m,) in springs by what they are called, such as ``"spring on 'TOP'"`` [force].
+    """Return the tension (m,) in springs by name, such as ``"spring on 'TOP'"`` [force].
 
     Parameters
     ----------

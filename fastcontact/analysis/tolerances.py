@@ -1,4 +1,4 @@
-"""How accurate each solution of a load step has to be: loose at first with an iterative solver, tight at the end."""
+"""Forcing terms of inexact solutions in a load step: loose at first with an iterative solver, tight at the end."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Tolerances:
         return self._solver.iterative and self._residual > self._solver.tolerance
 
     def tighten(self, relative_change: float, law_residual: float = 0.0) -> None:
-        """Lower the residual to what the last relative change of the displacement is worth.
+        """Lower the residual to the forcing term of the last relative change of the displacement.
 
         Where the friction law is off by more (`law_residual`, over the largest force) and Newton's method goes down, to what
         that is worth: its next step is no more accurate.

@@ -1,4 +1,4 @@
-"""Bodies held by contact alone: weak springs make their stiffness matrix regular.
+"""Floating bodies, held by contact alone: springs regularise their singular stiffness matrix.
 
 Each free rigid motion gets one spring at one node, about as stiff as the body there. The springs are fixed to a rigid
 position y of the bodies; for every y the contact problem is regular. A Newton iteration moves y until the spring forces
@@ -16,15 +16,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import qr
 from scipy.sparse import bsr_array
 
 from fastcontact.analysis.solution import Solution
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.elasticity.constrained_system import System
 from fastcontact.model.rigid_motions import FreeMotions
 
-Array = NDArray[np.float64]
 # The springs carry less than this fraction of the loads and of the contact forces, which is all there is where motions drive
 # the bodies; more where round-off or the linear solver leave more.
 SLACK = 1e-12
@@ -92,7 +91,7 @@ class UnsupportedBodies:
         Of each spring [force / length].
     """
 
-    def __init__(self, motions: FreeMotions, system: System, avoid: NDArray[np.intp]) -> None:
+    def __init__(self, motions: FreeMotions, system: System, avoid: Indices) -> None:
         diagonal, weightless = system.matrix.diagonal(), system.weightless
         typical = float(np.median(diagonal[system.free & ~weightless]))
         diagonal = np.where(weightless, typical, diagonal)
@@ -121,7 +120,7 @@ class UnsupportedBodies:
         return np.asarray(self.motions.displacement @ position)
 
     def report(self, found: RigidPosition, load: float) -> dict[str, Any]:
-        """Return what was regularised, and by how much, as plain numbers and strings.
+        """Return a report of the regularisation, as plain numbers and strings.
 
         Keys: ``motions``, names of the free motions; ``springs``, their places; ``spring_stiffness`` [force / length];
         ``force_left``, what each spring still carries [force]; ``relative_to_load``, the largest over the load;
@@ -137,8 +136,8 @@ class UnsupportedBodies:
             "positions": found.positions,
         }
 
-    def _owner(self, motions: FreeMotions, dof: int, weightless: NDArray[np.bool_]) -> str:
-        """Return what a spring hangs on: a point of a body, or an obstacle that has no point in the mesh."""
+    def _owner(self, motions: FreeMotions, dof: int, weightless: Mask) -> str:
+        """Return the name of the point or obstacle that a spring is attached to."""
         if not weightless[dof]:
             return f"point {dof // self._dim}"
         column = int(np.argmax(np.abs(motions.displacement[dof])))
@@ -206,9 +205,9 @@ class UnsupportedBodies:
 
 
 class _Search:
-    """Where the search for the position stands."""
+    """State of the search for the position."""
 
-    def __init__(self, solve_at: Callable[[Array], Solution], dofs: NDArray[np.intp], start: Array) -> None:
+    def __init__(self, solve_at: Callable[[Array], Solution], dofs: Indices, start: Array) -> None:
         self._solve_at, self._dofs = solve_at, dofs
         self.positions = self.iterations = 0
         self.unsettled: Solution | None = None  # the first one whose inequalities do not hold
@@ -285,7 +284,7 @@ def _corrected(derivative: Array, moved: Array, change: Array) -> Array:
     return derivative + np.outer(change - derivative @ moved, moved) / square if square else derivative
 
 
-def _spring_dofs(motions: Array, diagonal: Array, avoid: NDArray[np.intp]) -> NDArray[np.intp]:
+def _spring_dofs(motions: Array, diagonal: Array, avoid: Indices) -> Indices:
     """Return k unknowns that determine the motions (n, k): the stiffest ones far apart, none of `avoid` if possible."""
     weights = np.sqrt(np.maximum(diagonal, 0.0))
     weights[avoid] *= 1e-3

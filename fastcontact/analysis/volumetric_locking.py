@@ -1,4 +1,4 @@
-"""How much too stiff nearly incompressible elements make a model: a lower bound from its own solution.
+"""Volumetric locking: a lower bound of the excess stiffness, from the solution itself.
 
 Let S be the stiffness that a reference without locking does not have: K is the stiffness of the model, K - S that of the
 reference. For the forces of the solution u, the potential energy of the reference is lower than that of the model by
@@ -17,16 +17,15 @@ which lock with it or have none, the mean dilatation of the cells at each node (
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.problem import Problem
+from fastcontact.arrays import Array, Mask
 from fastcontact.elasticity import incompatible_modes, recovery
 from fastcontact.elasticity.energy import cell_volumes
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.mesh import elements
 from fastcontact.model.model import Model
 
-Array = NDArray[np.float64]
 # Poisson's ratio from which on plain elements may lock, the excess of stiffness that is worth a warning, and the number of
 # conjugate gradients.
 SUSPICIOUS, EXCESS, ITERATIONS = 0.45, 0.05, 5
@@ -63,7 +62,7 @@ class Comparison:
         self.elements = list(self._cells)
         self.nu = max((float(nu[self._material[name][rows]].max()) for name, rows in self._cells.items()), default=0.0)
 
-    def _may_lock(self, name: str) -> NDArray[np.bool_]:
+    def _may_lock(self, name: str) -> Mask:
         """Return which cells (n_cells,) of an element may lock."""
         numbers = self._material[name]
         bends = incompatible_modes.asked(name, self._treatment)
@@ -83,7 +82,7 @@ class Comparison:
         return recovery.internal_force(mesh, kinematics, surplus)
 
     def _add_beyond_nodal_mean(self, reference: dict[str, Array], surplus: dict[str, Array]) -> None:
-        """Add to `surplus` what mean pressures of cells have beyond the means at their nodes, material by material."""
+        """Add to `surplus` the deviation of cell mean pressures from the nodal means, material by material."""
         mesh, names = self._model.mesh, [name for name in self._cells if name in AT_NODES]
         volume, pressure = {}, {}
         for name in names:

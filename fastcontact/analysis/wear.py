@@ -1,24 +1,22 @@
-"""Wear after Archard (J. Appl. Phys. 24, 1953): a depth in proportion to pressure and sliding distance."""
+"""Archard wear (J. Appl. Phys. 24, 1953): depth proportional to pressure times sliding distance."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.slip import slip_of_nodes
+from fastcontact.arrays import Array
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.mesh import elements
 from fastcontact.results.step import ContactResult
 
-Array = NDArray[np.float64]
-
 
 @dataclass(frozen=True, eq=False)
 class Worn:
-    """What has been worn off a contact pair at the end of a load step.
+    """Wear of a contact pair at the end of a load step.
 
     Attributes
     ----------
@@ -38,7 +36,7 @@ class Worn:
         return cls(np.zeros(count), np.zeros(count))
 
     def after(self, pair: Formulation, at: Configuration, contact: ContactResult, coefficient: float) -> Worn:
-        """Return what has been worn off after a load step more, see `worn_in_step`."""
+        """Return the wear after one more load step, see `worn_in_step`."""
         more = worn_in_step(pair, at, contact, self.pressure, coefficient)
         mean = 0.5 * np.maximum(contact.pressure + self.pressure, 0.0)
         pace = np.divide(more, mean, out=np.zeros_like(more), where=mean > 0.0)

@@ -1,4 +1,4 @@
-"""Work of a load step at its contacts: of friction, of springs, and what of it nothing explains.
+"""Energy balance of a load step: strain energy, external work, frictional work, penalties, imbalance.
 
 Over a step forces count as the mean of those at both ends, times the displacement between (trapezoidal rule). What is known
 of the path in between is put right: a normal force acts only on closed gaps, and friction slides where its traction is at
@@ -10,13 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 
 from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
+from fastcontact.arrays import AnyArray, Array
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations import Formulation
@@ -24,12 +23,10 @@ from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pairing import Candidates
 from fastcontact.results.step import ContactResult
 
-Array = NDArray[np.float64]
-
 
 @dataclass(frozen=True, eq=False)
 class ContactForces:
-    """What the work of the next load step needs of a contact pair at the end of one.
+    """Contact forces at the end of a load step, from which the work of the next one is integrated.
 
     Attributes
     ----------
@@ -53,7 +50,7 @@ class ContactForces:
     pressure: Array
     traction: Array
     energy: Array
-    rows: Sequence[NDArray[Any]]
+    rows: Sequence[AnyArray]
     tangential: Array
     pressing: Array
     added: Array
@@ -129,7 +126,7 @@ class Work:
         return replace(found, largest=max(terms))
 
     def told(self) -> dict[str, float]:
-        """Return what results tell, see `StepResult.work`."""
+        """Return the reported quantities, see `StepResult.work`."""
         return {
             "strain_energy": self.strain_energy, "plastic_work": self.plastic,
             "external_work": self.external, "friction_work": self.friction,
@@ -181,7 +178,7 @@ def contact_work(
 
 
 def _areas(part: Constraints) -> Array:
-    """Return the areas (m,) that constraints stand for, zero where for none [area]."""
+    """Return the areas (m,) of constraints, zero without one [area]."""
     return np.zeros(len(part)) if part.areas is None else np.where(np.isfinite(part.areas), part.areas, 0.0)
 
 
@@ -213,7 +210,7 @@ def _forces(
 
 
 def _stored(part: Constraints, normal: Array, tangents: Array, give: Array) -> float:
-    """Return the energy of penalties that give way (m,) [length] under normal forces (m,) and tangential ones (m, k)."""
+    """Return the energy stored in penalties under normal forces (m,) and tangential forces (m, k)."""
     total = float(normal @ give)
     if part.tangential_softness is not None:
         total += float(part.tangential_softness @ (tangents**2).sum(axis=1))
@@ -244,7 +241,7 @@ def _nothing(now: ContactForces) -> ContactForces:
 
 
 def _added(pair: Formulation, at: Configuration, contact: ContactResult) -> Array:
-    """Return what clearances and wear add to the gaps (n_nodes,) of the secondary nodes [length]."""
+    """Return the contribution of clearances and wear to the gaps (n_nodes,) of the secondary nodes [length]."""
     if pair.options.clearance is None and at.worn is None:
         return np.zeros(len(contact.gap))
     bare = pair.nodal_gap(at, with_clearance=False)[0]

@@ -1,4 +1,4 @@
-"""Formulas of contact mechanics: numerical results are compared with them.
+"""Closed-form solutions of contact mechanics.
 
 Each file holds one theory: a frozen result with its numbers and methods, and a factory that makes it. `THEORIES` names the
 factories for case files. Normal contacts share `radius` (half-width in the plane), `force`, `pressure_max` and

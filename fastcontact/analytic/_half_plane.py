@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastcontact.analytic._half_space import below_surface
 from fastcontact.analytic._inputs import array
+from fastcontact.arrays import Array
 
-Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 

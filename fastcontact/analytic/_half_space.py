@@ -11,12 +11,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fastcontact.analytic._inputs import array
+from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 
-Array = NDArray[np.float64]
 # From here on the series in 1/s is used: the closed forms lose digits as s grows.
 _FAR = 4.0
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fastcontact.arrays import REFUSAL, Array, is_masked
 from fastcontact.errors import ModelError, unknown
-from fastcontact.masks import REFUSAL, is_masked
 
 # Size of any number of a formula: cubes of it are still finite.
 LARGEST = 1e60
@@ -29,7 +29,7 @@ def number(name: str, value: object) -> float:
     return float(value)  # type: ignore[arg-type]
 
 
-def array(name: str, values: ArrayLike) -> NDArray[np.float64]:
+def array(name: str, values: ArrayLike) -> Array:
     """Return `values` (...) [unit of the quantity] as floats (...) [unit of the quantity], or raise ModelError."""
     if is_masked(values):
         raise ModelError(f"{name} {REFUSAL}")

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fastcontact.analytic._inputs import array, not_negative, number, poisson, positive
 from fastcontact.analytic.hertz_line import HertzLine, hertz_line
 from fastcontact.analytic.hertz_point import HertzPoint, hertz_point
-from fastcontact.errors import FastcontactWarning, ModelError
-
-Array = NDArray[np.float64]
+from fastcontact.arrays import Array
+from fastcontact.errors import ModelError, warn
 
 
 @dataclass(frozen=True)
@@ -178,8 +176,7 @@ def _checked(normal: HertzLine | HertzPoint, friction: float, tangential_force: 
         raise ModelError(f"tangential_force is {T:g}: the bodies slide above friction times normal force, {limit:g}")
     beta = normal.bodies.dundurs
     if abs(beta) > 1e-12:
-        text = f"Cattaneo-Mindlin is exact for like materials: Dundurs' beta is {beta:.4g}, not 0"
-        warnings.warn(text, FastcontactWarning, stacklevel=3)
+        warn(f"Cattaneo-Mindlin is exact for like materials: Dundurs' beta is {beta:.4g}, not 0")
     return f, T
 
 

@@ -1,4 +1,4 @@
-"""Two equal elastic half spheres pressed together as finite bodies: what a convergent solution tends to.
+"""Two equal elastic half-spheres pressed together as finite bodies: mesh-converged reference values.
 
 Hertz's theory takes each body for a half space with a parabolic surface. Real half spheres differ from that
 by terms of the order a/R: at an approach of 8 % of the radius the force is 12.6 % above Hertz's.
@@ -11,13 +11,12 @@ from dataclasses import dataclass
 from importlib import resources
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analytic._inputs import number, positive
 from fastcontact.analytic.hertz_point import HertzPoint, hertz_point
+from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 
-Array = NDArray[np.float64]
 NU = 0.3  # the table was computed for this Poisson ratio only
 
 

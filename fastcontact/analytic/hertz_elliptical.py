@@ -6,12 +6,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fastcontact.analytic._inputs import Bodies, array, effective_radius, exactly_one
+from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 
-Array = NDArray[np.float64]
 _FLATTEST = 1e-6  # ratio of the axes b/a below which the contact is a line for every purpose
 
 

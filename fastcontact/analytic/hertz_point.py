@@ -6,13 +6,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fastcontact.analytic import _half_space
 from fastcontact.analytic._half_space import VonMisesMaximum, von_mises
 from fastcontact.analytic._inputs import Bodies, array, effective_radius, exactly_one, poisson
-
-Array = NDArray[np.float64]
+from fastcontact.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fastcontact.analytic._inputs import array, not_negative, number, plane_kinematics, poisson, positive
+from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

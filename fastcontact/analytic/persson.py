@@ -6,12 +6,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fastcontact.analytic._inputs import array, exactly_one, not_negative, plane_kinematics, poisson, positive
+from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fastcontact.analytic.cattaneo_mindlin import CattaneoMindlinLine, CattaneoMindlinSphere
 from fastcontact.analytic.hertz_line import HertzLine
@@ -17,8 +17,8 @@ from fastcontact.analytic.lame import PressFit
 from fastcontact.analytic.manufactured import HertzBox
 from fastcontact.analytic.persson import PerssonPin
 from fastcontact.analytic.punches import PowerLawPunch
+from fastcontact.arrays import Array
 
-Array = NDArray[np.float64]
 # Who a theory is called after.
 NAMES: dict[type, str] = {
     HertzPoint: "Hertz",

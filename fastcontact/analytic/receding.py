@@ -6,12 +6,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fastcontact.analytic._inputs import Bodies, array, not_negative, plane_kinematics, positive
+from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 
-Array = NDArray[np.float64]
 _TERMS = 80  # of the Chebyshev series: errors of half-width and pressure below 1e-6 in all the range below
 _LARGEST_RATIO = 100.0  # of the moduli: beyond, the contact is so wide that the layer is a beam
 _LARGEST_LOAD = 10.0  # half-width of the load over thickness

@@ -1,1 +1,1 @@
-"""Contact: surfaces, the search for who faces whom, pairing, constraints and formulations."""
+"""Contact: surfaces, contact detection, pairing, constraints and formulations."""

@@ -1,4 +1,4 @@
-r"""Nodal pressures that tell the story of the contact force: none at open nodes, no tension, and the force as their integral.
+r"""Non-negative nodal pressures that vanish at open nodes and integrate to the contact force.
 
 A pressure field that is found by projection undershoots beyond the edge of the contact, and what an open node has of it is
 part of the force all the same: :math:`\int p_h\,dA = \sum_j A_j p_j` holds for all nodes together. So the share
@@ -10,12 +10,10 @@ and more are farther from where the error is. A tension at a closed node makes i
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Mask
 from fastcontact.contact.surface import Surface
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 # A node with less than this part of the mean area takes no share: its pressure would be anything.
 NO_AREA = 1e-3
 # Shares below this part of the largest are rounding errors.

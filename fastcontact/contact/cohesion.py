@@ -11,9 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from fastcontact.arrays import Array
+
 # Of the opening at which a layer is broken, that of its largest traction, where no stiffness is given.
 ELASTIC = 0.01
 

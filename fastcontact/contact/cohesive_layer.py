@@ -9,14 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 
+from fastcontact.arrays import Array
 from fastcontact.contact.cohesion import Bond, CohesiveLaw
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 
-Array = NDArray[np.float64]
 # Slope of the line where the traction falls, by the stiffness of the layer: with less a beam glued by nodes does not settle.
 LEVEL = 1e-2
 

@@ -1,17 +1,14 @@
-"""Where the two sides of a contact pair stand when they are paired, and where they stood as the load step began."""
+"""Configuration of a contact pair: current, and at the beginning of the load step."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Mask
 from fastcontact.contact.cohesion import Bond
 from fastcontact.contact.obstacles.rigid_side import Stance
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +41,8 @@ class Configuration:
         Of the fluid at its source [pressure].
     pressure : ndarray (n_nodes,), optional
         What the last pairing has found at the secondary nodes, fluid included [pressure]; None before.
+    rounded : bool
+        Whether facet normals turn at rounded edges, see `pairing.pair`.
     """
 
     displacement: Array
@@ -59,10 +58,11 @@ class Configuration:
     bond: Bond | None = None
     fluid_pressure: float = 0.0
     pressure: Array | None = None
+    rounded: bool = False
 
     @property
     def stance(self) -> Stance:
-        """Where a rigid obstacle stands now."""
+        """Current position of a rigid obstacle."""
         return Stance(self.obstacle, self.angle)
 
     @property

@@ -1,4 +1,4 @@
-"""The conditions of contact, row by row: ``gap >= 0``, ``multiplier >= 0``, ``gap * multiplier = 0``."""
+"""Contact constraints: ``gap >= 0``, ``multiplier >= 0``, ``gap * multiplier = 0`` row by row."""
 
 from __future__ import annotations
 
@@ -7,25 +7,22 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array, vstack
 
+from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.linear.field_compliance import FieldCompliance
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 class Compliance(Protocol):
     """A symmetric positive semidefinite matrix C (m, m) over all constraints."""
 
-    def block(self, rows: NDArray[np.intp]) -> Array:
+    def block(self, rows: Indices) -> Array:
         """Return the dense rows and columns `rows` of C, or, where C is diagonal, its diagonal there."""
         ...
 
-    def among(self, rows: NDArray[np.intp]) -> Array | FieldCompliance:
-        """Return the same, or what a linear solver can do without them."""
+    def among(self, rows: Indices) -> Array | FieldCompliance:
+        """Return the same, or an equivalent form that a linear solver can use without forming the block."""
         ...
 
     def apply(self, multiplier: Array) -> Array:
@@ -34,7 +31,7 @@ class Compliance(Protocol):
 
 
 class NodalField(Protocol):
-    """What the forces of constraints mean at the secondary nodes.
+    """Nodal interpretation of the forces of constraints.
 
     Attributes
     ----------
@@ -69,7 +66,7 @@ class NodalField(Protocol):
         """
         return self.over_whole_side(force) * self.nodal_areas
 
-    def weighted_gaps(self, gaps: Array) -> tuple[Array, NDArray[np.intp]]:
+    def weighted_gaps(self, gaps: Array) -> tuple[Array, Indices]:
         """Return gaps at the nodes (n_nodes,), of those (m,) of constraints, and the nearest node of each of these (m,).
 
         Infinite where nothing is faced [length].
@@ -106,15 +103,15 @@ class Wetted(Protocol):
 
 
 class Tied(Protocol):
-    """Linear equations in the place of contact; see `tied.TiedPair`."""
+    """Linear equations that replace contact; see `tied.TiedPair`."""
 
     @property
     def directions(self) -> tuple[Array, ...]:
-        """Tangents (m, dim) at the places of the formulation."""
+        """Tangents (m, dim) at the constraints of the formulation."""
         ...
 
     def forces(self, multiplier: Array) -> tuple[Array, Array]:
-        """Return normal (m,) and tangential (m, k) forces at the places of the formulation [force]."""
+        """Return normal (m,) and tangential (m, k) forces at the constraints of the formulation [force]."""
         ...
 
 
@@ -182,12 +179,12 @@ class Constraints:
     tangential_softness: Array | None = None
     elastic_slip: Array | None = None
     areas: Array | None = None
-    nodes: NDArray[np.intp] | None = None
+    nodes: Indices | None = None
     nodal: NodalField | None = None
     tied: Tied | None = None
     driven: Mask | None = None
     law: OverclosureLaw | None = None
-    branches: NDArray[np.int8] | None = None
+    branches: AnyArray | None = None
     wetted: Wetted | None = None
 
     def __len__(self) -> int:
@@ -240,7 +237,7 @@ class Constraints:
         return total
 
     def normal_forces(self, multiplier: Array) -> Array:
-        """Return the normal forces (m,) at the places of the formulation [force]."""
+        """Return the normal forces (m,) at the constraints of the formulation [force]."""
         return multiplier if self.tied is None else self.tied.forces(multiplier)[0]
 
     def contact_forces(self, multiplier: Array) -> Array:
@@ -272,7 +269,7 @@ class StackedConstraints(Constraints):
 
     parts: Mapping[str, Constraints] = field(default_factory=dict)
 
-    def state(self, active: Mask) -> NDArray[np.int8]:
+    def state(self, active: Mask) -> AnyArray:
         """Return the set `active` (m,) with the `branches` of all pairs: what is smooth as long as they are the same."""
         found = (part.branches for part in self.parts.values() if part.branches is not None)
         return np.concatenate([active.astype(np.int8), *found])
@@ -308,15 +305,15 @@ def stacked(parts: Mapping[str, Constraints]) -> StackedConstraints:
     )
 
 
-def _stacked_vectors(found: Sequence[NDArray[Any] | None], parts: list[Constraints], kind: type) -> Any:
+def _stacked_vectors(found: Sequence[AnyArray | None], parts: list[Constraints], kind: type) -> Any:
     """Return vectors (m,) of all parts as one, zero where a part has none; None where no part has one."""
     if all(vector is None for vector in found):
         return None
-    zero: list[NDArray[Any]] = [np.zeros(len(part), kind) for part in parts]
+    zero: list[AnyArray] = [np.zeros(len(part), kind) for part in parts]
     return np.concatenate([own if vector is None else vector for own, vector in zip(zero, found, strict=True)])
 
 
-def _stacked_nodes(parts: list[Constraints]) -> NDArray[np.intp] | None:
+def _stacked_nodes(parts: list[Constraints]) -> Indices | None:
     """Return the nodes of all parts; None where a part has none."""
     nodes = [part.nodes for part in parts if part.nodes is not None]
     return np.concatenate(nodes) if len(nodes) == len(parts) else None
@@ -332,7 +329,7 @@ def _stacked_slips(found: Sequence[Array | None], parts: list[Constraints]) -> A
 
 
 def _stacked_tangents(parts: list[Constraints]) -> tuple[csr_array, ...]:
-    """Return the tangential rows of all parts; empty rows stand for parts without friction."""
+    """Return the tangential rows of all parts, empty for parts without friction."""
     count = max(len(part.tangents) for part in parts)
     return tuple(
         csr_array(vstack([p.tangents[j] if p.tangents else csr_array(p.B.shape) for p in parts], format="csr"))
@@ -371,11 +368,11 @@ class _Softened:
     def __init__(self, inner: Compliance | None, softness: Array) -> None:
         self._inner, self._softness = inner, softness
 
-    def block(self, rows: NDArray[np.intp]) -> Array:
+    def block(self, rows: Indices) -> Array:
         own = self._softness[rows]
         return own if self._inner is None else np.diag(own) + self._inner.block(rows)
 
-    def among(self, rows: NDArray[np.intp]) -> Array | FieldCompliance:
+    def among(self, rows: Indices) -> Array | FieldCompliance:
         inner = None if self._inner is None else self._inner.among(rows)
         if isinstance(inner, FieldCompliance):
             return inner.softened(self._softness[rows], lambda: self.block(rows))
@@ -393,7 +390,7 @@ class _BlockDiagonal:
         self._parts = [part.compliance for part in parts]
         self._start = np.cumsum([0] + [len(part) for part in parts])
 
-    def block(self, rows: NDArray[np.intp]) -> Array:
+    def block(self, rows: Indices) -> Array:
         values = np.zeros((len(rows), len(rows)))
         for part, first, end in zip(self._parts, self._start[:-1], self._start[1:], strict=True):
             mine = np.flatnonzero((rows >= first) & (rows < end))
@@ -401,7 +398,7 @@ class _BlockDiagonal:
                 values[np.ix_(mine, mine)] = part.block(rows[mine] - first)
         return values
 
-    def among(self, rows: NDArray[np.intp]) -> Array | FieldCompliance:
+    def among(self, rows: Indices) -> Array | FieldCompliance:
         found = []
         for part, first, end in zip(self._parts, self._start[:-1], self._start[1:], strict=True):
             mine = rows[(rows >= first) & (rows < end)] - first

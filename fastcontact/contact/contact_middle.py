@@ -1,4 +1,4 @@
-"""Where the middle of a contact is, and how far from it places on the secondary surface lie.
+"""Centre of a contact zone, and distances from it on the secondary surface.
 
 In axisymmetry the middle is the axis. Otherwise it is the centre of pressure, of the contact as it is completed by reflection
 at the planes of symmetry that it reaches: a half or a quarter of a model has its middle on these planes. A plane of
@@ -17,18 +17,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.formulations import Formulation
-from fastcontact.contact.held_motions import HELD, HeldMotions
+from fastcontact.contact.held_motions import HeldMotions
 from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.surface import Surface
 from fastcontact.contact.unrolled_line import UnrolledLine, unrolled
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 # A plane of symmetry cuts the surface: its normal and that of the surface are nearly perpendicular [cosine].
 ACROSS = 0.5
+# A direction is held where at least this part of it, squared, is prescribed.
+HELD = 0.99
 # Below this length of the mean of unit normals a surface closes on itself: it has no direction.
 DIRECTED = 0.3
 
@@ -106,8 +106,8 @@ def contact_middle(pair: Formulation, normal: Array, force: Array, closed: Mask,
     return _in_space(points, weight, planes, mean)
 
 
-def _in_space(points: Array, weight: Array, planes: list[tuple[int, NDArray[np.intp]]], mean: Array) -> ContactMiddle:
-    """Return the middle on a surface in space; parallel planes of symmetry at both ends stand for an endless one."""
+def _in_space(points: Array, weight: Array, planes: list[tuple[int, Indices]], mean: Array) -> ContactMiddle:
+    """Return the centre on a surface in space; parallel planes of symmetry at both ends represent an infinite one."""
     centre = weight @ points
     ends: dict[int, list[float]] = {}
     for axis, nodes in planes:
@@ -127,9 +127,7 @@ def _meets_axis(points: Array) -> bool:
     return bool(np.abs(points[:, 0]).min() <= 1e-9 * np.ptp(points, axis=0).max())
 
 
-def symmetry_planes(
-    surface: Surface, coordinates: Array, motions: HeldMotions | None
-) -> list[tuple[int, NDArray[np.intp]]]:
+def symmetry_planes(surface: Surface, coordinates: Array, motions: HeldMotions | None) -> list[tuple[int, Indices]]:
     """Return the planes of symmetry at the ends of a surface: their axis, and which nodes of the surface lie on them.
 
     `coordinates` (n_points, dim) are those of all points; without supports there is no plane.
@@ -165,7 +163,7 @@ def _weights(force: Array, gap: Array) -> Array:
     return weight
 
 
-def _reached(surface: Surface, nodes: NDArray[np.intp], closed: Mask) -> bool:
+def _reached(surface: Surface, nodes: Indices, closed: Mask) -> bool:
     """Return whether a facet with one of the `nodes` has a closed node."""
     for block in surface.blocks:
         touching = np.isin(block.local, nodes).any(axis=1)
@@ -175,7 +173,7 @@ def _reached(surface: Surface, nodes: NDArray[np.intp], closed: Mask) -> bool:
 
 
 def _along_line(
-    surface: Surface, coordinates: Array, weight: Array, planes: list[tuple[int, NDArray[np.intp]]], mean: Array
+    surface: Surface, coordinates: Array, weight: Array, planes: list[tuple[int, Indices]], mean: Array
 ) -> ContactMiddle:
     """Return the middle on a surface in the plane; one in several pieces is seen along its mean normal."""
     points, length = coordinates[surface.points], float(np.linalg.norm(mean))

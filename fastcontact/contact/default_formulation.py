@@ -1,4 +1,4 @@
-"""What a contact pair gets without asking for a formulation: between bodies mortar with dual multipliers.
+"""Default formulation of a contact pair: between bodies, mortar with dual Lagrange multipliers.
 
 Of all choices it alone is right on any two surfaces (``bench/defaults.py``, docs/reference/accuracy.md). Node-to-segment
 contact takes the normal of one of two facets at a node that lies opposite a node, and nodes that lie so at first no
@@ -8,9 +8,10 @@ more on smooth quadratic facets in the plane, but each of their gaps involves th
 closed one costs a linear solution.
 
 Against rigid obstacles it is the continuous one, which also knows what lies between nodes, but node against obstacle on
-linear triangles, and in space on all facets whose nodes carry pressure, corners included. Triangles and tetrahedra cannot
-meet all conditions of the continuous formulation, and its pressures oscillate by up to 40 %; in space each of its
-integration points costs a linear solution.
+linear triangles, and in space on all facets whose nodes carry pressure, corners included; on the other facets in space,
+which are quadratic, it is mortar again where there is friction. Triangles and tetrahedra cannot meet all conditions of the
+continuous formulation, and its pressures oscillate by up to 40 %; in space each of its integration points costs a linear
+solution, and with friction nothing eliminates them.
 """
 
 from __future__ import annotations
@@ -41,8 +42,8 @@ def default_formulation(dim: int, options: Mapping[str, Any]) -> tuple[str, dict
 
 def against_obstacle(
     dim: int, facets: Collection[str], of_simplices: bool, options: Mapping[str, Any]
-) -> tuple[str, str]:
-    """Return the name of the formulation of a side against a rigid obstacle, and why, as the end of a sentence.
+) -> tuple[str, dict[str, Any], str]:
+    """Return the formulation of a side against a rigid obstacle, its options, and why, as the end of a sentence.
 
     Parameters
     ----------
@@ -56,7 +57,11 @@ def against_obstacle(
     """
     if facets and "integration" not in options:
         if of_simplices and all(elements.get(name).linear == name for name in facets):
-            return "node_to_segment", "the pressures of the continuous one oscillate on linear triangles and tetrahedra"
+            why = "the pressures of the continuous one oscillate on linear triangles and tetrahedra"
+            return "node_to_segment", dict(options), why
         if dim == 3 and all(all_nodes_carry(name) for name in facets):
-            return "node_to_segment", "the continuous one costs many times as much in space"
-    return "continuous", "it also knows what lies between nodes"
+            return "node_to_segment", dict(options), "the continuous one costs many times as much in space"
+        if dim == 3 and options.get("friction") and not any(name in options for name in OF_STANDARD):
+            why = "multigrid cannot eliminate the continuous one with friction in space"
+            return "mortar", {**options, "multipliers": "dual"}, why
+    return "continuous", dict(options), "it also knows what lies between nodes"

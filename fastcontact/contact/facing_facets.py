@@ -6,18 +6,16 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.contact.projection import CORNER
 from fastcontact.contact.search.closest import closest_of_kinds
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import cells_of_outer_facets, outer_facets
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 ROUNDING = 1e-9  # of the size of a facet
 
 
@@ -35,7 +33,7 @@ class OuterFacets:
     """
 
     mesh: Mesh
-    blocks: dict[str, NDArray[np.int32]]
+    blocks: dict[str, Numbers]
     body: Indices
     cell: Indices
 
@@ -117,7 +115,7 @@ class OuterFacets:
         graph = coo_array((np.ones(len(first_of)), (first_of, second_of)), shape=(len(self.body),) * 2)
         return np.asarray(connected_components(graph, directed=False)[1], np.intp)
 
-    def facets(self, numbers: Indices) -> dict[str, NDArray[np.int32]]:
+    def facets(self, numbers: Indices) -> dict[str, Numbers]:
         """Return the connectivity of some facets by element."""
         found = {}
         for (name, block), first in zip(self.blocks.items(), self.first):
@@ -171,14 +169,14 @@ def facing(outside: OuterFacets, distance: float | None, angle: float) -> Facing
     return Facing(*(np.concatenate([one[touching], other[ahead]]) for one, other in parts))
 
 
-def _search(outside: OuterFacets, distance: float | None, angle: float, among: NDArray[np.bool_]) -> Facing:
+def _search(outside: OuterFacets, distance: float | None, angle: float, among: Mask) -> Facing:
     """Return what points in the facets `among` (n,) all face."""
     found = [_faced_by(outside, body, distance, angle, among) for body in np.unique(outside.body)]
     return Facing(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 
 
 def _faced_by(
-    outside: OuterFacets, body: int, distance: float | None, angle: float, among: NDArray[np.bool_]
+    outside: OuterFacets, body: int, distance: float | None, angle: float, among: Mask
 ) -> tuple[Indices, Indices, Array]:
     """Return what points in those facets of one body face that are `among` (n,): see `Facing`."""
     owner, place, normal = outside.samples

@@ -9,16 +9,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
+from fastcontact.arrays import Array, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.surface import Surface
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 # A force that does not depend on the gap is a line of so small a slope: it vanishes at so many lengths of the side.
 FAR = 1e6
 # Gaps below this part of the length of the side are closed; pressures that differ by less of their size are the same.

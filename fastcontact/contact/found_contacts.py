@@ -1,4 +1,4 @@
-"""Contact pairs that a mesh has by itself: bodies whose surfaces face each other, with groups for both sides."""
+"""Automatic contact detection: bodies whose surfaces face each other, with facet groups for both sides."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.contact.facing_facets import Facing, OuterFacets, facing
 from fastcontact.errors import ContactError, FileError
 from fastcontact.mesh.argument_types import typed
@@ -19,8 +20,6 @@ from fastcontact.mesh.html_table import html_table
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import bodies
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 # Sides whose nodes, and bodies whose moduli, differ by less are alike.
 ALIKE = 0.1
 _COLUMNS = (
@@ -63,7 +62,7 @@ class FoundContact:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FoundContacts(Sequence[FoundContact]):
-    """What `find_contacts` has found: a sequence of `FoundContact` that prints as a table.
+    """Result of `find_contacts`: a sequence of `FoundContact` that prints as a table.
 
     Attributes
     ----------
@@ -224,7 +223,7 @@ def _bodies_of_cells(mesh: Mesh, groups: Sequence[str] | None) -> Indices:
     return found
 
 
-def _whole_bodies(mesh: Mesh) -> NDArray[np.int32]:
+def _whole_bodies(mesh: Mesh) -> Numbers:
     """Return the body (n_points,) of each point, -1 without any; both sides of a cut are one body."""
     count, body = bodies(mesh)
     cuts = [name for name in mesh.group_names if name + OPPOSITE in mesh.group_names]
@@ -235,7 +234,7 @@ def _whole_bodies(mesh: Mesh) -> NDArray[np.int32]:
 
 
 def _names(mesh: Mesh, body: Indices) -> list[str]:
-    """Return what bodies are called: by a cell group that is all of a body, else by their number from 1."""
+    """Return the names of bodies: a cell group that is all of a body, else its number from 1."""
     names, count = [f"body {k + 1}" for k in range(body.max() + 1)], np.bincount(body[body >= 0])
     for group in reversed(list(mesh.cell_groups)):
         members = body[mesh.cell_groups[group]]

@@ -1,4 +1,4 @@
-"""Directions in which single nodes are held, however that is said: by supports along axes, in other frames, by relations."""
+"""Directions in which nodes are constrained, by supports along axes, in local frames, or by multi-point constraints."""
 
 from __future__ import annotations
 
@@ -7,12 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial.distance import cdist
 
-Array = NDArray[np.float64]
-# A direction is held where at least this part of it, squared, is prescribed.
-HELD = 0.99
+from fastcontact.arrays import Array, Indices, Mask
+
 # Cosine of the angle within which directions at several nodes are taken together, as those of a curved rim are.
 TOGETHER = 0.94
+# Power of the inverse distance by which directions count elsewhere.
+NEAREST = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,12 +30,12 @@ class HeldMotions:
         Orthogonal projectors on the prescribed directions [-].
     """
 
-    nodes: NDArray[np.intp]
+    nodes: Indices
     projectors: Array
 
     @classmethod
-    def of(cls, supported: NDArray[np.bool_], relations: csr_array) -> HeldMotions:
-        """Return what `supported` components (n_points, dim) and `relations` (m, n_dofs) of single nodes hold."""
+    def of(cls, supported: Mask, relations: csr_array) -> HeldMotions:
+        """Return the constraints by `supported` components (n_points, dim) and single-node `relations` (m, n_dofs)."""
         dim = supported.shape[1]
         owners, normals = _rows_of_single_nodes(relations, dim)
         nodes = np.union1d(np.flatnonzero(supported.any(axis=1)), owners)
@@ -42,9 +45,7 @@ class HeldMotions:
             place = np.searchsorted(nodes, owners)
             np.add.at(projectors, place, np.einsum("md,me->mde", normals, normals))
             turned = np.unique(place)
-            values, vectors = np.linalg.eigh(projectors[turned])
-            vectors = np.where(values[:, None, :] > 1e-6, vectors, 0.0)
-            projectors[turned] = vectors @ vectors.transpose(0, 2, 1)
+            projectors[turned] = spanned(projectors[turned], 1e-6)
         return cls(nodes, projectors)
 
     def at(self, nodes: NDArray[np.integer]) -> Array:
@@ -55,7 +56,7 @@ class HeldMotions:
         return np.asarray(np.where((self.nodes[place] == nodes)[..., None, None], self.projectors[place], 0.0))
 
 
-def _rows_of_single_nodes(relations: csr_array, dim: int) -> tuple[NDArray[np.intp], Array]:
+def _rows_of_single_nodes(relations: csr_array, dim: int) -> tuple[Indices, Array]:
     """Return the nodes (k,) of rows that relate components of one node alone, and the unit vectors (k, dim) of the rows."""
     counts = np.diff(relations.indptr)
     rows = np.flatnonzero(counts > 0)
@@ -71,22 +72,53 @@ def _rows_of_single_nodes(relations: csr_array, dim: int) -> tuple[NDArray[np.in
     return owner[first[alone]], normals[rows[alone]] / length[alone, None]
 
 
-def distinct_directions(projectors: Array) -> Array:
-    """Return unit vectors (c, dim) such that each prescribed direction is one of them, or lies in the plane of some.
+def spanned(tensors: Array, least: float) -> Array:
+    """Return the projectors (n, dim, dim) on the eigenvectors of symmetric `tensors` with eigenvalues from `least` on."""
+    values, vectors = np.linalg.eigh(tensors)
+    vectors = np.where(values[:, None, :] >= least, vectors, 0.0)
+    return np.asarray(vectors @ vectors.transpose(0, 2, 1))
 
-    Axes first; then directions at nodes with a single one, those of nearly the same angle as one; then what is left.
+
+def without(projectors: Array, vectors: Array, least: Array | float) -> Array:
+    """Return projectors (n, dim, dim) less the parts of `vectors` (n, dim) inside them, where longer than `least`."""
+    inside = np.einsum("nde,ne->nd", projectors, vectors)
+    length = np.linalg.norm(inside, axis=1, keepdims=True)
+    inside = np.where(length > least, inside / np.where(length > 0.0, length, 1.0), 0.0)
+    return projectors - inside[:, :, None] * inside[:, None, :]
+
+
+def alike(projectors: Array, places: Array) -> list[tuple[Array, Mask]]:
+    """Return directions (n, dim) that several nodes are held in, as round a curved rim, and which nodes those are (n,).
+
+    Nodes held in a single direction come first, together where directions are nearly the same or others lie in between; nodes
+    held in more join them. Other nodes have the mean of the directions nearest to their `places` (n, dim) [length].
     """
-    dim = projectors.shape[-1]
-    values, vectors = np.linalg.eigh(projectors)
-    axes = [axis for k, axis in enumerate(np.eye(dim)) if (projectors[:, k, k] >= HELD).any()]
-    found: list[Array] = axes
-    for rank in range(1, dim + 1):
-        of_rank = (values > 0.5).sum(axis=1) == rank
-        several = vectors[of_rank][:, :, dim - rank :].swapaxes(1, 2).reshape(-1, dim)
-        for direction in several[np.sort(np.unique(several.round(9), axis=0, return_index=True)[1])]:
-            known = np.array(found).reshape(-1, dim)
-            within = known[np.abs(known @ direction) >= TOGETHER] if rank == 1 else known
-            spanned = len(within) and np.linalg.norm(np.linalg.lstsq(within.T, direction)[0] @ within) >= TOGETHER
-            if not spanned:
-                found.append(direction / np.linalg.norm(direction))
-    return np.array(found).reshape(-1, dim)
+    rest, found = projectors.copy(), []
+    while len(seeds := np.flatnonzero(rank := np.trace(rest, axis1=1, axis2=2).round())):
+        least = rank[seeds].min()
+        seeds = seeds[rank[seeds] == least]
+        seeds = seeds if least == 1 else seeds[:1]  # of several directions any are taken
+        own = np.linalg.eigh(rest[seeds])[1][:, :, -1]
+        if least == 1:
+            together = connected_components(csr_array(np.abs(own @ own.T) >= TOGETHER))[1] == 0
+            seeds, own = seeds[together], own[together]
+        along = _from_nearest(own, places[seeds], places)
+        along[seeds] = own
+        held = np.einsum("nd,nde,ne->n", along, rest, along) >= TOGETHER**2
+        found.append((np.where(held[:, None], _unit(np.einsum("nde,ne->nd", rest, along)), along), held))
+        rest[held] = without(rest[held], along[held], 0.0)
+    return found
+
+
+def _from_nearest(directions: Array, origin: Array, places: Array) -> Array:
+    """Return means (n, dim) of `directions` (k, dim) at `origin` (k, dim), up to their signs, by the distance to `places`."""
+    first = directions[0]
+    if (np.abs(directions @ first) > 1.0 - 1e-12).all():
+        return np.tile(first, (len(places), 1))
+    away = np.maximum(cdist(places, origin), 1e-300)
+    weight = (away.min(axis=1, keepdims=True) / away) ** NEAREST
+    return np.asarray(np.linalg.eigh(np.einsum("nk,kd,ke->nde", weight, directions, directions))[1][:, :, -1])
+
+
+def _unit(vectors: Array) -> Array:
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300))

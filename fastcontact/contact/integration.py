@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
+from fastcontact.arrays import Array, Numbers
 from fastcontact.contact.surface import Surface
 from fastcontact.mesh import elements, quadrature
 
-Array = NDArray[np.float64]
 
-
-def facet_measure(facets: NDArray[np.int32], element: str, points: Array, xi: Array, axisymmetric: bool) -> Array:
+def facet_measure(facets: Numbers, element: str, points: Array, xi: Array, axisymmetric: bool) -> Array:
     """Return the length or area per unit of xi, (n_facets, n_q), at `xi` (n_q, dim - 1).
 
     In axisymmetry, the area over the full circle.

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact import line_projection_kernels
 from fastcontact.contact.search.closest import Closest
 from fastcontact.contact.surface import Surface
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 
 def along_line_normals(
@@ -35,7 +32,7 @@ def along_line_normals(
     return facet, xi[:, None], overhang
 
 
-def smooth_ends(side: Surface, normals: Array) -> NDArray[np.bool_]:
+def smooth_ends(side: Surface, normals: Array) -> Mask:
     """Return which ends (n_facets, 2) of lines another line goes on from without a corner.
 
     `normals` (n_facets, k, 2) are those of the facets at their nodes, see `projection.smooth_normals`: the same for both

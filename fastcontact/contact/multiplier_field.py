@@ -1,4 +1,4 @@
-"""Pressure fields: point forces, their field, and the compliance between the two.
+"""Multiplier fields: point forces, their projection onto the field, and the compliance between the two.
 
 See `_pressure_field` for the formulas.
 """
@@ -8,21 +8,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import SuperLU
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ContactError
 from fastcontact.linear.field_compliance import FieldCompliance
 
-Array = NDArray[np.float64]
 # Closed integration points up to which the dense equations of the continuous formulation are solved, in about a minute.
 MOST_POINTS = 10_000
 
 
 @dataclass(frozen=True, eq=False)
 class Projection:
-    """Projection of point forces on a multiplier field, and the compliance of what it cannot represent.
+    """Projection of point forces on a multiplier field, and the compliance of the complement.
 
     Attributes
     ----------
@@ -47,13 +46,13 @@ class Projection:
     eliminable: bool = True
     quadratic: bool = False
 
-    def block(self, rows: NDArray[np.intp]) -> Array:
+    def block(self, rows: Indices) -> Array:
         """Return rows and columns `rows` of C, a dense matrix; ContactError where it would be too large to be of use."""
         if len(rows) > MOST_POINTS:
             raise ContactError(
                 f"the continuous formulation closes {len(rows)} integration points at once, whose compliance would be a "
-                f"dense matrix of {8e-9 * len(rows) ** 2:.1f} GB: use formulation='node_to_segment' (on cells with quadratic "
-                "facets: hex27 or linear ones) or, between bodies, 'mortar'"
+                f"dense matrix of {8e-9 * len(rows) ** 2:.1f} GB: use formulation='mortar' with "
+                "multipliers='dual'"
             )
         if self.mass is None:
             return np.zeros((len(rows), len(rows)))
@@ -62,7 +61,7 @@ class Projection:
         own = np.divide(1.0, areas, out=np.zeros_like(areas), where=areas > 0)
         return (np.diag(own) - P @ self.mass.solve(np.ascontiguousarray(P.T))) / self.rho
 
-    def among(self, rows: NDArray[np.intp]) -> Array | FieldCompliance:
+    def among(self, rows: Indices) -> Array | FieldCompliance:
         """Return C among `rows`; see `Compliance`."""
         if not self.eliminable or self.mass is None or not (self.areas[rows] > 0).all():
             return self.block(rows)
@@ -83,8 +82,8 @@ class Projection:
         """Return the independent values (k,) of the multiplier field [pressure] for point forces (m,) [force]."""
         return np.zeros(self.P.shape[1]) if self.mass is None else self.mass.solve(self.P.T @ multiplier)
 
-    def compliant(self, columns: NDArray[np.intp]) -> Array:
-        r"""Return a factor Z (m, h) of what dropping `columns` of the multiplier field adds to the compliance C.
+    def compliant(self, columns: Indices) -> Array:
+        r"""Return a factor Z (m, h) of the compliance added by dropping `columns` of the multiplier field.
 
         At supported nodes, as on an axis or in a plane of symmetry, the slip of a facet has one nodal value less than its
         multiplier field: a field that alternates from node to node and dies out along the surface does no work on any slip,

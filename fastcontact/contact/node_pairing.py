@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.contact.pairing import Candidates, Pairing
 from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.surface import Surface
 from fastcontact.mesh import elements
-
-Array = NDArray[np.float64]
 
 
 def at_nodes(
@@ -41,7 +39,7 @@ def at_nodes(
     return replace(found, facet=facet[nearest], xi=xi[nearest], normal=normal)
 
 
-def _on_facets(side: Surface) -> tuple[NDArray[np.intp], Array]:
+def _on_facets(side: Surface) -> tuple[Indices, Array]:
     """Return a facet (m,) at each node of a surface, and the reference coordinates (m, dim - 1) of the node on it."""
     m, dim = len(side.points), elements.get(side.blocks[0].element).dim
     facet, xi, first = np.zeros(m, np.intp), np.zeros((m, dim)), 0

@@ -1,15 +1,14 @@
-"""Whether the nodes of two surfaces lie opposite to each other."""
+"""Whether two surface meshes are conforming."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.contact.projection import places
 from fastcontact.contact.search.closest import closest_of_kinds
 from fastcontact.contact.surface import Surface
 
-Array = NDArray[np.float64]
 # In facet lengths: how far from a node a projection may lie and still be opposite to it; how much farther apart than
 # the closest points others may be and still tell whether the sides match; and how far beyond an edge they may lie.
 OPPOSITE, NEAR, BESIDE = 0.2, 0.5, 0.05

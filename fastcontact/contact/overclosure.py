@@ -1,4 +1,4 @@
-"""Pressure as a function of the overclosure, by a table: a soft layer between the sides of a contact pair."""
+"""Tabular pressure-overclosure relations."""
 
 from __future__ import annotations
 
@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.errors import ContactError
-
-Array = NDArray[np.float64]
 
 
 class OverclosureLaw:

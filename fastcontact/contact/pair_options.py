@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, diags_array, eye_array
 
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.cohesion import CohesiveLaw
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.contact.pairing import Candidates, Pairing, normals
@@ -16,8 +16,6 @@ from fastcontact.contact.projection import places
 from fastcontact.contact.surface import Surface
 from fastcontact.mesh import elements
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 KINDS = ("unilateral", "bilateral", "bilateral_once_closed", "tied", "gap_only")
 Field = Callable[[Array], Array]
 # A vector of which less than this lies in a tangent plane is normal to it.
@@ -69,7 +67,7 @@ class PairOptions:
     wear: float | None = None
     cohesion: CohesiveLaw | None = None
     source: Mask | None = None
-    same_place: NDArray[np.intp] | None = None
+    same_place: Indices | None = None
 
     @property
     def gap_only(self) -> bool:
@@ -92,8 +90,8 @@ class PairOptions:
             np.zeros(len(candidates.nodes), bool) if self.excluded is None else candidates.belonging_to(self.excluded)
         )
 
-    def borders(self, side: Surface) -> tuple[NDArray[np.intp], Array]:
-        """Return (facet, xi) of the points of lines where what belongs to excluded nodes ends."""
+    def borders(self, side: Surface) -> tuple[Indices, Array]:
+        """Return (facet, xi) of the points on lines that bound the share of excluded nodes."""
         mask = self.excluded
         if mask is None:
             return np.empty(0, np.intp), np.empty(0)
@@ -136,7 +134,7 @@ class PairOptions:
     def added_gap(
         self, candidates: Candidates, pairing: Pairing, primary: object, reference: Array, factor: float
     ) -> Array:
-        """Return what clearances times a factor add to the gaps (n,) of candidates, zero where nothing is faced [length]."""
+        """Return the contribution of clearances times a factor to the gaps (n,) of candidates, zero if unpaired [length]."""
         added = np.zeros(len(candidates.nodes))
         rows = np.flatnonzero(pairing.paired)
         if not len(rows):
@@ -150,7 +148,7 @@ class PairOptions:
         return factor * added
 
 
-def spread(side: Surface, excluded: Mask, givers: NDArray[np.intp]) -> csr_array:
+def spread(side: Surface, excluded: Mask, givers: Indices) -> csr_array:
     """Return the nodal field (m, m) of a multiplier of which excluded nodes have no value of their own.
 
     They take the mean of their neighbours among the nodes `givers`, so that a uniform field remains one; zero where

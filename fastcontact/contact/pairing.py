@@ -1,4 +1,4 @@
-"""Which point faces which facet: places of the secondary side projected on the primary facets, and their gap rows.
+"""Pairing: projection of secondary points onto primary facets, and rows of the gap function.
 
 Mortar in space pairs facets with facets instead, in `formulations._cut_faces`.
 """
@@ -7,18 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from fastcontact.arrays import AnyArray, Array, Indices, Mask, Numbers
 from fastcontact.contact.line_projection import along_line_normals, smooth_ends
 from fastcontact.contact.obstacles.rigid_side import RigidSide, Stance
 from fastcontact.contact.projection import (
     Places,
     along_normals,
     at_nodes_of_facets,
+    facet_normals,
     interpolated,
     places,
     smooth_normals,
@@ -27,10 +27,11 @@ from fastcontact.contact.search.closest import Closest, closest_of_kinds
 from fastcontact.contact.surface import Surface
 from fastcontact.mesh import elements
 
-Array = NDArray[np.float64]
 # In facet lengths: how far beyond both facets at a node a point may lie and still face it; what is rounding.
 FOLDED = 0.5
 ROUNDING = 1e-10
+# Part of either facet at an edge over which rounded edges turn.
+ROUNDED = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,9 +50,9 @@ class Candidates:
         Their reference coordinates in it.
     """
 
-    nodes: NDArray[np.int32]
+    nodes: Numbers
     shape: Array
-    facet: NDArray[np.intp] | None = None
+    facet: Indices | None = None
     xi: Array | None = None
 
     @classmethod
@@ -82,7 +83,7 @@ class Candidates:
         """Return the positions (n, dim) for nodal `coordinates` (n_points, dim)."""
         return np.einsum("nk,nkd->nd", self.shape, coordinates[self.nodes])
 
-    def belonging_to(self, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def belonging_to(self, mask: Mask) -> Mask:
         """Return which candidates (n,) lie nearer to nodes of `mask` (n_points,) than to all others."""
         inside = mask[self.nodes]
         largest = np.where(inside, self.shape, -np.inf).max(axis=1)
@@ -110,14 +111,14 @@ class Pairing:
         on straight there; None where none does.
     """
 
-    facet: NDArray[np.intp]
+    facet: Indices
     xi: Array
     normal: Array
-    paired: NDArray[np.bool_]
+    paired: Mask
     offset: Array | None = None
     beyond: Array | None = None
 
-    def places(self, primary: Surface, rows: NDArray[np.intp]) -> Places:
+    def places(self, primary: Surface, rows: Indices) -> Places:
         """Return the points of `primary` that candidates `rows` (n,) face, facets going on straight beyond their ends."""
         found = places(primary, self.facet[rows], self.xi[rows])
         if self.beyond is None:
@@ -132,6 +133,7 @@ def pair(
     projection_tolerance: float,
     normals: str | Sequence[float] = "facet",
     obstacle: Stance | None = None,
+    rounded: bool = False,
 ) -> Pairing:
     """Project candidate positions (n, dim) on the closest facet of `primary` at nodal `coordinates` [length].
 
@@ -140,7 +142,7 @@ def pair(
     sides have one line of action; they balance in moment. Unless `normals` is ``"facet"``, the normal is interpolated
     between nodal means of the facets' normals, so that it does not jump where facets meet but for corners, and the
     candidates are projected along it; a unit vector (dim,) is the normal everywhere. A rigid obstacle stands
-    as `obstacle` says.
+    as `obstacle` says. Edges between facets are `rounded` or not.
 
     Raises
     ------
@@ -153,7 +155,7 @@ def pair(
         nowhere = np.zeros(len(candidates), np.intp)
         return Pairing(nowhere, np.zeros((len(candidates), candidates.shape[1] - 1)), normal, paired, offset)
     found = closest_of_kinds(candidates, primary.corners(coordinates))
-    if normals == "facet":
+    if normals == "facet" and not rounded:
         inner = _at_smooth_ends(primary, coordinates, found)
         paired = found.overhang <= np.where(inner, max(projection_tolerance, FOLDED), projection_tolerance)
         outside = paired & ~inner & (found.overhang > ROUNDING)
@@ -168,16 +170,32 @@ def pair(
     else:
         facet, xi, overhang = along_line_normals(candidates, primary, coordinates, at_nodes, found)
         normal = interpolated(at_nodes[facet], places(primary, facet, xi))
+    if normals == "facet":
+        normal = _round_edges(primary, coordinates, facet, xi, normal)
     paired = overhang <= projection_tolerance
     return _straight_on(
         Pairing(facet, xi, normal, paired), candidates, primary, coordinates, paired & (overhang > ROUNDING)
     )
 
 
-def _straight_on(
-    pairing: Pairing, candidates: Array, primary: Surface, coordinates: Array, outside: NDArray[np.bool_]
-) -> Pairing:
-    """Return the pairing with how far those `outside` (n,) stand beyond the ends of their facets."""
+def _round_edges(primary: Surface, coordinates: Array, facet: Indices, xi: Array, mean: Array) -> Array:
+    """Return the normals (n, dim) of facets that turn to the `mean` (n, dim) at their edges over `ROUNDED` of each.
+
+    Where facets meet in an edge, contact forces of a node may have any direction between their normals, and the edge is where
+    equilibrium puts the node: with the normal of one or the other it flips between them. Here the direction follows from
+    where it stands on the rounded edge.
+    """
+    own = at_nodes_of_facets([facet_normals(block, coordinates) for block in primary.blocks])[facet]
+    own = interpolated(own, places(primary, facet, xi))
+    on_triangle = np.column_stack([xi, 1.0 - xi.sum(axis=1)]).min(axis=1)
+    inside = np.where(primary.triangular[facet], on_triangle, 0.5 * (1.0 - np.abs(xi).max(axis=1)))
+    share = np.clip(1.0 - inside / ROUNDED, 0.0, 1.0)[:, None]
+    normal = share * mean + (1.0 - share) * own
+    return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
+
+
+def _straight_on(pairing: Pairing, candidates: Array, primary: Surface, coordinates: Array, outside: Mask) -> Pairing:
+    """Return the pairing with the overhang of candidates `outside` (n,) beyond the ends of their facets."""
     rows = np.flatnonzero(outside)
     if not len(rows):
         return pairing
@@ -190,8 +208,8 @@ def _straight_on(
     return replace(pairing, beyond=beyond)
 
 
-def _at_smooth_ends(primary: Surface, coordinates: Array, found: Closest) -> NDArray[np.bool_]:
-    """Return which candidates (n,) stand out at an end of a line where another line goes on from without a corner.
+def _at_smooth_ends(primary: Surface, coordinates: Array, found: Closest) -> Mask:
+    """Return which candidates (n,) overhang an end at which another line continues smoothly.
 
     On lines that fold inward, points at a distance lie beyond the ends of both facets at a node, but not beyond the end
     of the surface. At a corner they lie beside it.
@@ -203,7 +221,7 @@ def _at_smooth_ends(primary: Surface, coordinates: Array, found: Closest) -> NDA
     return np.asarray(out & smooth[found.facet, (found.xi[:, 0] > 0.0).astype(np.intp)])
 
 
-def filled_up(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
+def filled_up(parts: Sequence[AnyArray]) -> AnyArray:
     """Return arrays (n_i, k_i) as one, as wide as the widest: integers are repeated, floating-point numbers zero."""
     width = max(part.shape[1] for part in parts)
     missing = [((0, 0), (0, width - part.shape[1])) for part in parts]
@@ -250,19 +268,6 @@ def tangents(normal: Array) -> list[Array]:
     return [first, np.cross(normal, first)]
 
 
-def tangents_by_axes(normal: Array) -> list[Array]:
-    """Return tangents as `tangents` does, but in 3D for each point by itself, along coordinate axes where these allow it.
-
-    In planes and on lines of symmetry, one of them is what supports hold. From point to point they may jump.
-    """
-    if normal.shape[1] == 2:
-        return tangents(normal)
-    smallest = np.eye(3)[np.argmin(np.abs(normal), axis=1)]
-    first = np.cross(smallest, normal)
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    return [first, np.cross(normal, first)]
-
-
 def normals(directions: Sequence[Array]) -> Array:
     """Return the unit normals (n, dim) that `tangents` complete."""
     if len(directions) == 1:
@@ -273,7 +278,7 @@ def normals(directions: Sequence[Array]) -> Array:
 def rows_along(
     direction: Array, candidates: Candidates, pairing: Pairing, primary: Surface | RigidSide, n_dofs: int
 ) -> csr_array:
-    """Return rows (n, n_dofs): motion of the candidates along `direction` (n, dim) relative to what they face.
+    """Return rows (n, n_dofs) of the relative motion of paired points along `direction` (n, dim).
 
     Rows of unpaired candidates are empty.
     """

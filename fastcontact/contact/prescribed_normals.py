@@ -1,4 +1,4 @@
-"""Along which normals gaps are measured, where a user says so: those of the secondary side, or one for all."""
+"""Prescribed directions of the gap function: secondary normals, or one vector for the whole side."""
 
 from __future__ import annotations
 
@@ -6,15 +6,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pairing import Pairing
 from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError, unknown
 
-Array = NDArray[np.float64]
 Normals = str | Sequence[float]
 KINDS = ("facet", "averaged", "secondary")
 # Cosine of the angle beyond which two sides do not face each other: about 85 degrees.

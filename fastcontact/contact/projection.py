@@ -1,4 +1,4 @@
-"""Projection on a surface along averaged normals: continuous where facets meet, as the closest point is not.
+"""Projection along averaged normals: continuous across facets, unlike closest-point projection.
 
 On a surface of facets the closest point jumps where an edge folds inward, by a distance in proportion to the gap; a
 pairing that is renewed in a loop may then flip for ever. Along normals interpolated between nodal means the projection
@@ -11,17 +11,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._jit.parallel import portions, shared
+from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.contact import projection_kernels
 from fastcontact.contact.search.closest import Closest
 from fastcontact.contact.search.facet_tables import tables
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.mesh import elements
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 # What the projection of a point takes, in nodes of a cell: see `portions`.
 EFFORT = 16
@@ -43,7 +40,7 @@ class Places:
         Their derivatives.
     """
 
-    nodes: NDArray[np.int32]
+    nodes: Numbers
     local: Indices
     shape: Array
     gradient: Array
@@ -126,7 +123,7 @@ def smooth_normals(side: Surface, coordinates: Array) -> list[Array]:
 
 
 def at_nodes_of_facets(parts: Sequence[Array]) -> Array:
-    """Return what blocks have at the nodes of their facets (n_facets, k, ...) as one array, as wide as the widest block.
+    """Return values at the nodes of facets (n_facets, k, ...) of all blocks as one array, as wide as the widest block.
 
     The last entry of facets with fewer nodes is repeated, as in `places`.
     """
@@ -160,7 +157,7 @@ def _angles(block: FacetBlock, coordinates: Array) -> Array:
 
 
 def interpolated(normals: Array, at: Places) -> Array:
-    """Return unit normals (n, dim) at places, interpolated from those at the nodes of their facets (n, k, dim)."""
+    """Return unit normals (n, dim) interpolated from those at the nodes of facets (n, k, dim)."""
     normal = np.einsum("nk,nkd->nd", at.shape, normals)
     return normal / np.linalg.norm(normal, axis=1, keepdims=True)
 

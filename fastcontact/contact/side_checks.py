@@ -1,24 +1,21 @@
-"""Whether the two sides of a contact pair can touch at all: checks before any numerics."""
+"""Checks of the two sides of a contact pair before any numerics."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Mask, Numbers
 from fastcontact.contact.obstacles.rigid_side import RigidSide, Stance
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
-Array = NDArray[np.float64]
 # Facets of each kind that are looked at.
 SAMPLE = 200
 
 
-def check_sides(
-    mesh: Mesh, name: str, secondary: Surface, primary: Surface, excluded: NDArray[np.bool_] | None = None
-) -> None:
+def check_sides(mesh: Mesh, name: str, secondary: Surface, primary: Surface, excluded: Mask | None = None) -> None:
     """Raise ContactError for sides of contact `name` that share nodes or cannot face each other.
 
     They may share nodes that carry no contact, `excluded` (n_points,).
@@ -63,7 +60,7 @@ def check_obstacle(mesh: Mesh, name: str, secondary: Surface, obstacle: RigidSid
         )
 
 
-def shared_facets(mesh: Mesh, group: str, other: str) -> NDArray[np.int32]:
+def shared_facets(mesh: Mesh, group: str, other: str) -> Numbers:
     """Return the nodes of the facets that two groups share, ascending; a facet may be in the mesh more than once."""
     ours, theirs = mesh.cells_of(group, dim=mesh.dim - 1), mesh.cells_of(other, dim=mesh.dim - 1)
     nodes = [np.empty(0, np.int32)]

@@ -1,4 +1,4 @@
-"""One side of a contact pair: the facets of a group, turned outward from the solid that carries them."""
+"""One side of a contact pair: the facets of a group, with outward orientation."""
 
 from __future__ import annotations
 
@@ -7,16 +7,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
+from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.errors import ContactError, MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import ordered_line, outer_facets
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int32]
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,8 +31,8 @@ class FacetBlock:
     """
 
     element: str
-    facets: Indices
-    local: NDArray[np.intp]
+    facets: Numbers
+    local: Indices
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +53,7 @@ class Surface:
 
     group: str
     blocks: tuple[FacetBlock, ...]
-    points: Indices
+    points: Numbers
     abscissa: Array
 
     @property
@@ -75,12 +72,12 @@ class Surface:
         return self._only_block().element
 
     @property
-    def facets(self) -> Indices:
+    def facets(self) -> Numbers:
         """Connectivity (n_facets, n_nodes), where the facets are of one kind."""
         return self._only_block().facets
 
     @property
-    def local(self) -> NDArray[np.intp]:
+    def local(self) -> Indices:
         """`facets` as positions in `points`, where they are of one kind."""
         return self._only_block().local
 
@@ -93,29 +90,35 @@ class Surface:
         return self.blocks[0]
 
     @cached_property
-    def inner_ends(self) -> NDArray[np.bool_]:
+    def inner_ends(self) -> Mask:
         """Which ends (n_facets, 2) of lines meet another line."""
         ends = np.concatenate([block.local[:, :2] for block in self.blocks])
         return np.asarray(np.bincount(ends.ravel())[ends] > 1)
 
     @cached_property
-    def near(self) -> csr_array:
-        """One (m, m) where two nodes lie in one facet or in two facets that share a node."""
+    def beside(self) -> csr_array:
+        """One (m, m) where two nodes lie in one facet."""
         rows = [np.repeat(block.local, block.local.shape[1], axis=1).ravel() for block in self.blocks]
         columns = [np.tile(block.local, block.local.shape[1]).ravel() for block in self.blocks]
         row, column, m = np.concatenate(rows), np.concatenate(columns), len(self.points)
-        beside = csr_array(coo_array((np.ones(len(row)), (row, column)), shape=(m, m)))
-        found = csr_array(beside @ beside)
+        found = csr_array(coo_array((np.ones(len(row)), (row, column)), shape=(m, m)))
         found.data[:] = 1.0
         return found
 
     @cached_property
-    def triangular(self) -> NDArray[np.bool_]:
+    def near(self) -> csr_array:
+        """One (m, m) where two nodes lie in one facet or in two facets that share a node."""
+        found = csr_array(self.beside @ self.beside)
+        found.data[:] = 1.0
+        return found
+
+    @cached_property
+    def triangular(self) -> Mask:
         """Which facets (n_facets,) are triangles."""
         return np.concatenate([np.full(len(b.facets), elements.get(b.element).n_corners == 3) for b in self.blocks])
 
     @cached_property
-    def neighbours(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    def neighbours(self) -> tuple[Indices, Indices]:
         """Where the neighbours of each facet begin (n_facets + 1,), and which they are, ascending: they share a node."""
         nodes = np.concatenate([block.local.ravel() for block in self.blocks])
         sizes = np.concatenate([np.full(len(block.local), block.local.shape[1]) for block in self.blocks])
@@ -156,7 +159,7 @@ def surface(mesh: Mesh, group: str) -> Surface:
     return Surface(group, blocks, points, abscissa)
 
 
-def _outward(mesh: Mesh, group: str, name: str, block: Indices, outer: Mapping[str, Indices]) -> Indices:
+def _outward(mesh: Mesh, group: str, name: str, block: Numbers, outer: Mapping[str, Numbers]) -> Numbers:
     """Return the facets `outer` of the solids that match `block`, with the solid's orientation."""
     candidates = outer.get(name, np.empty((0, elements.get(name).n_nodes), np.int32))
     near = np.zeros(mesh.n_points, bool)
@@ -174,7 +177,7 @@ def _outward(mesh: Mesh, group: str, name: str, block: Indices, outer: Mapping[s
     return np.ascontiguousarray(candidates[np.unique(rows)])
 
 
-def _ordered(mesh: Mesh, group: str, facets: Mapping[str, Indices]) -> tuple[Indices, Array]:
+def _ordered(mesh: Mesh, group: str, facets: Mapping[str, Numbers]) -> tuple[Numbers, Array]:
     if mesh.dim == 2:
         try:
             line = ordered_line(mesh, group)

@@ -18,22 +18,20 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.special import comb
 
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.projection import CORNER
 from fastcontact.contact.search.closest import closest_of_kinds
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.mesh import elements
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
-# Heights below this part of the size of a facet are rounding errors of node positions.
+# Heights below this part of the size of a facet, and curvatures below this part of its inverse, are rounding errors.
 ROUND_OFF = 1e-10
-# Columns of a fit are scaled by this with each degree, and its squares damped: where nodes leave terms undetermined, as on a
-# strip one facet wide, those of low degree take all.
-LOWER, DAMPING = 0.1, 1e-13
+# Columns of a fit are scaled by this with each degree, and its squares damped by this part of the least column: where nodes
+# leave terms undetermined, as on a strip one facet wide, those of low degree take all.
+LOWER, DAMPING = 0.1, 1e-5
 # Circles, spheres and cylinders are matched to (L / R)^(2 PASSES).
 PASSES = 3
 
@@ -148,7 +146,7 @@ def smooth_side(side: Surface, points: Array) -> SmoothSide | None:
     return SmoothSide(heights * _limiter(near, curvature, axes)[:, None, None], curvature)
 
 
-def _neighbours(side: Surface, normal: Array) -> tuple[csr_array, Indices, NDArray[np.bool_]]:
+def _neighbours(side: Surface, normal: Array) -> tuple[csr_array, Indices, Mask]:
     """Return which facets share a node and meet at no corner, and the nodes of all these for each facet.
 
     A matrix (n_facets, n_facets), each facet with itself, positions (n_facets, most) in the points of the side, and which of
@@ -168,7 +166,7 @@ def _neighbours(side: Surface, normal: Array) -> tuple[csr_array, Indices, NDArr
     return near, padded, taken
 
 
-def _flat(points: Array, around: Array, taken: NDArray[np.bool_]) -> bool:
+def _flat(points: Array, around: Array, taken: Mask) -> bool:
     """Return whether points (n, dim) lie in one plane, or the points `around` (n, m, dim) every facet in one of their own."""
     away = points - points.mean(axis=0)
     if np.linalg.svd(away, compute_uv=False)[-1] <= ROUND_OFF * np.linalg.norm(away):
@@ -200,15 +198,18 @@ class _Fit:
         local = np.einsum("nkd,ned->nke", points - self.origin[:, None], self.axes) / self.size[:, None, None]
         return local[..., :-1], local[..., -1]
 
-    def fitted(self, points: Array, taken: NDArray[np.bool_]) -> _Fit:
+    def fitted(self, points: Array, taken: Mask) -> _Fit:
         """Return this one with polynomials fitted to those `points` (n, m, dim) that are `taken` (n, m)."""
         (plane, height), (i, j) = self.in_planes(points), self.powers
         lower = LOWER ** (i + j) * np.sqrt(comb(i + j, i))  # no direction counts more than others (Bombieri's norm)
         columns = np.where(taken[..., None], lower * _terms(plane, i, j), 0.0)
-        rest = (height - _conic(self.curvature, plane))[..., None]
-        normal = columns.transpose(0, 2, 1) @ columns
-        normal += DAMPING * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(len(i))
-        return replace(self, polynomial=lower * np.linalg.solve(normal, columns.transpose(0, 2, 1) @ rest)[..., 0])
+        rest = np.where(taken, height - _conic(self.curvature, plane), 0.0)
+        size = LOWER ** (i + j).max() * np.sqrt(DAMPING * (columns**2).sum(axis=(1, 2)))
+        damping = size[:, None, None] * np.eye(len(i), len(i) + 1)
+        # By orthogonal factors: in normal equations what the damping determines would be known to 1e-3 only.
+        rows = np.concatenate([np.concatenate([columns, rest[..., None]], axis=2), damping], axis=1)
+        R: Array = np.asarray(np.linalg.qr(rows, mode="r"))
+        return replace(self, polynomial=lower * np.linalg.solve(R[:, : len(i), :-1], R[:, : len(i), -1:])[..., 0])
 
     def at(self, plane: Array) -> Array:
         """Return the heights (n, m) over points (n, m, d) of the planes."""
@@ -224,7 +225,7 @@ class _Fit:
         return self.polynomial[:, slope], self.curvature - self.polynomial[:, second] * (1.0 + np.eye(len(second)))
 
 
-def _fit(block: FacetBlock, points: Array, around: Array, taken: NDArray[np.bool_], degree: int) -> _Fit:
+def _fit(block: FacetBlock, points: Array, around: Array, taken: Mask, degree: int) -> _Fit:
     """Fit surfaces to those of the points `around` (n, m, dim) the facets of a block that are `taken` (n, m).
 
     From pass to pass, planes turn to be tangent, and what is of constant curvature is taken out of the polynomials.
@@ -234,13 +235,20 @@ def _fit(block: FacetBlock, points: Array, around: Array, taken: NDArray[np.bool
     size = np.linalg.norm(corners - origin[:, None], axis=2).max(axis=1)
     powers = _powers(points.shape[1] - 1, degree)
     curvature = np.zeros((len(corners), *2 * (points.shape[1] - 1,)))
-    fit = _Fit(np.empty(0), origin, size, curvature, powers, np.empty(0))
-    for _ in range(PASSES):
-        fit = replace(fit, axes=_axes(block, points, normal), curvature=curvature).fitted(around, taken)
+    fit = _Fit(_axes(block, points, normal), origin, size, curvature, powers, np.empty(0)).fitted(around, taken)
+    for _ in range(1, PASSES):
         slope, curvature = fit.in_the_middle()
-        normal = fit.axes[:, -1] - np.einsum("nj,njd->nd", slope, fit.axes[:, :-1])
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        fit = replace(fit, axes=_tilted(fit.axes, slope), curvature=curvature).fitted(around, taken)
     return fit
+
+
+def _tilted(axes: Array, slope: Array) -> Array:
+    """Return axes (n, dim, dim) after the smallest rotation to normals of surfaces with a `slope` (n, dim - 1) over them."""
+    normal = axes[:, -1] - np.einsum("nj,njd->nd", slope, axes[:, :-1])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    both = axes[:, -1] + normal
+    along = np.einsum("njd,nd->nj", axes[:, :-1], normal) / np.einsum("nd,nd->n", both, normal)[:, None]
+    return np.concatenate([axes[:, :-1] - along[:, :, None] * both[:, None], normal[:, None]], axis=1)
 
 
 def _heights(block: FacetBlock, points: Array, smooth: _Fit) -> tuple[Array, Array, Array]:
@@ -252,7 +260,9 @@ def _heights(block: FacetBlock, points: Array, smooth: _Fit) -> tuple[Array, Arr
     height = smooth.size[:, None] * np.where(np.abs(height) > ROUND_OFF, height, 0.0)
     heights = np.zeros((len(corners), k, k if element.dim == 2 else 1))
     heights[:, powers[0], powers[1]] = np.linalg.solve(_terms(xi, *powers), height.T).T
-    return heights, smooth.in_the_middle()[1] / smooth.size[:, None, None], smooth.axes[:, :-1]
+    curvature = smooth.in_the_middle()[1]
+    curvature = np.where(np.abs(curvature) > ROUND_OFF, curvature, 0.0) / smooth.size[:, None, None]
+    return heights, curvature, smooth.axes[:, :-1]
 
 
 def _conic(curvature: Array, plane: Array) -> Array:

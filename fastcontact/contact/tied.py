@@ -11,13 +11,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array, eye_array, vstack
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.contact.constraints import Constraints, NodalField
 from fastcontact.contact.multiplier_field import Projection
 
-Array = NDArray[np.float64]
 # Entries of a row below this fraction of the largest are rounding errors of a projection that ends at a node.
 ZERO = 1e-12
 
@@ -47,7 +46,7 @@ class TiedPair:
     directions: tuple[Array, ...]
     positions: Array
     nodal: NodalField
-    nodes: NDArray[np.intp] | None = None
+    nodes: Indices | None = None
 
     def constraints(self) -> Constraints:
         """Return the equations."""
@@ -66,7 +65,7 @@ class TiedPair:
 
 
 def tied(part: Constraints) -> TiedPair:
-    """Return the equations that tie what the constraints `part`, with tangents, pair."""
+    """Return the tying equations of the constraints `part`, which have tangents."""
     moments = moments_of(part)
     size = np.maximum(np.asarray(abs(moments).sum(axis=1)).ravel(), 1e-300)
     positions = abs(moments) @ part.positions / size[:, None]

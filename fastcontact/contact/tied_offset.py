@@ -1,4 +1,4 @@
-"""Tied sides that lie apart: what ties them turns with the primary facet, as a stiff arm of the length of the gap.
+"""Tied sides with an offset: a rigid arm across the gap rotates with the primary facet.
 
 Equal displacements across a gap would stop no rotation: the forces of both sides would have lines of action a gap apart, and
 shear would lose its moment. With the arm, the relative displacement along a tangent t is ``t . (u_s - u_p) + g n . du_p/dt``,
@@ -10,14 +10,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 
+from fastcontact.arrays import Array, Numbers
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.pairing import Pairing, normals
 from fastcontact.contact.surface import Surface
 
-Array = NDArray[np.float64]
 # Gaps below this part of the size of the secondary side are round-off.
 ROUND_OFF = 1e-9
 
@@ -61,7 +60,7 @@ def _rotations(points: Array) -> Array:
     return np.stack([np.cross(axis, x).ravel() for axis in np.eye(3)], axis=1)
 
 
-def _rows(values: Array, nodes: NDArray[np.int32], n_dofs: int) -> csr_array:
+def _rows(values: Array, nodes: Numbers, n_dofs: int) -> csr_array:
     """Return a matrix (m, n_dofs) of the `values` (m, k, dim) at the components of `nodes` (m, k)."""
     m, k, dim = values.shape
     columns = nodes[:, :, None].astype(np.intp) * dim + np.arange(dim)

@@ -1,4 +1,4 @@
-"""A surface in the plane as a line of straight pieces, and the length along it."""
+"""A contact line as a polyline, parametrised by arc length."""
 
 from __future__ import annotations
 
@@ -6,11 +6,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.contact.surface import Surface
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,11 +39,11 @@ class UnrolledLine:
         return cls(middle + np.outer([-reach, reach], direction), np.array([0.0, 2.0 * reach]))
 
     def at(self, length: float) -> Array:
-        """Return the place (2,) at a length along the line [length]."""
+        """Return the point (2,) at an arc length along the line [length]."""
         return np.array([np.interp(length, self.abscissa, component) for component in self.nodes.T])
 
     def lengths(self, positions: Array) -> Array:
-        """Return the length along the line (n,) of the place on it nearest to each of some positions (n, 2) [length]."""
+        """Return the arc length (n,) of the point of the line nearest to each of `positions` (n, 2) [length]."""
         from scipy.spatial import cKDTree
 
         last = len(self.nodes) - 1

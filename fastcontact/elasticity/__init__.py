@@ -1,1 +1,1 @@
-"""Linear elasticity on a mesh: materials, stiffness, stresses, loads, springs, linear relations."""
+"""Elasticity on a mesh: materials, stiffness, stresses, loads, springs, multi-point constraints."""

@@ -1,4 +1,4 @@
-"""Linear elastic materials that are not isotropic: with three planes of symmetry, or with none."""
+"""Anisotropic linear elastic materials: orthotropic, and fully anisotropic."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from numbers import Real
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.elasticity.loads import LARGEST
 from fastcontact.elasticity.material_axes import Axes, checked_axes
 from fastcontact.elasticity.materials import Constant, Material, check_density, check_expansion, check_positive
@@ -18,7 +18,6 @@ from fastcontact.elasticity.varying_constants import Varying, wrapped
 from fastcontact.errors import ModelError
 from fastcontact.mesh.argument_types import check_type
 
-Array = NDArray[np.float64]
 NAMES = ("12", "13", "23")
 # Of the stiffness to be symmetric, relative to its largest entry.
 SYMMETRIC = 1e-9

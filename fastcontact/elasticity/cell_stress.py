@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._jit import parallel
+from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.elasticity import (
     dilatation,
     dilatation_kernels,
@@ -17,10 +17,6 @@ from fastcontact.elasticity.initial_states import StressOffset
 from fastcontact.elasticity.stiffness import of_cells
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
-
-Array = NDArray[np.float64]
-Numbers = NDArray[np.intp]
-
 
 # Cells at a time where moduli vary inside them.
 VARYING = 2_000
@@ -66,9 +62,7 @@ class CellStress:
         self._displacement, self._averaged = np.ascontiguousarray(displacement), averaged
         self._offset = offset
 
-    def at(
-        self, name: str, xi: Array, cells: NDArray[np.int32], material: NDArray[np.int32], rows: Numbers | None = None
-    ) -> Array:
+    def at(self, name: str, xi: Array, cells: Numbers, material: Numbers, rows: Indices | None = None) -> Array:
         """Return the stresses (n_cells, n, n_components) [pressure] at points `xi` (n, dim) [-] of cells of an element.
 
         `cells` (n_cells, n_nodes) of int; `material` (n_cells,) of int, the material number of each, or (n_cells, n_q), that
@@ -79,8 +73,8 @@ class CellStress:
         return out
 
     def fill(
-        self, name: str, xi: Array, cells: NDArray[np.int32], material: NDArray[np.int32], out: Array,
-        rows: Numbers | None = None,
+        self, name: str, xi: Array, cells: Numbers, material: Numbers, out: Array,
+        rows: Indices | None = None,
     ) -> None:  # fmt: skip
         """Fill `out` (n_cells, n, n_components) [pressure] in place, shared by threads.
 
@@ -120,7 +114,7 @@ class CellStress:
                 self._add_initial(self._offset, (name, xi, rows), cells, material, out)
 
     def _fill_varying(
-        self, at: tuple[str, Array, Array, Array], cells: NDArray[np.int32], material: NDArray[np.int32], moduli: Array,
+        self, at: tuple[str, Array, Array, Array], cells: Numbers, material: Numbers, moduli: Array,
         out: Array,
     ) -> None:  # fmt: skip
         """Fill `out` where moduli differ from point to point.
@@ -147,8 +141,8 @@ class CellStress:
             out[part] = np.einsum("cnij,cnj->cni", local, strain[part])
 
     def _add_modes(
-        self, at: tuple[str, Array, Array], cells: NDArray[np.int32], material: NDArray[np.int32], out: Array,
-        rows: Numbers | None,
+        self, at: tuple[str, Array, Array], cells: Numbers, material: Numbers, out: Array,
+        rows: Indices | None,
     ) -> None:  # fmt: skip
         """Add the stresses of incompatible modes."""
         name, xi, dN = at
@@ -168,14 +162,14 @@ class CellStress:
         )  # fmt: skip
 
     @staticmethod
-    def _lost_by_initial(offset: StressOffset, name: str, rows: Numbers, N: Array, moduli: Array) -> Array | float:
+    def _lost_by_initial(offset: StressOffset, name: str, rows: Indices, N: Array, moduli: Array) -> Array | float:
         """Return what stresses (n_cells, n, n_components) [pressure] lose by initial strains, less initial stresses."""
         strain, stress = (offset.initial(kind, name, rows, N) for kind in ("strain", "stress"))
         lost = 0.0 if strain is None else (moduli @ strain[..., None])[..., 0]
         return lost if stress is None else lost - stress
 
     def _add_initial(
-        self, offset: StressOffset, at: tuple[str, Array, Numbers], cells: NDArray[np.int32], material: NDArray[np.int32],
+        self, offset: StressOffset, at: tuple[str, Array, Indices], cells: Numbers, material: Numbers,
         out: Array,
     ) -> None:  # fmt: skip
         """Add initial stresses, subtract those of initial strains, whose dilatation is projected where that of others is."""
@@ -208,8 +202,8 @@ class CellStress:
         thermal: StressOffset,
         name: str,
         xi: Array,
-        cells: NDArray[np.int32],
-        material: NDArray[np.int32],
+        cells: Numbers,
+        material: Numbers,
         out: Array,
     ) -> None:
         """Subtract the thermal stresses; the dilatation of the temperature is projected where that of the strain is."""

@@ -1,4 +1,4 @@
-"""The linear system of a model: from all displacements u to the unknowns v of the linear solver and back.
+"""Linear system with supports and multi-point constraints eliminated: ``u = T v + t``.
 
 ``u = T v + t``: T is the identity except for the displacements that relations express by others, t holds the prescribed
 displacements. The matrix for the solver is ``T.T K T``. It keeps the size and blocks of K: in the rows and columns of
@@ -13,18 +13,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array, diags_array
 
 from fastcontact._jit import parallel
 from fastcontact._jit.norms_kernels import largest
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.elasticity import system_kernels
 from fastcontact.elasticity.relations import Elimination, Relation, eliminate, stacked_rows
 from fastcontact.errors import ModelError
 from fastcontact.linear.multigrid.matrix import block_matrix
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 # Supports and right-hand sides that miss a condition by less than this fraction meet it.
 CONFLICT = 1e-9
 # A stiffness below this fraction of those that cancel in it is what rounding leaves.
@@ -181,7 +179,7 @@ class System:
         """Return the unknowns (n, k) of motions (n, k) that obey supports and relations."""
         return np.where(self.free[:, None], motions, 0.0)
 
-    def involved(self, dofs: NDArray[np.intp]) -> NDArray[np.intp]:
+    def involved(self, dofs: Indices) -> Indices:
         """Return the unknowns that the displacements `dofs` depend on, ascending."""
         if self.T is not None:
             dofs = np.unique(self.T[dofs].indices)

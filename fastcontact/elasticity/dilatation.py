@@ -1,4 +1,4 @@
-"""Mean dilatation: elements that do not lock where materials are nearly incompressible.
+"""Mean dilatation (B-bar): elements free of volumetric locking.
 
 The dilatation, the trace of the strain, is projected on polynomials of low degree in each cell: its mean in linear elements
 (the B-bar method: Hughes, Int. J. Numer. Meth. Engng 15, 1980), a linear function in quadratic ones. What remains of the
@@ -17,11 +17,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.elasticity.energy import cell_volumes
 from fastcontact.elasticity.incompatible_modes import BENDING, MODES
 from fastcontact.mesh import elements
 
-Array = NDArray[np.float64]
 # Which moduli have a mean dilatation: True or 1, see `MaterialField.treatment`.
 Mask = NDArray[np.bool_] | NDArray[np.uint8]
 # Bulk over shear modulus at nu = 0.3: 2 (1 + nu) / (3 (1 - 2 nu)).

@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""The choice of the compiled element loops: those of two or those of three dimensions."""
+"""Dispatch to the element loops of two or three dimensions."""
 
 from types import ModuleType
 

@@ -1,14 +1,12 @@
-"""Elastic energy of stresses, and quadrature rules to integrate it over cells more exactly than the stiffness."""
+"""Strain energy of stresses, with quadrature of higher order than that of the stiffness."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.mesh import quadrature
 from fastcontact.mesh.elements import Element
-
-Array = NDArray[np.float64]
 
 
 def elastic_energy(stress: Array, compliance: Array) -> Array:

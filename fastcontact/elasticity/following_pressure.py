@@ -1,16 +1,15 @@
-"""Pressure that follows the deformed surface: forces, and their derivative (Bonet and Wood, 2008, section 8.5)."""
+"""Follower pressure: nodal forces and load stiffness (Bonet and Wood, 2008, section 8.5)."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from fastcontact.arrays import Array, Numbers
 from fastcontact.elasticity.loads import Pressure, evaluated, facets_of, outward
 from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.mesh import Mesh
 
-Array = NDArray[np.float64]
 # Points of the quadrature along each direction of a facet: exact on quadratic facets of a ring.
 POINTS = 4
 
@@ -29,9 +28,7 @@ class FollowingPressure:
         self._mesh, self._turned = mesh, kinematics == "axisymmetric"
         self._parts = [self._part(load, name, block) for name, block in facets_of(mesh, load.group).items()]
 
-    def _part(
-        self, load: Pressure, name: str, block: NDArray[np.int32]
-    ) -> tuple[NDArray[np.int32], Array, Array, Array]:
+    def _part(self, load: Pressure, name: str, block: Numbers) -> tuple[Numbers, Array, Array, Array]:
         """Return facets (f, n), shape values (q, n), derivatives (q, n, k), pressure times weight (f, q)."""
         facets, element = outward(self._mesh, load.group, name, block), elements.get(name)
         xi, weights = quadrature.product_rule(element.linear, POINTS, POINTS)

@@ -1,4 +1,4 @@
-"""Incompatible modes: quadrangles and hexahedra that lock neither in shear nor in volume.
+"""Incompatible modes: quadrangles and hexahedra free of shear and volumetric locking.
 
 Each linear cell gets displacements of its own, 1 - xi^2 along each reference direction, by which its edges may curve;
 neighbours do not share them, and static condensation removes them from the stiffness (Wilson, Taylor, Doherty and
@@ -16,9 +16,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Mask
 from fastcontact.mesh import elements
 
-Array = NDArray[np.float64]
 # Elements that have modes, and the flag of the moduli that ask for them.
 BENDING = ("quad4", "hex8")
 MODES = 2
@@ -51,7 +51,7 @@ def tables(name: str) -> Tables:
     return Tables(dN, element.quadrature[0], weights, element.gradient(np.zeros((1, element.dim))), PAIRS[element.dim])
 
 
-def asked(name: str, treatment: NDArray[np.generic] | None) -> NDArray[np.bool_] | None:
+def asked(name: str, treatment: NDArray[np.generic] | None) -> Mask | None:
     """Return which moduli (n_moduli,) have modes in an element; None where none has."""
     if treatment is None or name not in BENDING:
         return None

@@ -6,15 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.elasticity.loads import DensityField, Table, VolumeLoad, add_density, cell_points
 from fastcontact.elasticity.materials import Material
 from fastcontact.elasticity.varying_constants import Varying
 from fastcontact.errors import ModelError
 from fastcontact.mesh.mesh import Mesh
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,9 +27,9 @@ class Densities:
     """
 
     materials: Sequence[Material]
-    number: Mapping[str, NDArray[np.int32]]
+    number: Mapping[str, Numbers]
 
-    def at(self, name: str, rows: NDArray[np.intp], N: Array) -> Array:
+    def at(self, name: str, rows: Indices, N: Array) -> Array:
         """Return the densities (n_rows, n) [mass / length^3] in cells of an element, NaN where there are none.
 
         `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] shape values of the points.

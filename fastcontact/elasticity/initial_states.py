@@ -1,4 +1,4 @@
-"""Initial stresses and strains of solid cells, and what they and temperatures add to the stress of the displacements."""
+"""Initial stresses and strains, and stress-free strains due to temperature."""
 
 from __future__ import annotations
 
@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.loads import LARGEST, Table, check_number
 from fastcontact.elasticity.material_axes import Axes, checked_axes, frames, rotations
 from fastcontact.elasticity.varying_constants import Cells, Varying, positions, wrapped
 from fastcontact.errors import ModelError
 
-Array = NDArray[np.float64]
 COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 # The history of what is there from the first step on.
 ALWAYS: Table = ((-LARGEST, 1.0), (LARGEST, 1.0))
@@ -57,7 +56,7 @@ class InitialState:
         where = ", ".join(f"'{group}'" for group in self.groups) if self.groups is not None else "all solid cells"
         return f"the initial {self.kind} of {where}"
 
-    def values(self, name: str, rows: NDArray[np.intp], N: Array) -> Array:
+    def values(self, name: str, rows: Indices, N: Array) -> Array:
         """Return components (n_rows, n, n_components) [pressure] or [-] along the axes of the mesh, in cells of an element.
 
         `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] shape values of the points. Zero elsewhere.
@@ -140,7 +139,7 @@ class StressOffset:
     expansion: Array
     states: Sequence[tuple[float, InitialState]] = ()
 
-    def initial(self, kind: str, name: str, rows: NDArray[np.intp], N: Array) -> Array | None:
+    def initial(self, kind: str, name: str, rows: Indices, N: Array) -> Array | None:
         """Return the sum of initial stresses or strains (n_rows, n, n_components) [pressure] or [-]; None without any.
 
         `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] shape values of the points.

@@ -17,8 +17,8 @@ from numbers import Real
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.elasticity.symmetry_axis import axis_nodes
 from fastcontact.errors import ModelError, unknown
 from fastcontact.mesh import elements, quadrature
@@ -26,8 +26,6 @@ from fastcontact.mesh.argument_types import values_at
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int32]
 Table = tuple[tuple[float, float], ...]
 Value = float | Callable[[Array], Array]
 # What messages and results call a place where no group is named.
@@ -44,7 +42,7 @@ _POINTS, _STRAIGHT = 5, 4
 class DensityField(Protocol):
     """Densities of solid cells."""
 
-    def at(self, name: str, rows: NDArray[np.intp], N: Array) -> Array:
+    def at(self, name: str, rows: Indices, N: Array) -> Array:
         """Return the densities (n_rows, n) [mass / length^3] in cells of an element, NaN where there are none.
 
         `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] shape values of the points.
@@ -171,7 +169,7 @@ class VolumeLoad(Load):
         """Names of its groups."""
         return (EVERYWHERE,) if self.groups is None else self.groups
 
-    def rows(self, mesh: Mesh) -> Iterator[tuple[str, NDArray[np.intp]]]:
+    def rows(self, mesh: Mesh) -> Iterator[tuple[str, Indices]]:
         """Yield each element and the numbers (n,) of the solid cells on which the load acts."""
         if self.groups is None:
             yield from ((element, np.arange(len(block))) for element, block in mesh.solids.items())
@@ -181,7 +179,7 @@ class VolumeLoad(Load):
             if element in mesh.solids:
                 yield element, rows
 
-    def cells(self, mesh: Mesh) -> Iterator[tuple[str, Indices]]:
+    def cells(self, mesh: Mesh) -> Iterator[tuple[str, Numbers]]:
         """Yield each element and the solid cells (n_cells, n_nodes) on which the load acts."""
         for element, rows in self.rows(mesh):
             yield element, mesh.cells[element][rows]
@@ -262,7 +260,7 @@ class TotalForce(Load):
             forces[:, axis] = shares[:, 0] * (value / area)
 
 
-def facets_of(mesh: Mesh, group: str) -> dict[str, Indices]:
+def facets_of(mesh: Mesh, group: str) -> dict[str, Numbers]:
     """Return the facets (n, n_nodes) of a group by element, each once, though it may stand in the mesh more often.
 
     MeshError if there is no such group of cells, ModelError if it has no facets.
@@ -276,7 +274,7 @@ def facets_of(mesh: Mesh, group: str) -> dict[str, Indices]:
     return {name: block[np.sort(once[name])] for name, block in blocks.items()}
 
 
-def outward(mesh: Mesh, group: str, element: str, block: Indices) -> Indices:
+def outward(mesh: Mesh, group: str, element: str, block: Numbers) -> Numbers:
     """Return facets (n, n_nodes), those of `block` (n, n_nodes), turned so that their normals point out of the solid.
 
     ModelError if a facet does not lie on the outside of a solid.
@@ -346,7 +344,7 @@ def axes_of(what: str, components: Mapping[str, Any], dim: int) -> dict[int, Any
     return {"xyz".index(name): value for name, value in given.items()}
 
 
-def _mapped(mesh: Mesh, element: str, cells: Indices) -> tuple[Array, Array, Array, Array]:
+def _mapped(mesh: Mesh, element: str, cells: Numbers) -> tuple[Array, Array, Array, Array]:
     """Return positions (c, q, dim), shape values (q, n), Jacobians (c, q, dim, cell dim) and weights (q,)."""
     reference = elements.get(element)
     xi, weights = quadrature.product_rule(reference.linear, _POINTS, _STRAIGHT)
@@ -356,7 +354,7 @@ def _mapped(mesh: Mesh, element: str, cells: Indices) -> tuple[Array, Array, Arr
     return x, N, np.einsum("qnk,cnd->cqdk", dN, corners), weights
 
 
-def cell_points(mesh: Mesh, element: str, cells: Indices, kinematics: str) -> tuple[Array, Array, Array]:
+def cell_points(mesh: Mesh, element: str, cells: Numbers, kinematics: str) -> tuple[Array, Array, Array]:
     """Return positions (c, q, dim) [length], shape values (q, n) [-] and volumes (c, q) [length^dim] in cells.
 
     At the quadrature points of `cells` (c, n) of int of an element; in axisymmetry over the full circle.
@@ -365,7 +363,7 @@ def cell_points(mesh: Mesh, element: str, cells: Indices, kinematics: str) -> tu
     return x, N, _turned(np.linalg.det(J) * weights, x, kinematics)
 
 
-def _facet_points(mesh: Mesh, element: str, facets: Indices, kinematics: str) -> tuple[Array, Array, Array]:
+def _facet_points(mesh: Mesh, element: str, facets: Numbers, kinematics: str) -> tuple[Array, Array, Array]:
     """Return positions (f, q, dim), shape values (q, n) and area vectors (f, q, dim) of the quadrature of facets."""
     x, N, J, weights = _mapped(mesh, element, facets)
     if mesh.dim == 2:
@@ -391,7 +389,7 @@ def _density(load: Traction | BodyForce, x: Array, measure: Array) -> Array:
     return density
 
 
-def add_density(forces: Array, cells: Indices, N: Array, density: Array) -> None:
+def add_density(forces: Array, cells: Numbers, N: Array, density: Array) -> None:
     """Add the integrals of a density times the shape functions to nodal `forces` (n_points, dim) [force], in place.
 
     Of `cells` (c, n) of int, shape values `N` (q, n) [-], and `density` (c, q, dim) [force], times the volume of each point.

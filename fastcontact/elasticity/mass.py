@@ -1,4 +1,4 @@
-"""Matrices by which modes differ from statics: the consistent mass, and the stiffness that stresses give by themselves."""
+"""Consistent mass matrix and geometric (initial-stress) stiffness."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import bsr_array
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.cell_stress import CellStress
 from fastcontact.elasticity.energy import cell_volumes, integration_rule
 from fastcontact.elasticity.loads import DensityField
@@ -17,8 +17,6 @@ from fastcontact.errors import ModelError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 # Numbers of local matrices that are formed at a time.
 AT_ONCE = 2_000_000
 # The components of symmetric tensors in the order of stresses.

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 from fastcontact.mesh.argument_types import check_type, values_at
 
-Array = NDArray[np.float64]
 Axes = Sequence[Sequence[float]] | Callable[[Array], Array] | None
 # Components of stress and strain: xx, yy, zz, xy, yz, xz.
 PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))

@@ -10,15 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Mask, Numbers
 from fastcontact.elasticity.incompatible_modes import MODES
 from fastcontact.elasticity.initial_states import InitialState, StressOffset
 from fastcontact.elasticity.materials import MODULI, Material
 from fastcontact.elasticity.varying_constants import middle, positions
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int32]
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,13 +68,13 @@ class MaterialField:
     kinematics: str
     moduli: Array
     places: Sequence[Places]
-    owner: Indices
-    number: dict[str, Indices]
-    rows: dict[str, Indices]
-    inside: dict[str, Indices]
+    owner: Numbers
+    number: dict[str, Numbers]
+    rows: dict[str, Numbers]
+    inside: dict[str, Numbers]
 
     @property
-    def loops(self) -> dict[str, Indices]:
+    def loops(self) -> dict[str, Numbers]:
         """By solid element what element loops take: `inside` where materials vary inside cells, elsewhere `rows`."""
         return {**self.rows, **self.inside}
 
@@ -86,7 +84,7 @@ class MaterialField:
         return len(self.materials)
 
     @cached_property
-    def averaged(self) -> NDArray[np.bool_]:
+    def averaged(self) -> Mask:
         """Which moduli (n_moduli,) have a mean dilatation; none in plane stress, where none locks."""
         averaged = np.array([material.averaged for material in self.materials], bool)
         return np.asarray(averaged[self.owner] & (self.kinematics != "plane_stress"))
@@ -175,7 +173,7 @@ class MaterialField:
         return count
 
     @cached_property
-    def distinct(self) -> dict[str, Indices]:
+    def distinct(self) -> dict[str, Numbers]:
         """By solid element the material (n_cells,) of every cell, those between which stress does not jump under one number.
 
         These have the same moduli, axes and expansion.
@@ -188,7 +186,7 @@ class MaterialField:
 
 
 def material_field(
-    mesh: Mesh, kinematics: str, materials: Sequence[Material], number: Mapping[str, Indices]
+    mesh: Mesh, kinematics: str, materials: Sequence[Material], number: Mapping[str, Numbers]
 ) -> MaterialField:
     """Return the materials of all solid cells.
 
@@ -206,7 +204,7 @@ def material_field(
     rows, inside = {name: values.copy() for name, values in number.items()}, {}
     places: list[Places] = []
 
-    def added(index: int, points: Array, constants: Any) -> Indices:
+    def added(index: int, points: Array, constants: Any) -> Numbers:
         """Add the moduli of a material at `points`; return their numbers."""
         places.append(Places(index, sum(map(len, moduli)), points, constants))
         moduli.append(materials[index].moduli_at(points, kinematics, constants))

@@ -1,4 +1,4 @@
-"""Nodes where cells of several materials meet: stress jumps there, so each material has a value of its own."""
+"""Nodes on material interfaces, where stress is discontinuous: one nodal value for each material."""
 
 from __future__ import annotations
 
@@ -6,12 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Numbers
 from fastcontact.mesh.mesh import Mesh
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int32]
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,14 +25,14 @@ class MaterialSides:
         Where materials meet, for each node and each of its materials: node, material, place; ordered by node.
     """
 
-    cells: Mapping[str, Indices]
-    node: Indices
-    points: Indices
-    material: Indices
-    place: Indices
+    cells: Mapping[str, Numbers]
+    node: Numbers
+    points: Numbers
+    material: Numbers
+    place: Numbers
 
 
-def material_sides(mesh: Mesh, material: Mapping[str, Indices]) -> MaterialSides:
+def material_sides(mesh: Mesh, material: Mapping[str, Numbers]) -> MaterialSides:
     """Return where materials meet; `material` has by solid element the number (n_cells,) of each cell's material."""
     n = mesh.n_points
     least, most = np.full(n, np.iinfo(np.int32).max, np.int32), np.full(n, -1, np.int32)

@@ -1,4 +1,4 @@
-"""Material laws: small-strain linear elasticity. What all have in common, and the isotropic one."""
+"""Linear elastic material laws: base class and isotropic elasticity."""
 
 from __future__ import annotations
 
@@ -12,15 +12,14 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.loads import LARGEST, Value
 from fastcontact.elasticity.material_axes import PAIRS, Axes, frames, rotations
 from fastcontact.elasticity.varying_constants import Cells, Varying, mapped, varying, wrapped
 from fastcontact.errors import ModelError, unknown
 from fastcontact.mesh.argument_types import typed
 
-Array = NDArray[np.float64]
 AnyMaterial = TypeVar("AnyMaterial", bound="Material")
 
 KINEMATICS = ("axisymmetric", "plane_strain", "plane_stress", "3d")
@@ -127,7 +126,7 @@ class Material:
         return found
 
     @typed(ModelError)
-    def constants_at(self, name: str, rows: NDArray[np.intp], N: Array) -> SimpleNamespace:
+    def constants_at(self, name: str, rows: Indices, N: Array) -> SimpleNamespace:
         """Return the constants in cells of an element, those that vary as arrays (n_rows * n,) [unit of the constant].
 
         `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] shape values of the points.
@@ -153,7 +152,7 @@ class Material:
             raise ModelError("constants of the material depend on the position: ask the one in `materials` of a model")
         return own[0].cells
 
-    def _check_at(self, names: Sequence[str], element: str, rows: NDArray[np.intp], N: Array) -> None:
+    def _check_at(self, names: Sequence[str], element: str, rows: Indices, N: Array) -> None:
         """Raise ModelError, with the place, where the constants `names` are such that the material cannot be."""
         found, count = self.constants_at(element, rows, N), len(rows) * len(N)
         wrong = np.array(np.broadcast_to(~np.asarray(self.admissible(found), bool), count))

@@ -1,4 +1,4 @@
-"""Solid cells with nonlinear laws or finite strains as one term of the equilibrium: forces, tangent, history."""
+"""Bodies with nonlinear laws or finite strains: internal forces, consistent tangent, history."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import bsr_array
 
 from fastcontact._jit import parallel
+from fastcontact.arrays import Array, Numbers
 from fastcontact.elasticity import body_kernels, dilatation
 from fastcontact.elasticity.constitutive_kernels import LINEAR, SAINT_VENANT
 from fastcontact.elasticity.dilatation import REMAINDER
@@ -22,7 +22,6 @@ from fastcontact.errors import ConvergenceError, ModelError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
-Array = NDArray[np.float64]
 History = dict[str, Array]
 # Numbers of the history of a quadrature point, see `constitutive_kernels`.
 HISTORY, PLASTIC_STRAIN, ACROSS = 9, 6, 8
@@ -253,7 +252,7 @@ def _six_by_six(moduli: Array) -> Array:
     return whole
 
 
-def _at_points(numbers: NDArray[np.int32], name: str) -> NDArray[np.int32]:
+def _at_points(numbers: Numbers, name: str) -> Numbers:
     """Return the moduli of every quadrature point (n_cells, n_q), of those of cells or points."""
     n_q = len(elements.get(name).quadrature[1])
     whole = numbers[:, None] if numbers.ndim == 1 else numbers

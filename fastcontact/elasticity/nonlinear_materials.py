@@ -1,4 +1,4 @@
-"""Materials beyond linear elasticity: von Mises plasticity for small strains, hyperelasticity for finite ones.
+"""Nonlinear material laws: von Mises plasticity (small strain) and hyperelasticity (finite strain).
 
 A law is a row of constants for `constitutive_kernels`: its number, the shear modulus, the bulk modulus of the volumetric
 part ``U(J) = K (J - 1)^2 / 2``, then its own. Loads, contact and checks see the isotropic elasticity of small strains that
@@ -13,14 +13,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.elasticity.constitutive_kernels import INVARIANTS, OGDEN, PLASTIC
 from fastcontact.elasticity.materials import NEARLY_INCOMPRESSIBLE, LinearElastic, check_positive
 from fastcontact.errors import ModelError
 from fastcontact.mesh.argument_types import typed
 
-Array = NDArray[np.float64]
 STRAINS = ("small", "finite")
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._jit import parallel
+from fastcontact.arrays import Array, Numbers
 from fastcontact.elasticity import dilatation, element_2d_kernels, element_kernels
 from fastcontact.elasticity.cell_stress import CellStress
 from fastcontact.elasticity.initial_states import StressOffset
@@ -17,8 +17,7 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
 
-Array = NDArray[np.float64]
-Materials = dict[str, NDArray[np.int32]]
+Materials = dict[str, Numbers]
 # Memory for stresses at points while nodal ones are formed [bytes].
 BATCH = 16_000_000
 # Of so many cells one tells where the nodes of all lie.
@@ -114,7 +113,7 @@ class NodalAverage:
         self._total, self._count = np.zeros((count, components)), np.zeros(count)
 
     @typed(ModelError)
-    def add(self, cells: NDArray[np.int32], extrapolation: Array, values: Array) -> None:
+    def add(self, cells: Numbers, extrapolation: Array, values: Array) -> None:
         """Add the stresses of `cells` (n_cells, n_nodes), `values` (n_cells, n_q, n_components) [pressure] at points.
 
         The matrix `extrapolation` (n_nodes, n_q) [-] leads from values at the points to values at the nodes.
@@ -124,7 +123,7 @@ class NodalAverage:
         # For any dimension and number of components.
         parallel.shared(lambda part: element_2d_kernels.add_nodal(*given, *part, *into), self._parts(cells))
 
-    def _parts(self, cells: NDArray[np.int32]) -> list[tuple[int, int]]:
+    def _parts(self, cells: Numbers) -> list[tuple[int, int]]:
         """Return ranges of nodes that have about equally many of the cells: each thread adds at its own nodes."""
         some = np.sort(cells[::SAMPLED, 0])
         count = len(parallel.portions(*cells.shape)) if len(some) else 1

@@ -1,4 +1,4 @@
-"""Linear relations between displacements, and their elimination: ``R u = r`` becomes ``u = T w + S r``."""
+"""Multi-point constraints ``R u = r`` and their elimination: ``u = T w + S r``."""
 
 from __future__ import annotations
 
@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from fastcontact.arrays import Array, Indices, Mask
+
 Table = tuple[tuple[float, float], ...]
 # A coefficient below this fraction of the largest of its row has cancelled.
 ZERO = 1e-10
@@ -58,11 +57,11 @@ class Elimination:
         The row of R that each condition comes from.
     """
 
-    pivots: NDArray[np.intp]
+    pivots: Indices
     T: csr_array
     S: csr_array
     conditions: csr_array
-    origin: NDArray[np.intp]
+    origin: Indices
 
 
 def stacked_rows(relations: Sequence[Relation], n_dofs: int) -> csr_array:

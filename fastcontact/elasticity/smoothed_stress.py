@@ -1,4 +1,4 @@
-"""Nodal stresses that are smoother and more accurate than those of the solution, to estimate its error.
+"""Recovered nodal stresses for error estimation.
 
 At the centres of linear cells, and at the reduced Gauss points of quadratic ones, stresses are more accurate than elsewhere
 (Barlow, 1976). They are extrapolated from there to the nodes and averaged over the cells of one material at each node.
@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.cell_stress import CellStress
 from fastcontact.elasticity.initial_states import StressOffset
@@ -20,7 +20,6 @@ from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
-Array = NDArray[np.float64]
 # Position of the sampling points of quadratic triangles and tetrahedra between centre and corners.
 SIMPLEX = {3: 0.5, 4: 1.0 / math.sqrt(5.0)}
 

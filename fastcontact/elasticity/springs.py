@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array, diags_array, vstack
 
+from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 
-Array = NDArray[np.float64]
 # Springs between nodes that are so many times stiffer than the bodies there: told, and refused.
 STIFF, STIFFEST = 1e5, 1e12
 DIGITS = 16  # of the numbers that are computed with

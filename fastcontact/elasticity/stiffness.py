@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.sparse import bsr_array
 
 from fastcontact._jit import parallel
+from fastcontact.arrays import Array, Mask, Numbers
 from fastcontact.elasticity import (
     dilatation,
     dilatation_kernels,
@@ -24,7 +25,6 @@ from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 
@@ -47,9 +47,9 @@ class Sparsity:
         By solid element: position in `indices` of every node pair of every cell.
     """
 
-    indptr: NDArray[np.int32]
-    indices: NDArray[np.int32]
-    slots: dict[str, NDArray[np.int32]]
+    indptr: Numbers
+    indices: Numbers
+    slots: dict[str, Numbers]
     _owners: dict[tuple[str, int], Owners] = field(default_factory=dict, init=False, repr=False)
 
     def owners(self, mesh: Mesh, name: str) -> Owners:
@@ -76,7 +76,7 @@ def sparsity(mesh: Mesh) -> Sparsity:
     return Sparsity(indptr, indices, {name: _slots(block, indptr, indices) for name, block in blocks.items()})
 
 
-def _slots(cells: NDArray[np.int32], indptr: NDArray[np.int32], indices: NDArray[np.int32]) -> NDArray[np.int32]:
+def _slots(cells: Numbers, indptr: Numbers, indices: Numbers) -> Numbers:
     """Return the `slots` of `Sparsity` for one element."""
     slots = np.empty((*cells.shape, cells.shape[1]), np.int32)
 
@@ -92,7 +92,7 @@ def stiffness(
     mesh: Mesh,
     kinematics: str,
     moduli: Array,
-    material: dict[str, NDArray[np.int32]],
+    material: dict[str, Numbers],
     pattern: Sparsity | None = None,
     averaged: dilatation.Mask | None = None,
 ) -> bsr_array:
@@ -140,7 +140,7 @@ def stiffness(
     return bsr_array((data, pattern.indices, pattern.indptr), shape=(size, size))
 
 
-def of_special_form(moduli: Array) -> NDArray[np.bool_]:
+def of_special_form(moduli: Array) -> Mask:
     """Return for which moduli (n_materials,) the element loops have a shorter form, but for round-off.
 
     In the plane those without coupling of normal strains with shear, in 3D those of isotropic materials.
@@ -159,7 +159,7 @@ def of_special_form(moduli: Array) -> NDArray[np.bool_]:
     return np.asarray(np.abs(moduli - isotropic).max(axis=(1, 2)) <= 1e-14 * np.abs(moduli[:, 0, 0]))
 
 
-def of_cells(material: NDArray[np.int32]) -> NDArray[np.int32]:
+def of_cells(material: Numbers) -> Numbers:
     """Return one number for each cell (n_cells,) of int, where nothing varies inside the cell the only one.
 
     Of `material` (n_cells,) or (n_cells, n_q) of int.
@@ -168,8 +168,8 @@ def of_cells(material: NDArray[np.int32]) -> NDArray[np.int32]:
 
 
 def _passes(
-    tables: tuple[Array, Array, Array], material: NDArray[np.int32]
-) -> Iterator[tuple[tuple[Array, Array, Array], NDArray[np.int32]]]:
+    tables: tuple[Array, Array, Array], material: Numbers
+) -> Iterator[tuple[tuple[Array, Array, Array], Numbers]]:
     """Yield the tables of the quadrature with the material (n_cells,): once, or for each point if it varies inside cells."""
     if material.ndim == 1:
         yield tables, material
@@ -183,7 +183,7 @@ class _Addition:
     """The cells of one element, whose stiffness threads add to `data` (n_blocks, dim, dim)."""
 
     def __init__(
-        self, mesh: Mesh, name: str, axisymmetric: bool, material: NDArray[np.int32], pattern: Sparsity, data: Array
+        self, mesh: Mesh, name: str, axisymmetric: bool, material: Numbers, pattern: Sparsity, data: Array
     ) -> None:
         self._points, self._cells, self._material = mesh.points, mesh.cells[name], material
         self._name, self._tables, self._axisymmetric = name, elements.get(name).tables, axisymmetric
@@ -197,7 +197,7 @@ class _Addition:
 
     def part(
         self, number: int, moduli: Array, special: dilatation.Mask, split: dilatation.Split | None,
-        bends: NDArray[np.bool_] | None,
+        bends: Mask | None,
     ) -> int:  # fmt: skip
         """Add the rows of a part; return the number of the first cell with a Jacobian that is not positive, or -1."""
         rows = slice(*self._parts[number])
@@ -223,7 +223,7 @@ class _Addition:
         return -1
 
 
-def owners(cells: NDArray[np.int32], n_points: int) -> Owners:
+def owners(cells: Numbers, n_points: int) -> Owners:
     """Return the part of each point, and the cells that each part computes, of `cells` (n_cells, n_nodes).
 
     A point belongs to the first portion of the cells that has it, so that a part has the rows of its own cells and of few
@@ -239,7 +239,7 @@ def owners(cells: NDArray[np.int32], n_points: int) -> Owners:
     return _owners(cells, n_points, np.minimum(ends, len(cells)))[0]
 
 
-def _owners(cells: NDArray[np.int32], n_points: int, ends: Indices) -> tuple[Owners, Indices]:
+def _owners(cells: Numbers, n_points: int, ends: Indices) -> tuple[Owners, Indices]:
     """Return the owners for portions of the cells that begin and end at `ends`, and how many cells each computes."""
     owner = np.full(n_points, parallel.MOST, np.uint8)
     last, work = np.zeros((2, len(ends) - 1), np.int64)

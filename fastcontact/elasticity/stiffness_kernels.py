@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Sparsity of a stiffness matrix by node blocks: neighbours of each node, place of each node pair of each cell.
+"""Sparsity pattern of the stiffness matrix by node blocks, and the block index of each node pair of each cell.
 
 Cells of all elements stand in one list: the nodes of cell ``c`` are ``nodes[start[c]:start[c + 1]]``.
 """

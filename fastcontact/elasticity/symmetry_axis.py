@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Indices
 from fastcontact.mesh.mesh import Mesh
 
 # Nodes nearer to the axis than this fraction of the largest coordinate lie on it: files may hold single precision.
 ON_AXIS = 1e-6
 
 
-def axis_nodes(mesh: Mesh) -> NDArray[np.intp]:
+def axis_nodes(mesh: Mesh) -> Indices:
     """Return the nodes of solid cells on the axis x = 0, ascending.
 
     A body that reaches the axis stays closed there: by symmetry its points on the axis move along it only.

@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Supports taken out of a block matrix, whose blocks (n_blocks, size, size) are sorted in every row."""
+"""Elimination of supported unknowns from a block matrix with sorted rows."""
 
 from fastcontact._jit.decorators import kernel
 

@@ -1,4 +1,4 @@
-"""Constants of materials that vary: functions of the position, and numbers for each cell or each point of a mesh."""
+"""Spatially varying material constants: functions of position, or values per cell or point."""
 
 from __future__ import annotations
 
@@ -9,16 +9,15 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.elasticity.loads import check_number, evaluated
 from fastcontact.errors import ModelError
 from fastcontact.mesh import elements
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
 
-Array = NDArray[np.float64]
-Rows = Mapping[str, NDArray[np.intp]]
+Rows = Mapping[str, Indices]
 AXES = ("x", "y", "z", "radius")
 
 
@@ -91,7 +90,7 @@ class Cells:
         """How many there are."""
         return sum(map(len, self.rows.values()))
 
-    def samples(self) -> Iterator[tuple[str, NDArray[np.intp], Array]]:
+    def samples(self) -> Iterator[tuple[str, Indices, Array]]:
         """Yield element, cells and shape values (n, n_nodes) [-] of their middles, then of their quadrature points."""
         for name, rows in self.rows.items():
             yield name, rows, middle(name)
@@ -185,7 +184,7 @@ class Varying:
         found = [self.at(*sample) for sample in self.cells.samples()]
         return float(min(values.min() for values in found)), float(max(values.max() for values in found))
 
-    def at(self, name: str, rows: NDArray[np.intp], N: Array) -> Array:
+    def at(self, name: str, rows: Indices, N: Array) -> Array:
         """Return the numbers (n_rows * n,) [unit of the constant] at points of cells of an element, cell by cell.
 
         `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] shape values of the points.
@@ -200,7 +199,7 @@ class Varying:
         return evaluated(self.given, positions(mesh, nodes, N), self._name).ravel()
 
 
-def positions(mesh: Mesh, nodes: NDArray[np.int32], N: Array) -> Array:
+def positions(mesh: Mesh, nodes: Numbers, N: Array) -> Array:
     """Return places (n_cells * n, dim) [length] in cells with `nodes` (n_cells, n_nodes) of int, by shape values `N`.
 
     `N` is (n, n_nodes) [-].

@@ -82,7 +82,7 @@ def tight_enough(tolerance: float, relative: float) -> float:
 
 
 def chosen(dim: int, n_dofs: int, columns: bool = False) -> tuple[str, str]:
-    """Return the solver that ``"auto"`` stands for, and why."""
+    """Return the solver chosen by ``"auto"``, and why."""
     limit = (DIRECT_WITH_COLUMNS_UP_TO if columns else DIRECT_UP_TO)[dim]
     if n_dofs <= limit:
         return "direct", f"for {n_dofs} unknowns in {dim}D a factorisation is cheapest (up to {limit})"

@@ -1,4 +1,4 @@
-r"""The compliance of forces at points that a field of fewer values cannot represent, and the same equations for that field.
+r"""Compliance of point forces outside a multiplier field, and the equivalent equations for the field.
 
 Forces of points with the weights W belong to a field with the values p, ``P p`` at the points. What the field does not
 represent gives way: :math:`C = (W^{-1} - P M^{-1} P^T) / \rho` among the points of some equations, M the mass matrix of the
@@ -16,17 +16,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import block_diag, csc_array, csr_array, diags_array
 from scipy.sparse.linalg import splu
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from fastcontact.arrays import Array, Indices, Mask
 
 
 @dataclass(frozen=True, eq=False)
 class FieldCompliance:
-    """See the module; equations that do not give way are fields of one point without springs.
+    """See the module; exact constraints are fields of one point without springs.
 
     Attributes
     ----------
@@ -65,7 +63,7 @@ class FieldCompliance:
 
     @classmethod
     def none(cls, m: int) -> FieldCompliance:
-        """Return that of m equations that do not give way."""
+        """Return that of m exact constraints."""
         one = csr_array(diags_array(np.ones(m)))
         return cls(one, np.ones(m), np.zeros(m), csr_array((m, m)), lambda: np.zeros((m, m)))
 
@@ -79,7 +77,7 @@ class FieldCompliance:
         return FieldCompliance(self.P, weights, self.stiffness * share, others, dense, self.bordered)
 
     def of_field(self, B: csr_array, c: Array) -> FieldEquations:
-        """Return the same equations for the field, of rows B (m, n) and right-hand sides c (m,) [length]."""
+        """Return the equivalent equations for the field, from rows B (m, n) and right-hand sides c (m,) [length]."""
         shares = csr_array(self.P.T @ diags_array(self.weights))
         size = np.asarray(abs(shares).sum(axis=1))
         touched = np.flatnonzero(size > 0.0)
@@ -91,7 +89,7 @@ class FieldCompliance:
         compliance = self._at_edge(touched[edge], units[edge])
         return FieldEquations(csr_array(shares @ B), shares @ c, P, edge, compliance, touched[edge], units[edge])
 
-    def _at_edge(self, given: NDArray[np.intp], units: Array) -> csr_array:
+    def _at_edge(self, given: Indices, units: Array) -> csr_array:
         """Return E (e, e) among values `given` (e,), those without any equation being eliminated."""
         rest = np.setdiff1d(np.flatnonzero(self.others.diagonal() > 0.0), given)
         E = csr_array(self.others[given][:, given])
@@ -128,5 +126,5 @@ class FieldEquations:
     P: csr_array
     edge: Mask
     compliance: csr_array
-    at: NDArray[np.intp]
+    at: Indices
     units: Array

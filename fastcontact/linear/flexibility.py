@@ -1,4 +1,4 @@
-"""Equations through the flexibility of the structure: ``(B K^-1 B.T + C) multiplier = c - B K^-1 f``.
+"""Schur complement of linear constraints: ``(B K^-1 B.T + C) multiplier = c - B K^-1 f``.
 
 Only the degrees of freedom that appear in B matter. Their part of ``K^-1`` is computed when they first appear and
 kept, so further active sets and pairings cost a small dense solution and one solution with K each.
@@ -7,25 +7,24 @@ kept, so further active sets and pairings cost a small dense solution and one so
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, lstsq
 from scipy.sparse import csr_array
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ContactError, ConvergenceError
 from fastcontact.linear.field_compliance import FieldCompliance
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 # Right-hand sides at a time: whole columns of K^-1 are long, and only short parts of them are kept.
 CHUNK = 32
 # Constraints whose full compliance is formed and factorised, at most: 3.2 GB a copy, and minutes; with friction, where
 # Newton's method factorises it several times for each pairing and it is not symmetric, ten seconds each.
 MOST_ROWS, MOST_ROWS_WITH_FRICTION = 20_000, 6_000
 # Formulations whose constraints no solver needs columns of the inverse for.
-CHEAP = 'formulation="mortar" with multipliers="dual", against rigid obstacles formulation="node_to_segment"'
+CHEAP = 'formulation="mortar" with multipliers="dual"'
 
 
 class TooManyColumnsError(ConvergenceError):
@@ -97,13 +96,23 @@ class FlexibilityColumns:
         rows = csr_array((R.data[used], place, starts), shape=(R.shape[0], len(self._dofs)))
         return symmetric(np.asarray(rows @ (rows @ self._values).T))
 
-    def ask_again(self, asked: Iterable[Indices]) -> None:
-        """Solve for what the columns of another solver were asked for, in its order; see `asked`."""
-        for dofs in asked:
+    def put_back(self, asked: Sequence[Indices]) -> None:
+        """Keep what was `asked` for, in that order, and nothing else; solve only for what is not kept now."""
+        pairs = zip(self.asked, asked, strict=False)
+        same = next((i for i, (mine, other) in enumerate(pairs) if not np.array_equal(mine, other)), len(asked))
+        self._forget(sum(len(dofs) for dofs in self.asked[same:]))
+        del self.asked[same:]
+        for dofs in asked[len(self.asked) :]:
             self._places(dofs)
 
+    def _forget(self, count: int) -> None:
+        """Forget the last `count` columns."""
+        if count:
+            self._place[self._dofs[-count:]] = -1
+            self._dofs, self._values = self._dofs[:-count], self._values[:-count, :-count].copy()
+
     def _places(self, dofs: NDArray[np.integer]) -> Indices:
-        """Return where `dofs` (k,), which may repeat, stand among those kept; solve for those that are new."""
+        """Return the positions of `dofs` (k,), which may repeat, among stored columns; solve for new ones."""
         new = np.unique(dofs[self._place[dofs] < 0]).astype(np.intp)
         if len(new):
             self._extend(new)
@@ -160,7 +169,7 @@ def solve_multipliers(flexibility: Array, wanted: Array, C: Array | FieldComplia
 
 
 def _smallest(flexibility: Array, wanted: Array) -> Array:
-    """Return the smallest multipliers (m,) where rows repeat each other and leave them open."""
+    """Return the minimum-norm multipliers (m,) of linearly dependent rows."""
     return np.asarray(lstsq(flexibility, wanted, cond=_round_off(flexibility))[0])
 
 

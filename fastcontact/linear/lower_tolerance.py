@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Mapping
+from typing import Any
 
 from fastcontact.linear.protocol import LinearSolver
 
@@ -12,7 +14,7 @@ LEFT, LEAST = 0.1, 1e-15
 
 
 def tighten(solver: LinearSolver, excess: float) -> bool:
-    """Lower the tolerance of `solver`, whose solutions leave `excess` times what is allowed; False at the least one."""
+    """Lower the tolerance of `solver`, whose residual exceeds its bound by the factor `excess`; False at the lower limit."""
     tolerance = max(solver.tolerance * LEFT / excess, LEAST)
     if not tolerance < solver.tolerance:
         return False
@@ -23,3 +25,10 @@ def tighten(solver: LinearSolver, excess: float) -> bool:
     solver.asked = solver.tolerance if solver.asked is None else solver.asked
     solver.tolerance = tolerance
     return True
+
+
+def put_back_tolerance(solver: LinearSolver, snapshot: Mapping[str, Any]) -> None:
+    """Let `solver` have the tolerance of a snapshot, lowered or not."""
+    asked = solver.tolerance if solver.asked is None else solver.asked
+    solver.tolerance = snapshot.get("tolerance", asked)
+    solver.asked = None if solver.tolerance == asked else asked

@@ -1,4 +1,4 @@
-"""What a linear solver is: the methods that every solver has, and the counters it keeps.
+"""Protocols of linear solvers.
 
 Shapes: n unknowns, m equations among them. ``K`` is a stiffness [force / length], ``u`` a displacement [length], ``f`` a
 force [force]. Equations ``B u + C multiplier = c`` have rows B (m, n) [-] and right-hand sides c (m,) [length]; their
@@ -8,24 +8,22 @@ has no more.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
-import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.linear.field_compliance import FieldCompliance
 from fastcontact.linear.springs import Springs
 
-Array = NDArray[np.float64]
 # Called with an unfinished solution (u, multiplier, relative residual); where it returns True, the solver stops there.
 Monitor = Callable[[Array, Array, float], bool]
 
 
 class Product(Protocol):
-    """What a solver that has copied a matrix K (n, n) returns in its place."""
+    """Matrix-vector products of a solver that stores K (n, n) in its own format."""
 
     def __matmul__(self, u: Array) -> Array:
         """Return ``K u``, shape (n,) [force]."""
@@ -49,7 +47,7 @@ class Loaded(Protocol):
 
     def solve(
         self, B: csr_array, c: Array, C: Array | FieldCompliance | None = None, guess: Array | None = None,
-        monitor: Monitor | None = None, tolerance: float | None = None, nodes: NDArray[np.intp] | None = None,
+        monitor: Monitor | None = None, tolerance: float | None = None, nodes: Indices | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         """Return (u, multiplier) with ``K u = f + B.T multiplier`` and ``B u + C multiplier = c``.
 
@@ -117,7 +115,7 @@ class LoadedNonsymmetric(Loaded, Protocol):
         ...
 
     def solve_nonsymmetric(
-        self, B: csr_array, c: Array, nodes: NDArray[np.intp], guess: Array, tolerance: float,
+        self, B: csr_array, c: Array, nodes: Indices, guess: Array, tolerance: float,
         friction: FrictionTerms | None = None, C: Array | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         """Return (u, multiplier) with ``B u + C multiplier = c`` and ``K u + S u = f + forces + rows.T multiplier``.
@@ -129,7 +127,7 @@ class LoadedNonsymmetric(Loaded, Protocol):
         Raises
         ------
         ConvergenceError
-            If equations that do not give way repeat each other, in B or in rows, or the iteration does not end.
+            If exact constraints are linearly dependent, in B or in rows, or the iteration does not converge.
         """
         ...
 
@@ -176,9 +174,9 @@ class LinearSolver(Protocol):
         return False
 
     def prepare(
-        self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None, release: bool = False
+        self, K: bsr_array, rigid_modes: Array, involved: Indices | None = None, release: bool = False
     ) -> bsr_array | Product:
-        """Do what is done once for a matrix: factorise it, or build a hierarchy.
+        """Factorise the matrix, or build a multigrid hierarchy.
 
         Parameters
         ----------
@@ -203,22 +201,18 @@ class LinearSolver(Protocol):
         """Take the right-hand side f (n,) [force]."""
         ...
 
-    def snapshot(self) -> Any:
-        """Return what later solutions owe to the loads so far: part of the state of an analysis; None for nothing."""
-        return None
+    def snapshot(self) -> dict[str, Any]:
+        """Return all that later solutions owe to earlier ones: plain numbers, strings and arrays.
 
-    def put_back(self, snapshot: Any) -> None:
-        """Continue from a `snapshot` of this solver; None for the beginning."""
+        It is the part of the state of an analysis that the solver has, and is saved with it: arrays are replaced, never
+        written into.
+        """
+        ...
+
+    def put_back(self, snapshot: Mapping[str, Any]) -> None:
+        """Continue from a `snapshot` of this solver, or of one of the same kind that was prepared for the same matrix."""
         ...
 
     def improve(self, excess: float) -> bool:
-        """Make later solutions more accurate, since they leave `excess` times what is allowed; False if there is no way."""
+        """Make later solutions more accurate, since the residual exceeds its bound by `excess`; False if impossible."""
         return False
-
-    def memory(self) -> dict[str, Any]:
-        """Return what the last digits of later solutions owe to earlier ones: plain numbers, strings and arrays."""
-        ...
-
-    def remember(self, memory: dict[str, Any]) -> None:
-        """Take the `memory` of a solver of the same kind that was prepared for the same matrix."""
-        ...

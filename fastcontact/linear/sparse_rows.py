@@ -1,17 +1,14 @@
-"""Sparse matrices row by row: scaled and chosen without products of matrices, which cost more than a thousand numbers do."""
+"""Row scaling and selection of sparse matrices without matrix products."""
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-Array = NDArray[np.float64]
+from fastcontact.arrays import AnyArray, Indices
 
 
-def scaled(matrix: csr_array, factor: NDArray[Any]) -> csr_array:
+def scaled(matrix: csr_array, factor: AnyArray) -> csr_array:
     """Return the matrix (m, n) with its rows times `factor` (m,); rows times zero are empty."""
     values = matrix.data * np.repeat(factor, np.diff(matrix.indptr))
     result = csr_array((values, matrix.indices, matrix.indptr), shape=matrix.shape)
@@ -21,6 +18,6 @@ def scaled(matrix: csr_array, factor: NDArray[Any]) -> csr_array:
     return result
 
 
-def taken(matrix: csr_array, rows: NDArray[np.intp]) -> csr_array:
+def taken(matrix: csr_array, rows: Indices) -> csr_array:
     """Return `rows` (k,) of a matrix, ascending; the matrix itself where they are all."""
     return matrix if len(rows) == matrix.shape[0] else matrix[rows]

@@ -1,19 +1,18 @@
-"""Springs along rows of displacements, such as penalties and those across sliding contacts: kept as rows, not as a matrix."""
+"""Springs along rows of displacements, such as penalties: stored as rows, not as an assembled matrix."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import DTypeLike
 from scipy.sparse import csr_array, vstack
 
+from fastcontact.arrays import AnyArray, Indices
 from fastcontact.linear import springs_kernels
 from fastcontact.linear.sparse_rows import scaled
 
-Array = NDArray[np.float64]
 # Springs that differ by less than this part of their size are alike.
 ALIKE = 0.3
 
@@ -33,10 +32,10 @@ class Springs:
     """
 
     rows: csr_array
-    stiffness: NDArray[Any]
+    stiffness: AnyArray
     through: csr_array | None = None
 
-    def subtract_forces(self, u: NDArray[Any], r: NDArray[Any], factor: float = 1.0) -> None:
+    def subtract_forces(self, u: AnyArray, r: AnyArray, factor: float = 1.0) -> None:
         """Subtract from `r` (n,) `factor` times the product of their matrix with `u` (n,)."""
         R = self.rows
         if self.through is not None:
@@ -56,7 +55,7 @@ class Springs:
             through = csr_array(vstack(own, format="csr"))
         return Springs(rows, np.concatenate([one.stiffness for one in pair]), through)
 
-    def under(self, pivots: NDArray[np.intp], weights: csr_array) -> Springs:
+    def under(self, pivots: Indices, weights: csr_array) -> Springs:
         """Return them where ``u[pivots] = weights u``, weights (m, n); rows are then zero at the pivots."""
         R, W, n = self.rows, weights, self.rows.shape[1]
         number = np.full(n, -1, np.int32)
@@ -72,13 +71,13 @@ class Springs:
         """Return them `factor` times as stiff, in a precision."""
         return Springs(self.rows.astype(kind), (factor * self.stiffness).astype(kind))
 
-    def to_dict(self) -> dict[str, NDArray[Any]]:
+    def to_dict(self) -> dict[str, AnyArray]:
         """Return them as plain arrays."""
         R = self.rows
         return {"indptr": R.indptr, "indices": R.indices, "data": R.data, "stiffness": self.stiffness}
 
     @classmethod
-    def from_dict(cls, kept: Mapping[str, NDArray[Any]], n: int) -> Springs:
+    def from_dict(cls, kept: Mapping[str, AnyArray], n: int) -> Springs:
         """Return what `to_dict` has kept, for n unknowns."""
         shape = (len(kept["stiffness"]), n)
         return cls(csr_array((kept["data"], kept["indices"], kept["indptr"]), shape=shape), kept["stiffness"])

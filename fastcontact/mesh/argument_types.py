@@ -1,4 +1,4 @@
-"""Types of the arguments of public calls: a wrong one is told by name, before it goes anywhere.
+"""Type checks of the arguments of public calls.
 
 What an argument may be is what its annotation says, so no call has a list of its own. Numbers are any real numbers, NumPy's
 too, but no truth values; sequences are also arrays and iterators, but no strings; arrays are all that NumPy makes one of.
@@ -23,8 +23,8 @@ from typing import Any, TypeVar, Union
 import numpy as np
 import numpy.typing
 
+from fastcontact.arrays import REFUSAL, is_masked
 from fastcontact.errors import FastcontactError
-from fastcontact.masks import REFUSAL, is_masked
 
 F = TypeVar("F", bound=Callable[..., Any])
 _ARRAY_LIKE = {*typing.get_args(np.typing.ArrayLike)}

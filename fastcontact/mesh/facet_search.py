@@ -5,17 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Indices, Mask, Numbers
 from fastcontact.mesh import elements
-
-Indices = NDArray[np.int32]
-Mask = NDArray[np.bool_]
 
 
 def facets_with_nodes(
-    solids: Mapping[str, Indices], chosen: Mask, between: bool, own: Mapping[str, Mask] | None = None
-) -> dict[str, Indices]:
+    solids: Mapping[str, Numbers], chosen: Mask, between: bool, own: Mapping[str, Mask] | None = None
+) -> dict[str, Numbers]:
     """Return by facet element the facets (n_facets, n_nodes) of solid cells all of whose nodes are chosen.
 
     Each once, as its first cell has it, which is outward for those of one cell.
@@ -30,7 +27,7 @@ def facets_with_nodes(
     own : mapping of str to ndarray of bool (n_cells,), optional
         The cells that the facets must belong to, by default all.
     """
-    found: dict[str, list[Indices]] = {}
+    found: dict[str, list[Numbers]] = {}
     owned: dict[str, list[Mask]] = {}
     for name, block in solids.items():
         element = elements.get(name)
@@ -52,7 +49,7 @@ def facets_with_nodes(
     return kept
 
 
-def added(block: Indices, facets: Indices) -> tuple[Indices, NDArray[np.intp]]:
+def added(block: Numbers, facets: Numbers) -> tuple[Numbers, Indices]:
     """Return a block of facets with those that it lacks at its end, and the rows where all of them are."""
     both = np.concatenate([block, facets])
     _, first, facet = np.unique(np.sort(both, axis=1), axis=0, return_index=True, return_inverse=True)

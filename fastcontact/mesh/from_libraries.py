@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import importlib
 import tempfile
-import warnings
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
 import numpy as np
 
-from fastcontact.errors import FastcontactWarning, FileError, MeshError
-from fastcontact.masks import REFUSAL, is_masked
+from fastcontact.arrays import REFUSAL, is_masked
+from fastcontact.errors import FileError, MeshError, warn
 from fastcontact.mesh import elements, topology
 from fastcontact.mesh.files.blocks import VERTEX
 from fastcontact.mesh.files.mesh_files import read_mesh
@@ -140,11 +139,9 @@ def _tell_what_is_left_out(gmsh: Any, dim: int) -> None:
     count = sum(sum(map(len, gmsh.model.mesh.getElements(dim, tag)[1])) for tag in alone)
     if count:
         kind = "volumes" if dim == 3 else "surfaces"
-        warnings.warn(
+        warn(
             f"{count} solid cells belong to no physical group and are left out (those of the {kind} "
-            f"{', '.join(map(str, alone[:6]))}): give every body a group",
-            FastcontactWarning,
-            stacklevel=3,
+            f"{', '.join(map(str, alone[:6]))}): give every body a group"
         )
 
 

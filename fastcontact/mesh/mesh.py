@@ -9,25 +9,23 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.errors import MeshError, unknown
 from fastcontact.mesh import elements
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.facet_search import added, facets_with_nodes
 from fastcontact.mesh.html_table import html_table
 
-Array = NDArray[np.float64]
-Indices = NDArray[Any]
 
-
-def _read_only(values: ArrayLike, dtype: Any) -> NDArray[Any]:
+def _read_only(values: ArrayLike, dtype: Any) -> AnyArray:
     array = np.array(values, dtype=dtype, order="C")
     array.setflags(write=False)
     return array
 
 
-def _numbers(what: str, values: ArrayLike) -> NDArray[Any]:
+def _numbers(what: str, values: ArrayLike) -> AnyArray:
     """Return whole numbers as an array that loses nothing when it becomes one of 32 bits."""
     array = np.asarray(values)
     if array.size == 0:
@@ -67,9 +65,9 @@ class Mesh:
     """
 
     points: Array
-    cells: Mapping[str, Indices]
-    cell_groups: Mapping[str, Indices] = field(default_factory=dict)
-    point_groups: Mapping[str, Indices] = field(default_factory=dict)
+    cells: Mapping[str, AnyArray]
+    cell_groups: Mapping[str, AnyArray] = field(default_factory=dict)
+    point_groups: Mapping[str, AnyArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         points = _read_only(self.points, np.float64)
@@ -90,7 +88,7 @@ class Mesh:
         set_(self, "point_groups", self._checked_groups("point", self.point_groups, len(points)))
 
     @staticmethod
-    def _checked_cells(name: str, block: ArrayLike, n_points: int) -> Indices:
+    def _checked_cells(name: str, block: ArrayLike, n_points: int) -> AnyArray:
         element = elements.get(name)
         conn = _read_only(_numbers(f"cells of {name}", block), np.int32)
         if conn.shape[:1] == (0,):
@@ -102,7 +100,7 @@ class Mesh:
         return conn
 
     @staticmethod
-    def _checked_groups(kind: str, groups: Mapping[str, ArrayLike], count: int) -> Mapping[str, Indices]:
+    def _checked_groups(kind: str, groups: Mapping[str, ArrayLike], count: int) -> Mapping[str, AnyArray]:
         checked = {}
         for name, members in groups.items():
             numbers = np.unique(_numbers(f"{kind} group '{name}'", members).astype(np.int32))
@@ -153,12 +151,12 @@ class Mesh:
         return starts
 
     @property
-    def solids(self) -> dict[str, Indices]:
+    def solids(self) -> dict[str, AnyArray]:
         """Connectivity (n_cells, n_nodes) of the cells that have the dimension of the space, by element."""
         return {name: block for name, block in self.cells.items() if elements.get(name).dim == self.dim}
 
     @property
-    def facets(self) -> dict[str, Indices]:
+    def facets(self) -> dict[str, AnyArray]:
         """Connectivity (n_cells, n_nodes) of the cells one dimension below the space, by element."""
         return {name: block for name, block in self.cells.items() if elements.get(name).dim == self.dim - 1}
 
@@ -168,7 +166,7 @@ class Mesh:
         return list(self.cell_groups) + [name for name in self.point_groups if name not in self.cell_groups]
 
     @typed(MeshError)
-    def split(self, numbers: NDArray[Any]) -> dict[str, NDArray[np.intp]]:
+    def split(self, numbers: AnyArray) -> dict[str, Indices]:
         """Return by element the rows (m,) of its cells among the cell `numbers` (n,); elements without any are absent."""
         rows = {}
         for name, start in self.offsets.items():
@@ -178,7 +176,7 @@ class Mesh:
         return rows
 
     @typed(MeshError)
-    def cells_of(self, group: str, dim: int | None = None) -> dict[str, Indices]:
+    def cells_of(self, group: str, dim: int | None = None) -> dict[str, AnyArray]:
         """Return the connectivity (n_cells, n_nodes) of a cell group by element, only that of dimension `dim` if given.
 
         MeshError if there is no cell group of that name.
@@ -197,7 +195,7 @@ class Mesh:
         return {name: self.cells[name][r] for name, r in rows.items() if dim is None or elements.get(name).dim == dim}
 
     @typed(MeshError)
-    def points_of(self, group: str) -> Indices:
+    def points_of(self, group: str) -> AnyArray:
         """Return the sorted point numbers (n,) of a group: a point group, or else all nodes of a cell group.
 
         MeshError if there is no group of that name; the message offers the nearest names.
@@ -290,7 +288,7 @@ class Mesh:
             )
         return self.with_facets({name: facets})
 
-    def _cells_inside(self, name: str, group: str) -> dict[str, NDArray[np.bool_]]:
+    def _cells_inside(self, name: str, group: str) -> dict[str, Mask]:
         """Return by element which solid cells (n_cells,) are in a group; MeshError that names facet group `name` if none."""
         if not self.cells_of(group, dim=self.dim):
             raise MeshError(
@@ -306,7 +304,7 @@ class Mesh:
         `groups` (n_facets, n_nodes) of int has their nodes by name of the group and by element.
         """
         cells = dict(self.cells)
-        rows: dict[str, dict[str, Indices]] = {}
+        rows: dict[str, dict[str, AnyArray]] = {}
         for name, facets in groups.items():
             rows[name] = {}
             for kind, block in facets.items():
@@ -314,7 +312,7 @@ class Mesh:
                 cells[kind], rows[name][kind] = added(cells.get(kind, block[:0]), block)
         starts = dict(zip(cells, np.cumsum([0, *map(len, cells.values())]).tolist(), strict=False))
 
-        def numbers(of: Mapping[str, Indices]) -> Indices:
+        def numbers(of: Mapping[str, AnyArray]) -> AnyArray:
             return np.concatenate([starts[kind] + place for kind, place in of.items()] or [np.empty(0, np.intp)])
 
         kept = {own: numbers(self.split(members)) for own, members in self.cell_groups.items()}

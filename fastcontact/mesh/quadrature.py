@@ -5,13 +5,16 @@ A `Rule` consists of points (n_q, dim) and weights (n_q,), both without dimensio
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from functools import cache
 
-Array = NDArray[np.float64]
+import numpy as np
+
+from fastcontact.arrays import Array
+
 Rule = tuple[Array, Array]
 
 
+@cache  # every pairing of mortar in the plane asks for it
 def gauss_line(n: int) -> Rule:
     """Gauss-Legendre rule with `n` points on [-1, 1], exact to degree 2n - 1."""
     points, weights = np.polynomial.legendre.leggauss(n)

@@ -5,15 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Mask
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements, quality_kernels
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 # A Jacobian below this fraction of the squared (cubed) longest edge is rounding, not area.
 _FLAT = 1e-12

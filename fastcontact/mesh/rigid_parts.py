@@ -1,4 +1,4 @@
-"""Parts of bodies that can turn about each other without deforming: they share one node only, or nodes on one line.
+"""Parts of bodies connected by a hinge: they share a single node, or nodes on one line.
 
 Cells with a common facet belong to one part, and so do parts with two common nodes in the plane, or in space with three that
 are not in line. What is left between parts are hinges.
@@ -9,15 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import bodies, cells_joined_by_facets, remembered
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 # Nodes nearer to each other, or to a line, than this fraction of the size of the mesh are at one place, or on the line.
 IN_LINE = 1e-6
 
@@ -108,7 +106,7 @@ def _meetings(node: Indices, part: Indices) -> tuple[Indices, Indices, Indices]:
     return first, second, at
 
 
-def _rigid(points: Array, first: Indices, second: Indices, at: Indices) -> NDArray[np.bool_]:
+def _rigid(points: Array, first: Indices, second: Indices, at: Indices) -> Mask:
     """Return whether two parts cannot turn about each other, for each meeting (m,) of `first` and `second` at a node."""
     if not len(at):
         return np.empty(0, bool)

@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements, topology_kernels
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int32]
 Found = TypeVar("Found")
 
 
@@ -116,7 +115,7 @@ def remembered(function: Callable[[Mesh], Found]) -> Callable[[Mesh], Found]:
 
 @typed(MeshError)
 @remembered
-def bodies(mesh: Mesh) -> tuple[int, NDArray[np.int32]]:
+def bodies(mesh: Mesh) -> tuple[int, Numbers]:
     """Return the number of bodies (sets of solid cells connected by nodes) and the body (n_points,) of each point.
 
     It is -1 for points without a solid cell.
@@ -139,13 +138,13 @@ def bodies(mesh: Mesh) -> tuple[int, NDArray[np.int32]]:
 
 
 @typed(MeshError)
-def outer_facets(mesh: Mesh) -> Mapping[str, Indices]:
+def outer_facets(mesh: Mesh) -> Mapping[str, Numbers]:
     """Return by facet element the facets (n_facets, n_nodes) of exactly one solid cell, normals pointing outward."""
     return _facets(mesh)[0]
 
 
 @typed(MeshError)
-def cells_joined_by_facets(mesh: Mesh) -> NDArray[np.int32]:
+def cells_joined_by_facets(mesh: Mesh) -> Numbers:
     """Return for each cell (n_cells,) of the mesh the lowest one that common facets join it to, from cell to cell.
 
     Cells that are no solids stand for themselves.
@@ -154,16 +153,16 @@ def cells_joined_by_facets(mesh: Mesh) -> NDArray[np.int32]:
 
 
 @typed(MeshError)
-def cells_of_outer_facets(mesh: Mesh) -> Mapping[str, NDArray[np.int32]]:
+def cells_of_outer_facets(mesh: Mesh) -> Mapping[str, Numbers]:
     """Return by facet element the number (n_facets,) of the solid cell behind each of the `outer_facets`."""
     return _facets(mesh)[2]
 
 
 @remembered
-def _facets(mesh: Mesh) -> tuple[Mapping[str, Indices], NDArray[np.int32], Mapping[str, NDArray[np.int32]]]:
+def _facets(mesh: Mesh) -> tuple[Mapping[str, Numbers], Numbers, Mapping[str, Numbers]]:
     """Return `outer_facets`, `cells_joined_by_facets` and `cells_of_outer_facets`."""
-    found: dict[str, list[Indices]] = {}
-    owners: dict[str, list[Indices]] = {}
+    found: dict[str, list[Numbers]] = {}
+    owners: dict[str, list[Numbers]] = {}
     for name, block in mesh.solids.items():
         element, numbers = elements.get(name), mesh.offsets[name] + np.arange(len(block), dtype=np.int32)
         for facet, facet_element in zip(element.facets, element.facet_elements, strict=True):
@@ -195,7 +194,7 @@ class OrderedLine:
         Length from the start node along the straight pieces between consecutive nodes [length].
     """
 
-    points: Indices
+    points: Numbers
     abscissa: Array
 
 
@@ -242,7 +241,7 @@ def ordered_line(mesh: Mesh, group: str, start: str | int | None = None) -> Orde
     return OrderedLine(points, np.concatenate([[0.0], np.cumsum(lengths)]))
 
 
-def _walk(segments: NDArray[np.intp], n_nodes: int, first: int) -> list[int]:
+def _walk(segments: Indices, n_nodes: int, first: int) -> list[int]:
     """Follow the segments from `first`, each node at most once."""
     neighbours: list[list[int]] = [[] for _ in range(n_nodes)]
     for a, b in segments.tolist():

@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Facets of exactly one cell, and cells that facets join, found by sorting the facets by their nodes."""
+"""Boundary facets, and cells joined by facets, by sorting facets by their nodes."""
 
 import numpy as np
 

@@ -5,17 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.contact.search.closest import closest_of_kinds
 from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import bodies, outer_facets
 from fastcontact.model import body_overlap_kernels
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 # Points nearer to a surface than this, relative to the size of the model, lie on it.
 ON_SURFACE = 1e-10

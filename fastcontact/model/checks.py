@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.errors import ContactError, ModelError
 from fastcontact.mesh.mesh import Mesh
@@ -18,8 +18,6 @@ from fastcontact.model.rigid_motions import FreeMotions, body_name, node_at
 
 if TYPE_CHECKING:
     from fastcontact.contact.formulations import Formulation
-
-Array = NDArray[np.float64]
 
 
 def check_motions(mesh: Mesh, motions: FreeMotions) -> None:
@@ -57,7 +55,7 @@ def check_ramps(ramped: Iterable[tuple[str, Table | None]], instants: Iterable[f
             )
 
 
-def check_forces(mesh: Mesh, forces: Array, related: NDArray[np.bool_], name: str) -> None:
+def check_forces(mesh: Mesh, forces: Array, related: Mask, name: str) -> None:
     """Raise ModelError if `forces` (n_points, dim) [force] act on points without solid cell.
 
     Points with relations, `related` (n_points,) of bool, are left out.
@@ -70,7 +68,7 @@ def check_forces(mesh: Mesh, forces: Array, related: NDArray[np.bool_], name: st
         )
 
 
-def _carried(mesh: Mesh, related: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _carried(mesh: Mesh, related: Mask) -> Mask:
     """Return whether each point (n_points,) has a solid cell or a relation."""
     carried = related.copy()
     for block in mesh.solids.values():
@@ -78,7 +76,7 @@ def _carried(mesh: Mesh, related: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return carried
 
 
-def check_supports(mesh: Mesh, supports: Iterable[tuple[str, str]], related: NDArray[np.bool_]) -> None:
+def check_supports(mesh: Mesh, supports: Iterable[tuple[str, str]], related: Mask) -> None:
     """Raise ModelError if all points of a support (name, group) are without solid cell.
 
     Points with relations, `related` (n_points,) of bool, are left out.

@@ -13,8 +13,6 @@ from fastcontact.model.ramp import Table
 
 # Force on an obstacle by component, None where the component is prescribed; empty for none at all.
 Driving = tuple[float | None, ...]
-# Formulations that need no facets on the primary side.
-AGAINST_OBSTACLES = ("node_to_segment", "continuous")
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.loads import Load, Table
 from fastcontact.elasticity.relations import Relation
 from fastcontact.errors import MeshError, ModelError, unknown
@@ -20,8 +20,6 @@ from fastcontact.mesh.companion_groups import ROTATION
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.spread_forces import Spread, mean_rotation, shares_of, turned
 
-Array = NDArray[np.float64]
-Points = NDArray[np.intp]
 Term = tuple[int, int, float]  # point, component, coefficient
 KINDS = ("rigid", "distributing")
 
@@ -55,7 +53,7 @@ def _turn(dim: int, axis: int, arm: Array) -> list[tuple[int, float]]:
     return [(after, arm[last]), (last, -arm[after])]
 
 
-def rigid_rows(reference: ReferencePoint, points: Points, places: Array, axes: Sequence[int]) -> list[list[Term]]:
+def rigid_rows(reference: ReferencePoint, points: Indices, places: Array, axes: Sequence[int]) -> list[list[Term]]:
     """Return the equations by which points follow the motion of a reference point with its rotation.
 
     Parameters
@@ -75,7 +73,7 @@ def rigid_rows(reference: ReferencePoint, points: Points, places: Array, axes: S
     return rows
 
 
-def distributing_rows(reference: ReferencePoint, points: Points, places: Array, weight: Array) -> list[list[Term]]:
+def distributing_rows(reference: ReferencePoint, points: Indices, places: Array, weight: Array) -> list[list[Term]]:
     """Return the equations by which a reference point follows the mean motion of points.
 
     The rotation is that of least squares, ``J theta = sum of w r x u`` with r from the middle of the points.

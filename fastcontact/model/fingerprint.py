@@ -13,9 +13,9 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from fastcontact.arrays import Array
 from fastcontact.contact.formulations import FORMULATIONS
 from fastcontact.elasticity.incompatible_modes import BENDING
 from fastcontact.elasticity.materials import LinearElastic, Material
@@ -24,7 +24,6 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.model import Model
 
-Array = NDArray[np.float64]
 LENGTH = 16
 SMOOTHING = "surface_smoothing of contact"
 

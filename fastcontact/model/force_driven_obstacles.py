@@ -14,17 +14,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import block_diag
 from scipy.sparse import bsr_array, csr_array, hstack
 
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.relations import Relation
 from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.rigid_motions import FreeMotions
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Table = tuple[tuple[float, float], ...]
 
 
@@ -59,7 +57,7 @@ class ForceDrivenObstacles:
             mask[self.dofs(number)] = [force is not None for force in pair.force]
         return mask
 
-    def dofs(self, number: int) -> NDArray[np.intp]:
+    def dofs(self, number: int) -> Indices:
         """Return the displacement components of an obstacle."""
         return (self.shape[0] + number) * self.shape[1] + np.arange(self.shape[1])
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.contact.search.box_tree_kernels import build, tree_order
 from fastcontact.mesh import elements
 from fastcontact.mesh.elements import Element
@@ -23,9 +23,6 @@ from fastcontact.model.rigid_motions import node_at
 if TYPE_CHECKING:
     from fastcontact.model.model import Model
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 # Nodes nearer to a facet than this, in facet lengths, lie on it; those as near to its nodes lie at them. Fine facets of an
 # arc leave a coarse one by more; there the facets at all corners of the coarse one tell that it is no slit.
 NEAR, ON_ARC = 0.02, 0.1
@@ -43,8 +40,8 @@ class OuterFacets:
     `kind` (n,) is which of the `elements` they are.
     """
 
-    nodes: NDArray[np.int32]
-    corners: NDArray[np.int32]
+    nodes: Numbers
+    corners: Numbers
     centre: Array
     normal: Array
     rise: Array
@@ -76,7 +73,7 @@ def hanging_nodes_warning(model: Model) -> str:
     )
 
 
-def _joined(mesh: Mesh, nodes_of: str, facets_of: str, node: Indices, corners: NDArray[np.int32]) -> Mask:
+def _joined(mesh: Mesh, nodes_of: str, facets_of: str, node: Indices, corners: Numbers) -> Mask:
     """Return whether nodes (m,) belong to one side of a contact, and facets (m, n_corners) to its other one."""
     ours, theirs = np.zeros((2, mesh.n_points), bool)
     ours[mesh.points_of(nodes_of)] = True

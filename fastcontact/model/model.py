@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.elasticity.constrained_system import ConstrainedMotion
 from fastcontact.elasticity.initial_states import InitialState
@@ -28,8 +28,6 @@ from fastcontact.model.prescribed_overlap import Supports, check_prescribed
 from fastcontact.model.pretension import check_locks
 from fastcontact.model.ramp import Ramp, Table, combined, multiplier
 from fastcontact.model.rigid_motions import free_motions, generalised, resisting, unstopped
-
-Array = NDArray[np.float64]
 
 
 class Model(ModelSupports):
@@ -111,7 +109,7 @@ class Model(ModelSupports):
         )
         self._check_motions(fixed, list(self.force_driven.forces(forces).values()))
 
-    def _check_relations(self, fixed: NDArray[np.bool_], prescribed: Mapping[Table | None, Array], ramp: Ramp) -> None:
+    def _check_relations(self, fixed: Mask, prescribed: Mapping[Table | None, Array], ramp: Ramp) -> None:
         if not self.relations:
             return
         motion = ConstrainedMotion(fixed.ravel(), self.relations)
@@ -119,7 +117,7 @@ class Model(ModelSupports):
             lift = combined(prescribed, ramp, instant, fixed.shape)
             motion.lift(lift.ravel(), motion.values([multiplier(r.ramp, ramp, instant) for r in self.relations]))
 
-    def _check_motions(self, fixed: NDArray[np.bool_], forces: Sequence[Array]) -> None:
+    def _check_motions(self, fixed: Mask, forces: Sequence[Array]) -> None:
         """Refuse motions without deformation that no supports, relations, springs or loads against a contact stop."""
         driven = self.force_driven
         motions = driven.motions(free_motions(self.mesh, self.kinematics, fixed, self.holding_rows()))

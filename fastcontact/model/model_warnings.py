@@ -9,9 +9,9 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._jit.parallel import on_one_blas_thread
+from fastcontact.arrays import AnyArray, Array, Numbers
 from fastcontact.contact.configuration import Configuration
 from fastcontact.elasticity.energy import integration_rule
 from fastcontact.elasticity.loads import BodyForce, Load, Pressure, Traction, Value, evaluated, facets_of
@@ -28,7 +28,6 @@ from fastcontact.model.repeated_pairs import split_side_warnings
 if TYPE_CHECKING:
     from fastcontact.model.model import Model
 
-Array = NDArray[np.float64]
 # Young's moduli that differ by more: steel against soft rubber is 200 000, MPa against Pa a million.
 MODULI = 3e5
 # A prescribed displacement of more than so many times the size of the model, and strains by the loads above and below these
@@ -283,7 +282,7 @@ def _cofactors(J: Array) -> Array:
     return np.stack([np.cross(J[..., k - 2, :], J[..., k - 1, :]) for k in range(3)], axis=-2)
 
 
-def _some(cells: NDArray[Any]) -> NDArray[Any]:
+def _some(cells: AnyArray) -> AnyArray:
     """Return about `SOME` of the cells, or all if they are fewer."""
     return cells[:: max(1, len(cells) // SOME)]
 
@@ -305,14 +304,14 @@ def _load_integral(model: Model, load: Load) -> list[str]:
     ]
 
 
-def _loaded(model: Model, load: Load) -> Iterator[tuple[str, NDArray[np.int32]]]:
+def _loaded(model: Model, load: Load) -> Iterator[tuple[str, Numbers]]:
     if isinstance(load, BodyForce):
         yield from load.cells(model.mesh)
     elif isinstance(load, (Pressure, Traction)):
         yield from facets_of(model.mesh, load.group).items()
 
 
-def _integrals(mesh: Mesh, element: str, cells: NDArray[np.int32], value: Value, name: str, finer: bool) -> Array:
+def _integrals(mesh: Mesh, element: str, cells: Numbers, value: Value, name: str, finer: bool) -> Array:
     """Return the integral (n_cells,) of a load over each cell, by about the rule of loads or by a finer one."""
     reference = elements.get(element)
     xi, weights = quadrature.product_rule(reference.linear, 9 if finer else 5)

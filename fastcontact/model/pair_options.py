@@ -191,7 +191,7 @@ def _nodes(name: str, option: str, options: Mapping[str, Any], mesh: Mesh, side:
 
 
 def _function(what: str, value: Any) -> Field | None:
-    """Return a number or a function of position as a function that checks what it returns; None for None."""
+    """Return a number or a function of position as a function that checks its result; pass None through."""
     if value is None:
         return None
     check_value(what, value)

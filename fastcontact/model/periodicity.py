@@ -1,4 +1,4 @@
-"""Parts that repeat themselves: one period or one sector stands for all, its two ends tied node by node."""
+"""Periodic cells and cyclic sectors: their two ends are tied node by node."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 from scipy.sparse.csgraph import connected_components
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.contact.obstacles.rotation import Rotation
 from fastcontact.elasticity.relations import Relation
 from fastcontact.errors import ModelError
@@ -18,8 +18,6 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.ramp import Table
 from fastcontact.model.relation_rows import APART, matched
 
-Array = NDArray[np.float64]
-Nodes = NDArray[np.intp]
 # Part of a row of a relation that has cancelled.
 CANCELLED = 1e-12
 
@@ -30,12 +28,12 @@ class Seam(NamedTuple):
     Vectors at the second node are those at the first one times `turn` (dim, dim); None where nothing turns.
     """
 
-    first: Nodes
-    second: Nodes
+    first: Indices
+    second: Indices
     turn: Array | None = None
 
 
-def same_place(seams: Sequence[Seam], n_points: int) -> Nodes | None:
+def same_place(seams: Sequence[Seam], n_points: int) -> Indices | None:
     """Return for each node (n_points,) the first of those at its place; None without seams."""
     if not seams:
         return None
@@ -129,7 +127,9 @@ def cyclic(
     return [Relation(name, csr_array(rows[np.diff(rows.indptr) > 0]))], seam
 
 
-def _turned(mesh: Mesh, first: Nodes, second: Nodes, rotation: Rotation, sign: float) -> tuple[Array, Nodes, Array]:
+def _turned(
+    mesh: Mesh, first: Indices, second: Indices, rotation: Rotation, sign: float
+) -> tuple[Array, Indices, Array]:
     """Return how far each node of the first end lies from the nearest one of the second [length], which, and the matrix."""
     from scipy.spatial import cKDTree
 

@@ -1,4 +1,4 @@
-"""Contact nodes that supports push into the other side, or off it where it is tied: no contact force can move them back."""
+"""Contact nodes that supports prescribe to penetrate, or to separate where tied, which no contact force can prevent."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from fastcontact.arrays import Array, Mask, Numbers
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.pairing import Candidates, gap_rows, rows_along
@@ -17,8 +17,6 @@ from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.obstacle_rotation import angle_at
 from fastcontact.model.ramp import Ramp, Table, combined, multiplier
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Pairs = Sequence[tuple[ContactPair, Formulation]]
 # A gap that changes with a displacement by less than this does not depend on it [-].
 STILL = 1e-6
@@ -109,9 +107,7 @@ def _worst(found: Iterable[Overlap]) -> Overlap:
     return max(found, key=lambda overlap: overlap.depth)
 
 
-def _at(
-    contact: ContactPair, formulation: Formulation, nodes: NDArray[np.int32], supports: Supports, instant: float
-) -> Overlap:
+def _at(contact: ContactPair, formulation: Formulation, nodes: Numbers, supports: Supports, instant: float) -> Overlap:
     """Return what supports do to some secondary nodes at an instant."""
     displacement, ramp = supports.at(instant), supports.ramp
     still = np.zeros(displacement.shape[1])

@@ -1,4 +1,4 @@
-"""Pretension sections: a cut through a bolt whose sides a force pulls together, until their approach is locked."""
+"""Pretension sections: a force closes a cut through a bolt until its shortening is locked."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.loads import Load, Table, check_number
 from fastcontact.elasticity.relations import Relation
 from fastcontact.errors import ModelError
@@ -16,8 +16,6 @@ from fastcontact.mesh.companion_groups import OPPOSITE
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.relation_rows import along, matched, normals_of
 
-Array = NDArray[np.float64]
-Nodes = NDArray[np.intp]
 # How far nodes of a section may lie off its plane, relative to its size.
 FLAT = 1e-6
 # A bolt whose direction is farther from the normal of its section than this cosine tells is a mistake [-].
@@ -47,8 +45,8 @@ class Pretension:
     """
 
     label: str
-    nodes: Nodes
-    opposite: Nodes
+    nodes: Indices
+    opposite: Indices
     normal: Array
     force: float
     shortening: float | None
@@ -168,7 +166,7 @@ def pretension(
     return Pretension(label, nodes, facing, direction, force or 0.0, shortening, locked_from, ramp)
 
 
-def _sides(mesh: Mesh, name: str, section: str, opposite: str | None) -> tuple[Nodes, Nodes]:
+def _sides(mesh: Mesh, name: str, section: str, opposite: str | None) -> tuple[Indices, Indices]:
     """Return the points of both sides of a section, one upon the other."""
     other = section + OPPOSITE if opposite is None else opposite
     nodes = mesh.points_of(section).astype(np.intp)
@@ -187,7 +185,7 @@ def _sides(mesh: Mesh, name: str, section: str, opposite: str | None) -> tuple[N
     return nodes, facing[place]
 
 
-def _normal(mesh: Mesh, name: str, nodes: Nodes, normal: Sequence[float] | None) -> Array:
+def _normal(mesh: Mesh, name: str, nodes: Indices, normal: Sequence[float] | None) -> Array:
     """Return the unit normal (dim,) of a section, of its plane where none is given."""
     if normal is not None:
         vector = np.asarray(normal, float)

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from numbers import Real
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.elasticity.loads import LARGEST
 from fastcontact.errors import ModelError
 from fastcontact.mesh.argument_types import typed
 
-Array = NDArray[np.float64]
 # Points (instant, multiplier of the loads) of a piecewise linear function.
 Table = tuple[tuple[float, float], ...]
 # Largest number of equal steps; more are probably a typing error.

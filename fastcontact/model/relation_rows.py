@@ -1,21 +1,19 @@
-"""Rows of linear relations: displacements along the normals of a surface, nodes of one group with those of another."""
+"""Rows of multi-point constraints: along surface normals, and between the nodes of two groups."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.elasticity.loads import facets_of, outward
 from fastcontact.errors import ModelError
 from fastcontact.mesh.mesh import Mesh
 
-Array = NDArray[np.float64]
-Nodes = NDArray[np.intp]
 NORMAL = "normal"
 # A component of a unit normal below this is round-off.
 ROUND_OFF = 1e-12
@@ -23,7 +21,7 @@ ROUND_OFF = 1e-12
 APART = 1e-6
 
 
-def normals_of(mesh: Mesh, group: str) -> tuple[Nodes, Array]:
+def normals_of(mesh: Mesh, group: str) -> tuple[Indices, Array]:
     """Return the nodes (m,) of a group of outer facets, and the means (m, dim) of the facets' unit normals there.
 
     Errors as for a pressure on the group.
@@ -38,7 +36,7 @@ def normals_of(mesh: Mesh, group: str) -> tuple[Nodes, Array]:
     return points.astype(np.intp), normal / np.linalg.norm(normal, axis=1, keepdims=True)
 
 
-def directions_of(mesh: Mesh, group: str, component: str) -> list[tuple[Nodes, Array]]:
+def directions_of(mesh: Mesh, group: str, component: str) -> list[tuple[Indices, Array]]:
     """Return the nodes (m,) of a group, and unit vectors (m, dim), for each of the components that a name stands for.
 
     The name is ``"normal"``, or some of the letters x, y, z.
@@ -49,7 +47,7 @@ def directions_of(mesh: Mesh, group: str, component: str) -> list[tuple[Nodes, A
     return [(nodes, np.tile(np.eye(mesh.dim)["xyz".index(axis)], (len(nodes), 1))) for axis in component]
 
 
-def along(nodes: Nodes, directions: Array, n_dofs: int) -> csr_array:
+def along(nodes: Indices, directions: Array, n_dofs: int) -> csr_array:
     """Return rows (m, n_dofs): the displacement of each node (m,) along its unit vector (m, dim) [-]."""
     m, dim = directions.shape
     dofs = nodes[:, None] * dim + np.arange(dim)
@@ -59,8 +57,8 @@ def along(nodes: Nodes, directions: Array, n_dofs: int) -> csr_array:
 
 
 def matched(
-    mesh: Mesh, first: tuple[str, Nodes], second: tuple[str, Nodes], translation: Sequence[float] | None
-) -> Nodes:
+    mesh: Mesh, first: tuple[str, Indices], second: tuple[str, Indices], translation: Sequence[float] | None
+) -> Indices:
     """Return, for each node of the first group, the place among the nodes of the second where it lies after `translation`.
 
     Without one, groups are moved middle upon middle.

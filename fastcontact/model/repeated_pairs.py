@@ -1,4 +1,4 @@
-"""Facets and nodes that two contact pairs press on each other: their forces would be shared out at will."""
+"""Facets and nodes that belong to two contact pairs, whose force split is undetermined."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.side_checks import shared_facets
@@ -17,7 +17,6 @@ from fastcontact.errors import ContactError
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.contact_pair import ContactPair
 
-Array = NDArray[np.float64]
 # Sides whose normals at a common node are within 45 degrees go on in each other there; others meet in a corner.
 GOES_ON = 0.7
 
@@ -106,7 +105,7 @@ def split_side_warnings(pairs: Sequence[tuple[ContactPair, Formulation]]) -> lis
     return texts
 
 
-def _common(points: Array, side: Surface, other: Surface) -> NDArray[np.int32]:
+def _common(points: Array, side: Surface, other: Surface) -> Numbers:
     """Return the common nodes of two surfaces with nodes at `points` (n_points, dim) at which their normals agree."""
     nodes = np.intersect1d(side.points, other.points)
     if not len(nodes):
@@ -115,7 +114,7 @@ def _common(points: Array, side: Surface, other: Surface) -> NDArray[np.int32]:
     return np.asarray(nodes[np.einsum("nd,nd->n", *normals) > GOES_ON])
 
 
-def _places(side: Surface, nodes: NDArray[np.int32]) -> NDArray[np.intp]:
+def _places(side: Surface, nodes: Numbers) -> Indices:
     """Return the places of nodes among the points of a side."""
     order = np.argsort(side.points)
     return np.asarray(order[np.searchsorted(side.points, nodes, sorter=order)])

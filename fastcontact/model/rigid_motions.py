@@ -1,4 +1,4 @@
-"""Rigid-body motions that supports and relations leave free, and whether contact and loads can stop them.
+"""Rigid-body modes left free by supports and multi-point constraints, and whether contact can stop them.
 
 A body in contact stays in equilibrium if no motion that opens gaps, or leaves them, is driven by the loads: the loads
 then lie inside the cone of the contact forces (Fichera, 1964; Lions and Stampacchia, 1967).
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 from scipy.sparse import csr_array, vstack
 
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.stiffness import rigid_modes
 from fastcontact.errors import ModelError
@@ -20,8 +21,6 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.rigid_parts import RigidParts, rigid_parts
 from fastcontact.mesh.topology import bodies
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 MODE_NAMES = {
     "axisymmetric": ("translation along y (the axis)",),
     "plane_strain": ("translation along x", "translation along y", "rotation"),
@@ -52,7 +51,7 @@ class FreeMotions:
     displacement: Array
     parts: Array
     labels: list[tuple[str, str]]
-    hinges: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, np.intp))
+    hinges: Indices = field(default_factory=lambda: np.empty(0, np.intp))
 
     def __len__(self) -> int:
         return self.displacement.shape[1]
@@ -87,7 +86,7 @@ def body_name(mesh: Mesh, body: NDArray[np.integer], number: int) -> str:
     return _group_of(mesh, members) or f"number {number + 1} (around {mesh.points[members].mean(axis=0)})"
 
 
-def _group_of(mesh: Mesh, members: NDArray[np.intp]) -> str:
+def _group_of(mesh: Mesh, members: Indices) -> str:
     """Return the name of the cell group whose solid cells have the nodes `members`, empty if there is none."""
     for group in mesh.cell_groups:
         blocks = mesh.cells_of(group, dim=mesh.dim)
@@ -120,7 +119,7 @@ def free_motions(mesh: Mesh, kinematics: str, fixed: Mask, relations: csr_array 
 def _of_bodies(mesh: Mesh, kinematics: str, fixed: Mask) -> FreeMotions:
     """Return the motions that the supports `fixed` (n_points, dim) leave to bodies, and to parts of them at hinges."""
     rigid = _parts_of(mesh, kinematics)
-    moving: list[tuple[NDArray[np.intp], Array]] = []  # nodes (m,) of a part, and its motions (m, dim, k) there
+    moving: list[tuple[Indices, Array]] = []  # nodes (m,) of a part, and its motions (m, dim, k) there
     parts, labels = [np.empty((0, 0))], []
     for number in range(rigid.count):
         members = rigid.nodes_of(number)
@@ -152,7 +151,7 @@ def _parts_of(mesh: Mesh, kinematics: str) -> RigidParts:
     return RigidParts(count, body.astype(np.intp), np.empty(0, np.intp), np.empty(0, np.intp))
 
 
-def _turning_about(mesh: Mesh, rigid: RigidParts, moving: list[tuple[NDArray[np.intp], Array]]) -> Array:
+def _turning_about(mesh: Mesh, rigid: RigidParts, moving: list[tuple[Indices, Array]]) -> Array:
     """Return the combinations (k, j) of the motions of all parts under which nodes at hinges stay together."""
     width = sum(motion.shape[2] for _, motion in moving)
     if not len(rigid.hinge_node):

@@ -1,4 +1,4 @@
-"""Forces spread over a group by the distance from a place, through which their resultant passes."""
+"""Forces distributed over a group, with a prescribed point of application of the resultant."""
 
 from __future__ import annotations
 
@@ -6,14 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.loads import Load, Table, Traction, check_number
 from fastcontact.errors import MeshError, ModelError, unknown
 from fastcontact.mesh.mesh import Mesh
 
-Array = NDArray[np.float64]
-Points = NDArray[np.intp]
 # Weights by the distance over the radius, from 1 at the place to 0 at the radius.
 WEIGHTINGS: dict[str, Callable[[Array], Array]] = {
     "uniform": np.ones_like,
@@ -62,7 +60,7 @@ class Spread:
         return np.where(s <= 1.0, WEIGHTINGS[self.weighting](np.minimum(s, 1.0)), 0.0)
 
 
-def shares_of(mesh: Mesh, kinematics: str, group: str, spread: Spread | None = None) -> tuple[Points, Array]:
+def shares_of(mesh: Mesh, kinematics: str, group: str, spread: Spread | None = None) -> tuple[Indices, Array]:
     """Return the points (n,) of a group, and their shares (n,) of what is spread over it [-].
 
     By area, where the group has facets, times the weights of `spread`. ModelError if nothing lies inside its radius.

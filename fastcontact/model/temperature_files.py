@@ -6,20 +6,19 @@ import os
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ModelError
 from fastcontact.mesh.files.paths import PathLike
 from fastcontact.mesh.files.point_fields import at_points_of, read_point_field
 from fastcontact.mesh.mesh import Mesh
 
-Array = NDArray[np.float64]
 # How far a time of a file may lie from the one that is wanted, relative to the latest.
 SAME_TIME = 1e-9
 
 
 def read_temperatures(
-    mesh: Mesh, file: PathLike | Sequence[PathLike], field: str, wanted: NDArray[np.intp], instant: float | None
+    mesh: Mesh, file: PathLike | Sequence[PathLike], field: str, wanted: Indices, instant: float | None
 ) -> tuple[Array, Array | None]:
     """Return a field (n_instants, n_points) at the `wanted` (k,) of int points, elsewhere NaN, and its times (n_instants,).
 

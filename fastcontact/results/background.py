@@ -1,4 +1,4 @@
-"""Work in a thread of its own: one task at a time, whose error is raised to those who wait for it."""
+"""A background thread for one task at a time; its errors are raised in the waiting thread."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A file that HDF5 writes to, and that can be opened after every single write.
+"""An HDF5 file that can be opened after every single write.
 
 HDF5 writes the records of its indices in no particular order. A process that is killed between two writes may leave an index
 that leads beyond the end of the file or has lost entries, and with them steps that were complete. Here writes are kept in

@@ -1,4 +1,4 @@
-"""The place of a result file on the disk: room that is reserved, and one writer at a time."""
+"""Reservation of disk space and exclusive write access for result files."""
 
 from __future__ import annotations
 

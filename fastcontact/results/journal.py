@@ -1,4 +1,4 @@
-"""Writes that are repeated after a power loss: a list of them with a checksum, kept at the end of a file until they are done.
+"""Write-ahead journal: writes with a checksum at the end of the file, replayed after a power loss.
 
 A disk may do what was written since the last synchronisation in any order, in part, or not at all. New data hurt nobody,
 since nothing leads to them yet; records of HDF5 that are changed in place do. So these are first written behind the contents

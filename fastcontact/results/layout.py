@@ -1,4 +1,4 @@
-"""What stands where in a result file.
+"""Layout of result files.
 
 A result file is an HDF5 file with two groups. Viewers read the first, whose layout is that of VTK:
 
@@ -32,6 +32,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.arrays import AnyArray, Array, Numbers
 from fastcontact.elasticity.recovery import von_mises
 from fastcontact.errors import FileError
 from fastcontact.mesh import elements, topology
@@ -39,7 +40,6 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.separated import mean_in_cells
 from fastcontact.results.step import ContactResult, StepResult
 
-Array = NDArray[np.float64]
 Flags = NDArray[np.int8]
 
 # 1: until the restart state came in. 2: restart state of the last step, any number of run records. 3: the middle of a
@@ -150,7 +150,7 @@ def solid_cells(mesh: Mesh) -> SolidCells:
     )
 
 
-def xdmf_topology(mesh: Mesh) -> NDArray[np.int32] | None:
+def xdmf_topology(mesh: Mesh) -> Numbers | None:
     """Return each solid cell's XDMF code and nodes in one sequence; None if XDMF lacks an element."""
     codes = [XDMF_TYPES.get(elements.get(name).vtk) for name in mesh.solids]
     known = [code for code in codes if code is not None]
@@ -205,7 +205,7 @@ def point_flags(mesh: Mesh) -> dict[str, Flags]:
     return _flags(members, mesh.n_points)
 
 
-def cell_fields(mesh: Mesh) -> dict[str, NDArray[Any]]:
+def cell_fields(mesh: Mesh) -> dict[str, AnyArray]:
     """Return the body of each solid cell, and 1 inside and 0 outside for each group of solids."""
     first = np.concatenate([np.empty(0, np.int32), *(block[:, 0] for block in mesh.solids.values())])
     starts, total = {}, 0
@@ -226,7 +226,7 @@ def _plain(name: str) -> str:
     return "".join(c if c.isascii() else "_" for c in letters if not unicodedata.combining(c))
 
 
-def _flags(members: dict[str, NDArray[Any]], count: int) -> dict[str, Flags]:
+def _flags(members: dict[str, AnyArray], count: int) -> dict[str, Flags]:
     flags: dict[str, Flags] = {}
     for group, numbers in members.items():
         name = f"group_{_plain(group)}"

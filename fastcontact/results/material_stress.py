@@ -1,17 +1,14 @@
-"""Nodal stress where materials meet: one value for each of them, since stress jumps from one to the other."""
+"""Nodal stress on material interfaces: one value for each material."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Numbers
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.material_sides import MaterialSides
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int32]
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,9 +26,9 @@ class MaterialStress:
         Average over the cells of that material at the node, components as of `StepResult.stress` [pressure].
     """
 
-    cells: Indices
-    points: Indices
-    material: Indices
+    cells: Numbers
+    points: Numbers
+    material: Numbers
     stress: Array
 
     def at(self, point: int) -> dict[int, Array]:
@@ -40,7 +37,7 @@ class MaterialStress:
 
 
 def by_largest_von_mises(
-    sides: MaterialSides, cells: Indices, at_places: Array, n_points: int
+    sides: MaterialSides, cells: Numbers, at_places: Array, n_points: int
 ) -> tuple[Array, MaterialStress | None]:
     """Return the nodal stress (n_points, n_components), and that of each side where materials meet [pressure].
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.errors import FileError, MeshError
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.files.med import AXES, add_field, add_mesh, new_file
@@ -14,8 +14,6 @@ from fastcontact.mesh.files.paths import PathLike
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.layout import contact_pressure
 from fastcontact.results.step import StepResult
-
-Array = NDArray[np.float64]
 
 # Where each component stands in ours, xx yy zz xy yz xz: Salome and code_aster have xz before yz.
 STRESSES = {"SIXX": 0, "SIYY": 1, "SIZZ": 2, "SIXY": 3, "SIXZ": 5, "SIYZ": 4}

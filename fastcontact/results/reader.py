@@ -13,8 +13,8 @@ from types import TracebackType
 from typing import Any, overload
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Numbers
 from fastcontact.errors import FileError
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.files import toml_text
@@ -134,7 +134,7 @@ class Results(Sequence[StepResult]):
             raise ValueError(f"only {len(self._rows)} of {self._n_steps} steps")
         if not isinstance(self.kinematics, str) or not isinstance(self.case_text, str):
             raise ValueError("its kinematics or its case is no text")
-        self.load_factors: NDArray[np.float64] = np.ascontiguousarray(self._rows["load_factor"])
+        self.load_factors: Array = np.ascontiguousarray(self._rows["load_factor"])
         run = self._run_record(own)
         self.log: Any = (run or {}).get("log")
         self.error: str = (run or {}).get("error", "")
@@ -328,7 +328,7 @@ class Results(Sequence[StepResult]):
         static = {*layout.cell_fields(self.mesh), *layout.MATERIAL_FIELDS, "material"}
         return [name for name in self._file["VTKHDF/CellData"] if name not in static]
 
-    def _cell_fields(self, number: int) -> dict[str, NDArray[np.float64]]:
+    def _cell_fields(self, number: int) -> dict[str, Array]:
         data, n = self._file["VTKHDF/CellData"], len(self._file["VTKHDF/Types"])
         fields = {name: data[name][number * n : (number + 1) * n] for name in self.cell_field_names}
         for name, values in fields.items():
@@ -336,7 +336,7 @@ class Results(Sequence[StepResult]):
                 raise ValueError(f"{name} of step {number} is cut off or of another kind")
         return fields
 
-    def _field(self, name: str, number: int, width: int | None = None) -> NDArray[np.float64]:
+    def _field(self, name: str, number: int, width: int | None = None) -> Array:
         n = self.mesh.n_points
         data, rows = self._file["VTKHDF/PointData"][name], slice(number * n, (number + 1) * n)
         values = data[rows] if width is None else data[rows, :width]
@@ -389,7 +389,7 @@ def _read_mesh(stored: Any, raw: Any) -> Mesh:
     )
 
 
-def _read_groups(group: Any, raw: Any) -> dict[str, NDArray[np.int32]]:
+def _read_groups(group: Any, raw: Any) -> dict[str, Numbers]:
     names = _read_json(group["names"], raw)
     if group["sizes"].shape != (len(names),):
         raise ValueError(f"'{group.name}' has {len(names)} names for sizes of shape {group['sizes'].shape}")

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Numbers
 from fastcontact.elasticity.material_sides import material_sides
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.step import StepResult
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int32]
 
-
-def separated(mesh: Mesh, step: StepResult) -> tuple[Mesh, Indices, Array]:
+def separated(mesh: Mesh, step: StepResult) -> tuple[Mesh, Numbers, Array]:
     """Return the mesh cut along borders of materials, the node (m,) of each of its points, and the stress (m, ...) there.
 
     The points of `mesh` come first. Stress [pressure] has the components of `StepResult.stress`. The mesh has solid cells
@@ -28,7 +25,7 @@ def separated(mesh: Mesh, step: StepResult) -> tuple[Mesh, Indices, Array]:
     return Mesh(mesh.points[sides.node], sides.cells), sides.node, stress
 
 
-def cells_by_element(mesh: Mesh, values: NDArray[np.int32]) -> dict[str, NDArray[np.int32]]:
+def cells_by_element(mesh: Mesh, values: Numbers) -> dict[str, Numbers]:
     """Return numbers of all solid cells (n_solids,) by element."""
     ends = np.cumsum([len(block) for block in mesh.solids.values()])[:-1]
     return dict(zip(mesh.solids, np.split(values, ends), strict=True))

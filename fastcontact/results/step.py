@@ -6,18 +6,17 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Mask, Numbers
 from fastcontact.errors import unknown
 from fastcontact.mesh.html_table import html_table
 from fastcontact.results.material_stress import MaterialStress
 
-Array = NDArray[np.float64]
 # Part of the normal forces below which their resultant tells nothing.
 CANCELLED = 1e-3
 
 
-def half_width(place: Array, closed: NDArray[np.bool_], across: Array | None = None) -> tuple[float, float]:
+def half_width(place: Array, closed: Mask, across: Array | None = None) -> tuple[float, float]:
     """Return the bracket of the half-width of a contact [length]: (NaN, NaN) where nothing is closed.
 
     From `place` (n,) from the middle, with a sign where they lie on both sides of it [length], and which are `closed`: half
@@ -31,7 +30,7 @@ def half_width(place: Array, closed: NDArray[np.bool_], across: Array | None = N
     if not one_sided:  # where the surface ends on one side, it is no wider there
         beyond |= place == place[place < place[closed].min()].max(initial=-np.inf)
 
-    def half(nodes: NDArray[np.bool_]) -> float:
+    def half(nodes: Mask) -> float:
         return float(np.abs(across[nodes]).max() if one_sided else 0.5 * np.ptp(across[nodes]))
 
     return half(closed), half(closed | beyond) if beyond.any() else float("inf")
@@ -114,7 +113,7 @@ class ContactResult:
 
     name: str
     formulation: str
-    points: NDArray[np.int32]
+    points: Numbers
     coordinates: Array
     abscissa: Array
     gap: Array
@@ -122,17 +121,17 @@ class ContactResult:
     multiplier: Array
     force_vectors: Array
     normal: Array
-    active: NDArray[np.bool_]
+    active: Mask
     force: Array
     radius: tuple[float, float]
     shear: Array = None  # type: ignore[assignment]
-    sticking: NDArray[np.bool_] = None  # type: ignore[assignment]
+    sticking: Mask = None  # type: ignore[assignment]
     dissipation: float = 0.0
     obstacle_displacement: Array | None = None
     middle: Array = None  # type: ignore[assignment]
     place: Array = None  # type: ignore[assignment]
     tangent: Array | None = None
-    primary_points: NDArray[np.int32] = None  # type: ignore[assignment]
+    primary_points: Numbers = None  # type: ignore[assignment]
     primary_force_vectors: Array = None  # type: ignore[assignment]
     obstacle_angle: float | None = None
     torque: float | None = None

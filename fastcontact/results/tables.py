@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import AnyArray, Array
 from fastcontact.errors import CaseError, unknown
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.files.paths import PathLike, replacing
@@ -16,15 +16,14 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import ordered_line
 from fastcontact.results.step import ContactResult, StepResult
 
-Table = NDArray[Any]
-Columns = dict[str, NDArray[Any]]
+Columns = dict[str, AnyArray]
 
 AXES = ("x", "y", "z")
 STRESS_COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 
 
 @typed(CaseError)
-def contact_table(contact: ContactResult, step: StepResult | None = None) -> Table:
+def contact_table(contact: ContactResult, step: StepResult | None = None) -> AnyArray:
     """Return the state of a contact pair, one row for each secondary node in order along the surface.
 
     Parameters
@@ -66,7 +65,7 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Tab
     return table[np.argsort(contact.place, kind="stable")]  # a closed line has no first node
 
 
-def normal_stress(contact: ContactResult, step: StepResult) -> NDArray[np.float64]:
+def normal_stress(contact: ContactResult, step: StepResult) -> Array:
     """Return the stress ``n . sigma . n`` (m,) at the nodes of a contact along the normals n they face [pressure].
 
     `step` is the one that the contact belongs to. Where contact presses it is minus the pressure, up to the mesh error. NaN
@@ -81,7 +80,7 @@ def normal_stress(contact: ContactResult, step: StepResult) -> NDArray[np.float6
 
 
 @typed(CaseError)
-def line_table(mesh: Mesh, step: StepResult, group: str, start: str | int | None = None) -> Table:
+def line_table(mesh: Mesh, step: StepResult, group: str, start: str | int | None = None) -> AnyArray:
     """Return the fields along a line of nodes, one row a node, in order.
 
     Parameters
@@ -112,13 +111,13 @@ def line_table(mesh: Mesh, step: StepResult, group: str, start: str | int | None
     return _table(columns | _fields(step, line.points))
 
 
-def with_column(table: Table, name: str, values: NDArray[Any]) -> Table:
+def with_column(table: AnyArray, name: str, values: AnyArray) -> AnyArray:
     """Return a table (m,) with one column more, `values` (m,) under `name`."""
     return _table({**_columns(table), name: values})
 
 
 @typed(CaseError)
-def write_csv(path: PathLike, table: Table, units: Mapping[str, str] | None = None) -> None:
+def write_csv(path: PathLike, table: AnyArray, units: Mapping[str, str] | None = None) -> None:
     """Write a table as comma-separated values (RFC 4180) with one header line.
 
     Numbers are written with all their digits: whoever reads them gets the same bits.
@@ -159,7 +158,7 @@ def _text(value: Any) -> str:
     return str(value)
 
 
-def _table(columns: Mapping[str, NDArray[Any]]) -> Table:
+def _table(columns: Mapping[str, AnyArray]) -> AnyArray:
     """Return columns of equal length as one structured array."""
     table = np.empty(len(next(iter(columns.values()))), dtype=[(name, c.dtype) for name, c in columns.items()])
     for name, column in columns.items():
@@ -167,21 +166,21 @@ def _table(columns: Mapping[str, NDArray[Any]]) -> Table:
     return table
 
 
-def _columns(table: Table) -> Columns:
+def _columns(table: AnyArray) -> Columns:
     if not isinstance(table, np.ndarray) or table.dtype.names is None:
         raise CaseError(f"a table is an array with named columns, as contact_table makes it, not of the {type(table)}")
     return {name: table[name] for name in table.dtype.names}
 
 
-def _by_axis(prefix: str, vectors: NDArray[Any]) -> Columns:
+def _by_axis(prefix: str, vectors: AnyArray) -> Columns:
     return {f"{prefix}{axis}": vectors[:, i] for i, axis in enumerate(AXES[: vectors.shape[1]])}
 
 
-def _places(points: NDArray[Any], coordinates: NDArray[Any], abscissa: NDArray[Any]) -> Columns:
+def _places(points: AnyArray, coordinates: AnyArray, abscissa: AnyArray) -> Columns:
     return {"point": points, **_by_axis("", coordinates), "abscissa": abscissa}
 
 
-def _fields(step: StepResult, points: NDArray[Any]) -> Columns:
+def _fields(step: StepResult, points: AnyArray) -> Columns:
     """Return displacement, stress and von Mises stress at some points."""
     stress = step.stress[points]
     return {

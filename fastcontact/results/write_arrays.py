@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.arrays import AnyArray
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results import layout
 from fastcontact.results.material_stress import MaterialStress
@@ -27,7 +28,7 @@ ROWS, BYTES = 64, 4096
 SHARED = 4096
 
 
-def write_geometry(file: Any, mesh: Mesh, growing: Sequence[str] = (), material: NDArray[Any] | None = None) -> None:
+def write_geometry(file: Any, mesh: Mesh, growing: Sequence[str] = (), material: AnyArray | None = None) -> None:
     """Write /VTKHDF with the solid cells, the static arrays, and room for the steps and their `growing` cell fields.
 
     Where materials meet, `material` (n_solids,) are those of the cells, and each step gets their stress.
@@ -132,7 +133,7 @@ def _versions() -> dict[str, str]:
     return found
 
 
-def _packed(parent: Any, name: str, values: NDArray[Any]) -> None:
+def _packed(parent: Any, name: str, values: AnyArray) -> None:
     """Write a fixed array, compressed with the one filter that all readers know."""
     if values.size:
         parent.create_dataset(name, data=values, compression="gzip", compression_opts=1, chunks=values.shape)
@@ -314,7 +315,7 @@ def _append_sides(own: Any, mesh: Mesh, number: int, found: MaterialStress) -> N
     _extend(group["rows"], table)
 
 
-def _extend(table: Any, values: NDArray[Any]) -> None:
+def _extend(table: Any, values: AnyArray) -> None:
     first = len(table)
     table.resize(first + len(values), axis=0)
     table[first:] = values

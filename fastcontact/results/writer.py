@@ -1,4 +1,4 @@
-"""Write the steps of an analysis to one result file, step by step, so that a crash costs no finished step.
+"""Crash-safe writer of result files: no completed step is lost.
 
 Data are written first, then the rows of the step, the number of steps last, with a flush after each. Uncompressed tables and
 small fields grow in place, larger fields are a chunk of their own for each step, so that nothing of a finished step moves.

@@ -8,26 +8,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fastcontact.arrays import Array
 from fastcontact.errors import CaseError, FileError, unknown
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.files.paths import PathLike, replacing
 
 STYLES = ("line", "symbols", "line+symbols")
 
-# Black first; then colours that stay apart on paper and for colour-blind eyes (Okabe and Ito, 2008).
-COLOURS = (
-    ("white", 255, 255, 255),
-    ("black", 0, 0, 0),
-    ("vermilion", 213, 94, 0),
-    ("blue", 0, 114, 178),
-    ("bluish green", 0, 158, 115),
-    ("reddish purple", 204, 121, 167),
-    ("orange", 230, 159, 0),
-    ("sky blue", 86, 180, 233),
-)
-N_SYMBOLS, N_LINE_STYLES = 6, 5
+# Colours and symbols of Grace after white and no symbol, line styles after none.
+N_COLOURS, N_SYMBOLS, N_LINE_STYLES = 14, 6, 5
 
 # Grace writes Latin-1; Greek comes from the Symbol font, letter for letter.
 _GREEK = dict(zip("αβγδεζηθικλμνξοπρςστυφχψωΓΔΘΛΞΠΣΦΨΩ", "abgdezhqiklmnxoprVstufcywGDQLXPSFYW"))
@@ -55,8 +46,8 @@ class Curve:
         If `x` and `y` are not two vectors of one length, or there is no such style.
     """
 
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
+    x: Array
+    y: Array
     legend: str = ""
     style: str = "line"
 
@@ -99,13 +90,13 @@ def write_agr(
     x_axis = round_axis(np.concatenate([curve.x for curve in shown]))
     y_axis = round_axis(np.concatenate([curve.y for curve in shown]))
     lines = ["# Grace project file", "@version 50122", "@page size 792, 612"]
-    lines += [f'@map color {i} to ({r}, {g}, {b}), "{name}"' for i, (name, r, g, b) in enumerate(COLOURS)]
     lines += ["@g0 on", "@g0 type XY", "@with g0"]
     lines.append(f"@    world {x_axis[0]:.12g}, {y_axis[0]:.12g}, {x_axis[1]:.12g}, {y_axis[1]:.12g}")
     lines.append("@    view 0.18, 0.15, 1.20, 0.85")
     lines += [f'@    title "{escaped(title)}"', f'@    subtitle "{escaped(subtitle)}"']
     lines += [*_axis("x", xlabel, x_axis), *_axis("y", ylabel, y_axis)]
-    lines += _legend(shown, x_axis, y_axis)
+    named = "on" if any(curve.legend for curve in shown) else "off"
+    lines += [f"@    legend {setting}" for setting in (named, "loctype view", "0.82, 0.82", "char size 0.8")]
     for number, curve in enumerate(shown):
         lines += _set_style(number, curve)
     for number, curve in enumerate(shown):
@@ -155,38 +146,15 @@ def _known(letter: str) -> str:
 
 
 def _axis(name: str, label: str, axis: tuple[float, float, float]) -> list[str]:
-    low, high, distance = axis
-    largest = max(abs(low), abs(high))
-    digits = max(math.floor(math.log10(largest)) - math.floor(math.log10(distance)), 0)  # that tell ticks apart
-    exponential = largest >= 1e6 or largest < 1e-3
-    ticks = [f"major {distance:.12g}", "minor ticks 1"]
-    ticks += ["major grid on", "major color 1", "major linestyle 2", "major linewidth 0.5"]
-    return [
-        f'@    {name}axis  label "{escaped(label)}"',
-        *(f"@    {name}axis  tick {setting}" for setting in ticks),
-        f"@    {name}axis  ticklabel format {'exponential' if exponential else 'general'}",
-        f"@    {name}axis  ticklabel prec {digits if exponential else max(digits + 1, 6)}",
-    ]
-
-
-def _legend(curves: Sequence[Curve], x_axis: tuple[float, ...], y_axis: tuple[float, ...]) -> list[str]:
-    """Place the legend in the upper corner with fewer points behind it."""
-    right = left = 0
-    for curve in curves:
-        along = (curve.x - x_axis[0]) / (x_axis[1] - x_axis[0])
-        upper = (curve.y - y_axis[0]) / (y_axis[1] - y_axis[0]) > 0.6
-        right += int((upper & (along > 0.55)).sum())
-        left += int((upper & (along < 0.45)).sum())
-    place = "0.82, 0.82" if right <= left else "0.21, 0.82"
-    state = "on" if any(curve.legend for curve in curves) else "off"
-    box = ["box color 1", "box pattern 1", "box fill color 0", "box fill pattern 1", "char size 0.8"]
-    return [f"@    legend {setting}" for setting in (state, "loctype view", place, *box)]
+    settings = [f'label "{escaped(label)}"', f"tick major {axis[2]:.12g}", "tick minor ticks 1", "tick major grid on"]
+    settings += ["tick major linestyle 2", "ticklabel format general", "ticklabel prec 6"]
+    return [f"@    {name}axis  {setting}" for setting in settings]
 
 
 def _set_style(number: int, curve: Curve) -> list[str]:
-    colour = 1 + number % (len(COLOURS) - 1)
+    colour = 1 + number % N_COLOURS
     symbol = 1 + number % N_SYMBOLS if "symbols" in curve.style else 0
-    line = 1 + number // (len(COLOURS) - 1) % N_LINE_STYLES if "line" in curve.style else 0
+    line = 1 + number // N_COLOURS % N_LINE_STYLES if "line" in curve.style else 0
     settings = ["type xy", f"symbol {symbol}", "symbol size 0.6", f"symbol color {colour}"]
     settings += [f"line type {min(line, 1)}", f"line linestyle {line}", "line linewidth 1.5", f"line color {colour}"]
     return [f"@    s{number} {setting}" for setting in (*settings, f'legend "{escaped(curve.legend)}"')]

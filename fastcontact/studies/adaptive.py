@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.progress import StatusLine
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.cases.case import Case, build_case, read_case
 from fastcontact.errors import CaseError, FastcontactWarning, unknown
 from fastcontact.mesh import elements
@@ -28,7 +28,6 @@ from fastcontact.studies.levels import make_mesh, recipe
 from fastcontact.studies.report import of_case
 from fastcontact.studies.settings import Combination, Settings, one_combination, settings
 
-Array = NDArray[np.float64]
 # Cells that carry this part of the error are refined: a larger part makes fewer, larger steps (Doerfler, 1996).
 BULK = 0.7
 # From round to round differences shrink by at least this factor where refinement converges.
@@ -226,7 +225,7 @@ def _place(case: Case, last: StepResult, quantity: str, pair: str | None) -> Arr
     return None
 
 
-def _marked(indicator: Array, leaf: NDArray[np.intp], n_leaves: int) -> NDArray[np.bool_]:
+def _marked(indicator: Array, leaf: Indices, n_leaves: int) -> Mask:
     """Return which leaves (n_leaves,) to divide: the fewest cells that carry the part `BULK` of an indicator (n_solids,)."""
     order = np.argsort(-indicator, kind="stable")
     carried = np.cumsum(indicator[order])

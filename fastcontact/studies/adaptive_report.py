@@ -7,17 +7,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import AnyArray
 from fastcontact.cases.case import Case
 from fastcontact.results.plot.patches import outlines
 from fastcontact.results.step import StepResult
 from fastcontact.results.units import labelled
 from fastcontact.studies.error_estimate import ErrorEstimate
 from fastcontact.studies.quantities import column, title, unit
-from fastcontact.studies.render import page
 from fastcontact.studies.render.figure import frame, panels
-from fastcontact.studies.render.table import Rows, aligned, finite, number, structured
+from fastcontact.studies.render.table import Rows, finite, number, structured
 from fastcontact.studies.report import Report
 
 
@@ -75,6 +74,9 @@ class AdaptiveStudy(Report):
         Its error, cell by cell.
     """
 
+    kind = "Adaptive meshes"
+    picture = "errors over degrees of freedom, and the last mesh coloured by its error"
+
     combination: str
     quantity: str
     tolerance: float
@@ -107,7 +109,7 @@ class AdaptiveStudy(Report):
         counts = {"n_dofs": found.n_dofs, "n_cells": found.n_cells}
         return {**counts, **found.values, **errors, "seconds": found.seconds}
 
-    def table(self) -> NDArray[Any]:
+    def table(self) -> AnyArray:
         """Return a structured array (n_rounds,), one row a mesh, as ``--csv`` writes it.
 
         Fields ``n_dofs``, ``n_cells``, the quantity in its unit, and ``energy_error``, ``estimate``, ``true_error`` (against
@@ -121,10 +123,6 @@ class AdaptiveStudy(Report):
         """See `Report`."""
         return [(self.combination, self._rows())]
 
-    def lines(self) -> list[str]:
-        """Return a table and a sentence for a person, as ``fastcontact converge --adaptive`` prints them."""
-        return [self.title, "", *aligned(self._rows()), "", self._sentence()]
-
     def figure(self) -> Any:
         """Return a matplotlib figure: errors over degrees of freedom, and the last mesh coloured by its error."""
         heading = f"{self.title}: {self.combination}, refined for the {title(self.quantity)}"
@@ -134,13 +132,6 @@ class AdaptiveStudy(Report):
         self._draw_errors(errors)
         self._draw_mesh(mesh)
         return mesh.figure
-
-    def html(self) -> str:
-        """Return the study as one self-contained HTML page."""
-        description = "errors over degrees of freedom, and the last mesh coloured by its error"
-        sentence = page.paragraph(f"{self._sentence()}.")
-        parts = [sentence, page.image(self.figure(), description), page.table(self._rows())]
-        return page.page(f"Adaptive meshes: {self.title}", parts, self.text)
 
     def _errors(self) -> dict[str, list[float]]:
         """Return the errors of all rounds by name, each (n_rounds,)."""
@@ -163,7 +154,8 @@ class AdaptiveStudy(Report):
             rows.append(row + [number(errors[name][k], 2) for name in shown.values()])
         return rows
 
-    def _sentence(self) -> str:
+    def sentences(self) -> list[str]:
+        """See `Report`."""
         last, q = self.rounds[-1], self.quantity
         what = f"{title(q)} {last.values[q]:.8g} {unit(q, self.units)}".rstrip()
         verdict = "within" if self.reached else "NOT within"
@@ -171,7 +163,9 @@ class AdaptiveStudy(Report):
         if not self.reached:
             text += ": the limit of meshes or degrees of freedom was reached; allow more (--max-dofs)"
         true = last.true_error(q)
-        return text + (f"; true error {true:.1e}, effectivity {self.effectivity():.2g}" if math.isfinite(true) else "")
+        return [
+            text + (f"; true error {true:.1e}, effectivity {self.effectivity():.2g}" if math.isfinite(true) else "")
+        ]
 
     def _draw_errors(self, ax: Any) -> None:
         n_dofs, errors = [found.n_dofs for found in self.rounds], self._errors()

@@ -1,4 +1,4 @@
-"""Studies that no machine could finish are refused before their first run."""
+"""Refusal of studies too large to finish, before their first run."""
 
 from __future__ import annotations
 

@@ -7,16 +7,15 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analytic.pressure_curve import pressure_curve
+from fastcontact.arrays import Array
 from fastcontact.results.units import labelled
 from fastcontact.studies.quantities import title
 from fastcontact.studies.render.figure import frame, marker, message
 from fastcontact.studies.series import Series
 from fastcontact.studies.settings import Named
 
-Array = NDArray[np.float64]
 # With more curves than this, error bars would hide them.
 MOST_CURVES_WITH_BARS = 3
 

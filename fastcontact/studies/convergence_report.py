@@ -7,30 +7,19 @@ from functools import partial
 from itertools import zip_longest
 from typing import Any
 
-from numpy.typing import NDArray
-
+from fastcontact.arrays import AnyArray
 from fastcontact.studies import convergence_tables as tables
 from fastcontact.studies.convergence_figures import draw_differences, draw_errors, draw_pressure
 from fastcontact.studies.fit import CONFIDENCE
-from fastcontact.studies.render import page
 from fastcontact.studies.render.figure import message, panels
-from fastcontact.studies.render.table import Rows, aligned, structured
+from fastcontact.studies.render.table import Rows, structured
 from fastcontact.studies.report import Report
-from fastcontact.studies.sentences import MAIN, sentences
+from fastcontact.studies.sentences import sentences
 from fastcontact.studies.series import Series
 from fastcontact.studies.settings import Named
 
 # In figures, and in the table of all combinations.
 COMPARED = ("force", "pressure_max")
-EXPLANATIONS = (
-    "The <em>limit</em> is what the values tend to on ever finer meshes, from a fit of value = limit + C "
-    f"h<sup>order</sup>; it lies within the error bar with a probability of {CONFIDENCE:.0%}. Orders from one level "
-    "to the next are erratic, because the edge of the contact cuts another facet each time: judge by the fitted order.",
-    "The <em>mesh error</em> is the finest mesh's difference from the limit; a finer mesh makes it smaller. The "
-    "<em>model error</em> is the limit's difference from theory; it stays on every mesh, because theory and model "
-    "are about different bodies. Both are relative to the theory and sum up to the whole difference.",
-    "<em>Equal approach</em> compares at the same displacement, <em>equal force</em> at the same contact force.",
-)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -46,6 +35,18 @@ class Study(Report):
     theory : object or None
         The theory at equal approach, of `fastcontact.analytic`.
     """
+
+    kind = "Mesh convergence"
+    picture = "mesh errors over the mesh size, the pressure of all levels over theory, the difference from theory"
+    explanations = (
+        "The limit is what the values tend to on ever finer meshes, from a fit of value = limit + C h^order; it lies within "
+        f"the error bar with a probability of {CONFIDENCE:.0%}. Orders from one level to the next are erratic, because the "
+        "edge of the contact cuts another facet each time: judge by the fitted order.",
+        "The mesh error is the finest mesh's difference from the limit; a finer mesh makes it smaller. The model error is "
+        "the limit's difference from theory; it stays on every mesh, because theory and model are about different bodies. "
+        "Both are relative to the theory and sum up to the whole difference.",
+        "Equal approach compares at the same displacement, equal force at the same contact force.",
+    )
 
     series: list[Series]
     failed: dict[str, str]
@@ -73,7 +74,7 @@ class Study(Report):
         }
         return self.framed(numbers)
 
-    def table(self) -> NDArray[Any]:
+    def table(self) -> AnyArray:
         """Return a structured array (n_rows,), one row a level of a combination, as ``--csv`` writes it.
 
         Fields ``element``, ``formulation``, ``level``, ``h`` [length], ``n_dofs``, ``seconds`` [s], and for every quantity
@@ -83,24 +84,32 @@ class Study(Report):
         return structured(tables.csv_columns(self.series))
 
     def tables(self) -> list[tuple[str, Rows]]:
-        """See `Report`."""
-        return [(str(series.combination), tables.level_rows(series, self.units)) for series in self.series]
-
-    def lines(self) -> list[str]:
-        """Return tables and sentences for a person, as ``fastcontact converge`` prints them."""
-        found = [self.title]
+        """See `Report`: of every combination its levels and its limits, and all combinations beside each other."""
+        found = []
         for series in self.series:
-            limits = tables.limit_rows(series, self.units)
-            none = [f"  no limits: {len(series.levels)} levels were solved, and a limit takes three"]
-            found += ["", f"{series.combination}", *aligned(tables.level_rows(series, self.units)), ""]
-            found += aligned(limits) if len(limits) > 1 else none
-            found += [f"  level {number} failed: {text}" for number, text in series.failed.items()]
-        found += [f"  {name} failed: {text}" for name, text in self.failed.items()]
+            found.append((str(series.combination), tables.level_rows(series, self.units)))
+            if series.limits:
+                found.append((f"{series.combination}: limits", tables.limit_rows(series, self.units)))
         if len(self.series) > 1:
-            names = self.best.shown(COMPARED)
-            found += ["", f"all combinations: limits and model errors {self.best.compared}"]
-            found += aligned(tables.comparison_rows(self.series, names, self.units))
-        return [*found, "", *sentences(self.best)]
+            rows = tables.comparison_rows(self.series, self.best.shown(COMPARED), self.units)
+            found.append((f"all combinations: limits and model errors {self.best.compared}", rows))
+        return found
+
+    def sentences(self) -> list[str]:
+        """See `Report`."""
+        return sentences(self.best)
+
+    def remarks(self) -> list[str]:
+        """See `Report`."""
+        found = []
+        for series in self.series:
+            found += [
+                f"warning: {text}" for text in sorted({text for level in series.levels for text in level.warnings})
+            ]
+            if not series.limits:
+                found.append(f"no limits: {len(series.levels)} levels were solved, and a limit takes three")
+            found += [f"level {number} failed: {text}" for number, text in series.failed.items()]
+        return found + [f"{name} failed: {text}" for name, text in self.failed.items()]
 
     def figure(self) -> Any:
         """Return a matplotlib figure: errors, pressure over the radius, differences from theory."""
@@ -121,54 +130,8 @@ class Study(Report):
         known = self.best.shown(COMPARED) or list(self.best.quantities[:2])
         return known if isinstance(self.best.combination, Named) else list(COMPARED)
 
-    def html(self) -> str:
-        """Return the study as one self-contained HTML page."""
-        parts = [page.paragraph(text) for text in sentences(self.best)]
-        if len(self.series) > 1:
-            parts += [page.section("All combinations"), page.paragraph("Limits with error bars, held against theory.")]
-            for name in (name for name in MAIN if name in self.best.quantities):
-                rows = tables.page_comparison_rows(self.series, name)
-                parts.append(page.table(rows, tables.caption(name, self.units)))
-        if pictures := self._pictures():
-            parts += [page.section("Pictures"), *pictures]
-        for series in self.series:
-            parts += self._series_parts(series)
-        parts += [page.failure(f"{name} failed: {text}") for name, text in self.failed.items()]
-        parts += [page.section("How to read this"), *(f"<p class='say'>{text}</p>" for text in EXPLANATIONS)]
-        return page.page(f"Mesh convergence: {self.title}", parts, self.text)
-
-    def _pictures(self) -> list[str]:
-        limits = [name for name in self._drawn() if any(name in series.limits for series in self.series)]
-        theories = [name for name in COMPARED if any(series.split(name) for series in self.series)]
-        found = []
-        for names, draw, about in (
-            (limits, self._draw_errors, "mesh errors over the mesh size, doubly logarithmic"),
-            (theories, self._draw_differences, "difference from theory over the mesh size: model and mesh error"),
-        ):
-            if names:
-                axes = panels(1, len(names), (5.6 * len(names), 4.8), self.title)[0]
-                for ax, name in zip(axes, names, strict=True):
-                    draw(ax, name)
-                found.append(page.image(axes[0].figure, about))
-        if self.best.finest.profile:
-            ax = panels(1, 1, (7.4, 5.0))[0, 0]
-            draw_pressure(ax, self.best, self.theory, self.units)
-            found.append(page.image(ax.figure, "contact pressure of all levels over theory"))
-        return found
-
     def _draw_errors(self, ax: Any, quantity: str) -> None:
         draw_errors(ax, self.series, quantity, self.units)
 
     def _draw_differences(self, ax: Any, quantity: str) -> None:
         draw_differences(ax, self.series, self.best, quantity, self.units)
-
-    def _series_parts(self, series: Series) -> list[str]:
-        parts = [page.section(str(series.combination))]
-        names = series.shown(tables.IN_TABLES)
-        for first in range(0, len(names), 2):
-            parts.append(page.table(tables.level_rows(series, self.units, names[first : first + 2])))
-        if series.limits:
-            parts.append(page.table(tables.limit_rows(series, self.units, page=True)))
-        parts += [page.failure(f"level {number} failed: {text}") for number, text in series.failed.items()]
-        warnings = sorted({text for level in series.levels for text in level.warnings})
-        return parts + [page.paragraph(f"Warning: {text}") for text in warnings]

@@ -1,4 +1,4 @@
-"""Tables of a mesh-convergence study: rows for terminal and page, columns for CSV, dictionaries for JSON."""
+"""Tables of a mesh-convergence study: rows for people, columns for CSV, dictionaries for JSON."""
 
 from __future__ import annotations
 
@@ -9,15 +9,14 @@ from typing import Any
 
 from fastcontact.results.units import labelled
 from fastcontact.studies.quantities import column, title
-from fastcontact.studies.render.table import Rows, finite, number, percent, with_error_bar
+from fastcontact.studies.render.table import Rows, finite, number, percent
 from fastcontact.studies.sentences import sentences
 from fastcontact.studies.series import Series
 
 # Quantities with columns in the tables of levels; the limits are given for all quantities.
 IN_TABLES = ("force", "pressure_max", "contact_radius", "von_mises_max")
 # Columns about limits, and the first columns of a table of all combinations.
-ON_TERMINAL = ("limit", "+-", "order", "theory", "model error", "mesh error", "at equal force")
-ON_PAGE = ("theory", "limit", "order", "mesh error", "model error", "at equal force")
+OF_LIMITS = ("limit", "+-", "order", "theory", "model error", "mesh error", "at equal force")
 # Behind the error bar of a limit whose values do not settle.
 UNSETTLED = " (unsettled)"
 COMBINATION = ("combination", "levels", "finest DOF")
@@ -36,16 +35,11 @@ def level_rows(series: Series, units: Mapping[str, str], quantities: Sequence[st
     return [header, *rows]
 
 
-def limit_rows(series: Series, units: Mapping[str, str], page: bool = False) -> Rows:
-    """Return header and rows: limit, order, theory and errors of every quantity with a limit.
-
-    On a page every limit is rounded to its error bar, which on a terminal has a column of its own.
-    """
-    columns = ON_PAGE if page else ON_TERMINAL
-    label = caption if page else lambda name, units: column(title(name), name, units)
-    cells = [[label(name, units), *_cells(series, name, columns, page)] for name in series.limits]
-    told = [any(row[place] != "-" for row in cells) for place in range(len(columns) + 1)]
-    return [list(itertools.compress(row, told)) for row in (["quantity", *columns], *cells)]
+def limit_rows(series: Series, units: Mapping[str, str]) -> Rows:
+    """Return header and rows: limit, order, theory and errors of every quantity with a limit."""
+    cells = [[column(title(name), name, units), *_cells(series, name, OF_LIMITS)] for name in series.limits]
+    told = [any(row[place] != "-" for row in cells) for place in range(len(OF_LIMITS) + 1)]
+    return [list(itertools.compress(row, told)) for row in (["quantity", *OF_LIMITS], *cells)]
 
 
 def comparison_rows(all_series: Sequence[Series], quantities: Sequence[str], units: Mapping[str, str]) -> Rows:
@@ -62,23 +56,11 @@ def comparison_rows(all_series: Sequence[Series], quantities: Sequence[str], uni
     return [header, *rows]
 
 
-def page_comparison_rows(all_series: Sequence[Series], quantity: str) -> Rows:
-    """Return the same for a page: one quantity, every limit rounded to its error bar."""
-    columns = [name for name in ON_PAGE if name != "theory"]
-    rows = ([*_start(series), *_cells(series, quantity, columns, True)] for series in all_series)
-    return [[*COMBINATION, *columns], *rows]
-
-
-def caption(quantity: str, units: Mapping[str, str]) -> str:
-    """Return a quantity in words with its unit, without brackets for ratios."""
-    return column(title(quantity), quantity, units).removesuffix(" [1]")
-
-
 def _start(series: Series) -> list[str]:
     return [str(series.combination), str(len(series.levels)), str(series.finest.n_dofs)]
 
 
-def _cells(series: Series, quantity: str, columns: Sequence[str], rounded: bool = False) -> list[str]:
+def _cells(series: Series, quantity: str, columns: Sequence[str]) -> list[str]:
     """Return some columns about the limit of a quantity as texts; dashes where there is no limit."""
     limit, found = series.limits.get(quantity), series.split(quantity)
     if limit is None:
@@ -86,9 +68,7 @@ def _cells(series: Series, quantity: str, columns: Sequence[str], rounded: bool 
     same = series.split_equal_force(quantity) if quantity != "force" else None
     order = f"{limit.order:.2f}"
     texts = {
-        "limit": with_error_bar(limit.value, limit.uncertainty) + ("" if limit.converging else UNSETTLED)
-        if rounded
-        else number(limit.value, 8),
+        "limit": number(limit.value, 8),
         "+-": number(limit.uncertainty, 2) + ("" if limit.converging else UNSETTLED),
         "order": f"{order} +- {limit.order_uncertainty:.2f}" if math.isfinite(limit.order) else "-",
         "order alone": order,

@@ -11,8 +11,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.contact.integration import facet_measure, fine_rule
 from fastcontact.contact.surface import surface
 from fastcontact.elasticity.energy import elastic_energy
@@ -24,8 +24,6 @@ from fastcontact.mesh.argument_types import typed
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.studies.error_norms import stress_in_cells
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,9 +155,7 @@ def _traction(stress: Array, normal: Array) -> Array:
     return np.asarray((tensor * normal[..., None, :]).sum(axis=-1))
 
 
-def _owners(
-    name: str, cells: NDArray[np.int32], facets: NDArray[np.int32]
-) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+def _owners(name: str, cells: Numbers, facets: Numbers) -> tuple[Indices, Indices, Indices]:
     """Return the facets that belong to cells of a kind, those cells, and the facets' nodes as local nodes of the cells."""
     near = np.flatnonzero(np.isin(cells, facets).sum(axis=1) >= facets.shape[1])
     found_facets, found_cells, found_local = [], [], []

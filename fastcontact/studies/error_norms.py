@@ -12,8 +12,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.cell_stress import CellStress, beside
 from fastcontact.elasticity.energy import cell_volumes, elastic_energy, integration_rule
 from fastcontact.elasticity.initial_states import StressOffset
@@ -23,7 +24,6 @@ from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.elements import Element
 from fastcontact.model.model import Model
 
-Array = NDArray[np.float64]
 # Quadrature points worked on at a time, so that theories with large intermediate arrays fit the memory.
 AT_ONCE = 100_000
 
@@ -136,7 +136,7 @@ def error_against(
     return ErrorNorms(*(math.sqrt(square) for square in total))
 
 
-def _rows(model: Model, groups: Sequence[str] | None) -> dict[str, NDArray[np.intp]]:
+def _rows(model: Model, groups: Sequence[str] | None) -> dict[str, Indices]:
     """Return, by solid element, the cells to integrate over."""
     mesh = model.mesh
     if groups is None:
@@ -148,7 +148,7 @@ def _rows(model: Model, groups: Sequence[str] | None) -> dict[str, NDArray[np.in
     return {name: rows for name, rows in mesh.split(cells).items() if name in mesh.solids}
 
 
-def _portions(rows: NDArray[np.intp], element: Element, n_points: int | None) -> Iterator[NDArray[np.intp]]:
+def _portions(rows: Indices, element: Element, n_points: int | None) -> Iterator[Indices]:
     at_once = max(1, AT_ONCE // len(integration_rule(element, n_points)[1]))
     return (rows[first : first + at_once] for first in range(0, len(rows), at_once))
 
@@ -156,7 +156,7 @@ def _portions(rows: NDArray[np.intp], element: Element, n_points: int | None) ->
 def stress_in_cells(
     model: Model,
     name: str,
-    rows: NDArray[np.intp] | slice,
+    rows: Indices | slice,
     displacement: Array,
     n_points: int | None,
     offset: StressOffset | None = None,
@@ -185,7 +185,7 @@ def _squares(
     model: Model,
     u: Array,
     name: str,
-    rows: NDArray[np.intp],
+    rows: Indices,
     n_points: int | None,
     offset: StressOffset | None,
 ) -> Array:

@@ -1,4 +1,4 @@
-"""How runs are spread over processes, of this machine or of any executor; finished runs are kept in a folder."""
+"""Execution of runs by processes or any executor, with a store of finished runs."""
 
 from __future__ import annotations
 

@@ -18,11 +18,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fastcontact.arrays import Array
 from fastcontact.errors import CaseError
 
-Array = NDArray[np.float64]
 CONFIDENCE = 0.95
 ORDERS = np.geomspace(0.4, 6.0, 81)
 PRIOR_ORDER, PRIOR_SPREAD = 1.6, 0.35

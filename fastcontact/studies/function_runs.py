@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import inspect
-import pickle
 import sys
 import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass
+from multiprocessing.reduction import ForkingPickler
 from typing import Any
 
 import numpy as np
@@ -170,7 +170,7 @@ def _check_sendable(run: FunctionRun) -> None:
     try:
         if any(own.__module__ == "__main__" for own in (run.function, *run.measures.values())):
             inspect.getfile(sys.modules["__main__"])  # TypeError without one, as in notebooks
-        pickle.dumps(run)
+        ForkingPickler.dumps(run)
     except Exception as error:
         raise CaseError(
             f"{run.name} or a quantity cannot be sent to other processes ({error}): define functions with names at the top "

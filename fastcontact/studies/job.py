@@ -27,7 +27,6 @@ from fastcontact.cases.input_files import digest, files_named
 from fastcontact.contact.formulations import FORMULATIONS
 from fastcontact.errors import CaseError, FastcontactError, FastcontactWarning
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.model.contact_pair import AGAINST_OBSTACLES
 from fastcontact.model.pair_options import SHARED_OPTIONS
 from fastcontact.results.step import StepResult
 from fastcontact.studies import quantities
@@ -146,7 +145,7 @@ def case_data(settings: Settings, combination: Combination) -> dict[str, Any]:
         _exchange(entry, str(formulation), settings, settings.formulations[name])
     if formulation and (named == "auto" or "contacts" in data):
         _exchange(data.setdefault("contacts", {}), str(formulation), settings, settings.own.formulation or "")
-    for name, entry in data.get("obstacle", {}).items() if formulation in AGAINST_OBSTACLES else ():
+    for name, entry in data.get("obstacle", {}).items() if formulation else ():
         _exchange(entry, str(formulation), settings, settings.formulations[name])
     if settings.load_steps is not None:
         data["ramp"] = ramp_of(data.get("ramp", {}), settings.load_steps)

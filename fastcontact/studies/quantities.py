@@ -6,11 +6,11 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analytic.lame import PressFit
 from fastcontact.analytic.manufactured import HertzBox
 from fastcontact.analytic.pressure_curve import pressure_curve
+from fastcontact.arrays import Array, Numbers
 from fastcontact.cases.case import Case
 from fastcontact.cases.checks import OF_PROBES, ONLY_IN_SPACE, STRESS, at_point
 from fastcontact.contact.integration import facet_measure
@@ -23,7 +23,6 @@ from fastcontact.mesh.topology import bodies
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.results.units import labelled
 
-Array = NDArray[np.float64]
 # Theories about the very bodies that are modelled, not about half spaces or beams in their place.
 EXACT_THEORIES = (PressFit, HertzBox)
 # Of the standard quantities, which every study shows where they are known: title, and kind of the unit, empty for ratios.
@@ -179,7 +178,7 @@ def _along_axis(mesh: Mesh, values: Array, top: int) -> tuple[float, Array] | No
     return float(curve(best)), mesh.points[top] + np.array([0.0, best * size])
 
 
-def _around(mesh: Mesh, point: int) -> NDArray[np.int32]:
+def _around(mesh: Mesh, point: int) -> Numbers:
     near = [block[(block == point).any(axis=1)].ravel() for block in mesh.solids.values()]
     return np.unique(np.concatenate(near))
 

@@ -1,18 +1,18 @@
-"""What the reports of all studies share: the case, and the frame of their dictionaries."""
+"""What the reports of all studies share: the case; how tables and sentences stand on terminals, pages and in notebooks."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
-from numpy.typing import NDArray
-
+from fastcontact.arrays import AnyArray
 from fastcontact.cases.case import Case
 from fastcontact.cases.summary import versions
 from fastcontact.mesh.html_table import html_table
 from fastcontact.results.conversions import library
 from fastcontact.results.units import units_of_results
-from fastcontact.studies.render.table import Rows
+from fastcontact.studies.render import page
+from fastcontact.studies.render.table import Rows, aligned
 
 
 def of_case(case: Case) -> dict[str, Any]:
@@ -27,6 +27,10 @@ class Report:
 
     Attributes
     ----------
+    kind, picture : str
+        Of every study of a class: what it is, and what its figure shows.
+    explanations : tuple of str
+        How its numbers are to be read, at the end of its page.
     name, title, text : str
         Of the case: file name without suffix, title, text of the file; of a function: its name, the first line of its
         docstring, its source.
@@ -34,20 +38,50 @@ class Report:
         Names of the units of length, force and pressure; of plane models, of forces per thickness.
     """
 
+    kind: ClassVar[str]
+    picture: ClassVar[str]
+    explanations: ClassVar[tuple[str, ...]] = ()
+
     name: str
     title: str
     text: str
     units: dict[str, str]
 
-    def lines(self) -> list[str]:
-        """Return tables and sentences for a person."""
-        raise NotImplementedError
-
     def tables(self) -> list[tuple[str, Rows]]:
-        """Return the main tables, each with its caption; the first row is a header."""
+        """Return the tables, each with its caption; the first row is a header."""
         raise NotImplementedError
 
-    def table(self) -> NDArray[Any]:
+    def figure(self) -> Any:
+        """Return a matplotlib figure."""
+        raise NotImplementedError
+
+    def sentences(self) -> list[str]:
+        """Return what the numbers say."""
+        return []
+
+    def remarks(self) -> list[str]:
+        """Return warnings, and what failed."""
+        return []
+
+    def lines(self) -> list[str]:
+        """Return tables and sentences for a person, as the command line prints them."""
+        found = [self.title]
+        for caption, rows in self.tables():
+            found += ["", caption, *aligned(rows)]
+        found += [f"  {text}" for text in self.remarks()]
+        sentences = self.sentences()
+        return [*found, "", *sentences] if sentences else found
+
+    def html(self) -> str:
+        """Return the study as one self-contained HTML page."""
+        parts = [*map(page.paragraph, self.sentences()), page.image(self.figure(), self.picture)]
+        parts += [page.table(rows, caption) for caption, rows in self.tables()]
+        parts += map(page.failure, self.remarks())
+        if self.explanations:
+            parts += [page.section("How to read this"), *map(page.paragraph, self.explanations)]
+        return page.page(f"{self.kind}: {self.title}", parts, self.text)
+
+    def table(self) -> AnyArray:
         """Return the numbers as a structured array (n_rows,)."""
         raise NotImplementedError
 
@@ -59,7 +93,7 @@ class Report:
         return "\n".join([f"{type(self).__name__} of '{self.name}'", *self.lines()])
 
     def _repr_html_(self) -> str:
-        """Return the main tables for notebooks."""
+        """Return the tables for notebooks."""
         return "".join(
             html_table(rows[1:], rows[0], f"{self.title}: {caption}".strip(": ")) for caption, rows in self.tables()
         )

@@ -1,4 +1,4 @@
-"""Sentences about a mesh-convergence study: model error, mesh error, and what they do not prove."""
+"""Conclusions of a mesh-convergence study: model error, discretisation error, and their limits."""
 
 from __future__ import annotations
 

@@ -12,7 +12,6 @@ from fastcontact.contact.formulations import FORMULATIONS
 from fastcontact.errors import CaseError, unknown
 from fastcontact.mesh import elements
 from fastcontact.mesh.generate import Circle
-from fastcontact.model.contact_pair import AGAINST_OBSTACLES
 
 SHAPES = {"triangles": ("tri3", "tri6"), "quadrangles": ("quad4", "quad8", "quad9")}
 # Elements that "all" stands for.
@@ -54,7 +53,6 @@ class Settings:
     own: Combination  # element and formulation of the case itself
     pair: str | None  # the contact pair that is measured
     formulations: dict[str, str]  # of the contact pairs and obstacles of the case, by name
-    allowed: tuple[str, ...]  # formulations that the measured pair can have
     generator: str | None  # of the meshes; None where a mesh file is refined
     # Arguments of the generator on level 0: by shape of the cells (a key of `SHAPES`), or the case's own by "".
     arguments: dict[str, dict[str, Any]]
@@ -94,7 +92,6 @@ def settings(case: Case, data: dict[str, Any] | None = None) -> Settings:
     formulations = {pair.name: pair.formulation for pair in case.model.contact}
     if pair is not None and pair not in formulations:
         raise CaseError(unknown("contact pair in study.contact", pair, formulations))
-    rigid = any(own.name == pair and own.obstacle is not None for own in case.model.contact)
     solids = list(case.mesh.solids)
     own = Combination(solids[0] if len(solids) == 1 else None, formulations.get(pair or ""))
     generator, arguments = _generator(data, study)
@@ -107,7 +104,6 @@ def settings(case: Case, data: dict[str, Any] | None = None) -> Settings:
         own=own,
         pair=pair,
         formulations=formulations,
-        allowed=AGAINST_OBSTACLES if rigid else tuple(FORMULATIONS),
         generator=generator,
         arguments=arguments,
         halve=tuple(study.get("halve", ())),
@@ -148,15 +144,11 @@ def _combination(entry: Any) -> Combination:
     return _checked(words[0], words[1].replace("-", "_"))
 
 
-def _checked(
-    element: str | None, formulation: str | None, allowed: tuple[str, ...] = tuple(FORMULATIONS)
-) -> Combination:
+def _checked(element: str | None, formulation: str | None) -> Combination:
     if element is not None and element not in elements.ELEMENTS:
         raise CaseError(unknown("element", element, elements.ELEMENTS))
     if formulation is not None and formulation not in FORMULATIONS:
         raise CaseError(unknown("contact formulation", formulation, FORMULATIONS))
-    if formulation is not None and formulation not in allowed:
-        raise CaseError(unknown("contact formulation for a rigid obstacle", formulation, allowed))
     return Combination(element, formulation)
 
 
@@ -177,8 +169,8 @@ def combinations(
     if settings.pair is None:
         raise CaseError("this case has no contact pair, so there are no formulations to compare")
     named = [name.replace("-", "_") for name in formulations]
-    every = list(settings.allowed) if named == ["all"] else named
-    return tuple(_checked(element, formulation, settings.allowed) for element in chosen for formulation in every)
+    every = list(FORMULATIONS) if named == ["all"] else named
+    return tuple(_checked(element, formulation) for element in chosen for formulation in every)
 
 
 def one_combination(settings: Settings, element: str | None, formulation: str | None) -> Combination:
@@ -188,7 +180,7 @@ def one_combination(settings: Settings, element: str | None, formulation: str | 
         if element in (None, known.element) and formulation in (None, known.formulation):
             return known
     last = settings.combinations[-1]
-    return _checked(element or last.element, formulation or last.formulation, settings.allowed)
+    return _checked(element or last.element, formulation or last.formulation)
 
 
 def makeable(settings: Settings, element: str) -> bool:

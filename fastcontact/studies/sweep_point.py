@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
 
-from numpy.typing import NDArray
+from fastcontact.arrays import AnyArray
 
 Value = float | int | str | bool
 
@@ -65,5 +64,5 @@ class TheoryCurve:
     """
 
     label: str
-    x: NDArray[Any]
-    values: dict[str, NDArray[Any]]
+    x: AnyArray
+    values: dict[str, AnyArray]

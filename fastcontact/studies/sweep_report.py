@@ -6,12 +6,10 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from numpy.typing import NDArray
-
-from fastcontact.studies.quantities import column, title
-from fastcontact.studies.render import page
+from fastcontact.arrays import AnyArray
+from fastcontact.studies.quantities import column
 from fastcontact.studies.render.figure import panels
-from fastcontact.studies.render.table import Rows, aligned, finite, number, percent, structured
+from fastcontact.studies.render.table import Rows, finite, number, percent, structured
 from fastcontact.studies.report import Report
 from fastcontact.studies.sweep_figures import Drawing
 from fastcontact.studies.sweep_point import Point, TheoryCurve, Value
@@ -44,6 +42,9 @@ class Sweep(Report):
         Quantities that ``[study]`` asks for beside the main ones: tables and figures show them.
     """
 
+    kind = "Sweep"
+    picture = "quantities over the parameter, and their ratio to theory"
+
     combination: str
     parameters: dict[str, tuple[Value, ...]]
     points: list[Point]
@@ -67,7 +68,7 @@ class Sweep(Report):
         }
         return self.framed(numbers)
 
-    def table(self) -> NDArray[Any]:
+    def table(self) -> AnyArray:
         """Return a structured array (n_points,), one row a point, as ``--csv`` writes it.
 
         Fields: the parameters, ``h`` [length], ``n_dofs``, ``seconds`` [s], and for every quantity its value in its unit
@@ -88,11 +89,11 @@ class Sweep(Report):
         """See `Report`."""
         return [(self.combination, self._rows())]
 
-    def lines(self) -> list[str]:
-        """Return a table for a person, as ``fastcontact sweep`` prints it."""
-        found = [self.title, "", self.combination, *aligned(self._rows())]
-        found += [f"  warning: {text}" for text in sorted({text for point in self.points for text in point.warnings})]
-        return found + [f"  {text}" for text in self._failures(" failed")]
+    def remarks(self) -> list[str]:
+        """See `Report`."""
+        warnings = sorted({text for point in self.points for text in point.warnings})
+        choices = [(", ".join(f"{k} = {_shown(v)}" for k, v in choice.items()), text) for choice, text in self.failed]
+        return [*(f"warning: {text}" for text in warnings), *(f"{choice} failed: {text}" for choice, text in choices)]
 
     def figure(self) -> Any:
         """Return a matplotlib figure: values over the first parameter, and beside them their ratio to theory.
@@ -109,25 +110,9 @@ class Sweep(Report):
                 drawing.draw_ratios(row[1], name)
         return axes[0, 0].figure
 
-    def html(self) -> str:
-        """Return the sweep as one self-contained HTML page."""
-        what = ", ".join(map(title, self._main()))
-        choices = f"{len(self.points)} choices of {' and '.join(self.parameters)}"
-        parts = [
-            page.paragraph(f"{self.combination}: {what} for {choices}."),
-            page.image(self.figure(), "quantities over the parameter, and their ratio to theory"),
-            page.table(self._rows()),
-            *map(page.failure, self._failures("")),
-        ]
-        return page.page(f"Sweep: {self.title}", parts, self.text)
-
     def _main(self) -> list[str]:
         shown = dict.fromkeys((*MAIN, *self.asked))
         return [name for name in shown if name in self.quantities] or self.quantities[:3]
-
-    def _failures(self, verb: str) -> list[str]:
-        choices = [(", ".join(f"{k} = {_shown(v)}" for k, v in choice.items()), text) for choice, text in self.failed]
-        return [f"{choice}{verb}: {text}" for choice, text in choices]
 
     def _rows(self) -> Rows:
         """Return header and a row for each point: parameters, DOF, main quantities, differences from theory."""

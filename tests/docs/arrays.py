@@ -33,7 +33,7 @@ UNIT = re.compile(r"\[(?:-|(?:length|force|pressure|energy|radian|degrees|mass|t
 TYPED = re.compile(r"ndarray|array_like|csr_array|bsr_array")
 AFTER = r"((?: \([^)]*\))?(?: of int| of bool|(?: \[[^\]]*\])?))"  # the name of an argument: its shape, its unit
 ROWS = re.compile(r"structured array, one row")  # the units of its columns are another matter
-WHOLE = re.compile(r"structured|of (?:int|bool)|bool_|np\.u?int|NDArray\[Any\]|Indices|Numbers|Mask|intp|integer")
+WHOLE = re.compile(r"structured|of (?:int|bool)|bool_|np\.u?int|AnyArray|Indices|Numbers|Mask|intp|integer")
 
 
 @dataclass(frozen=True)

@@ -59,14 +59,14 @@ def test_any_problem_from_any_set_ends(n, m, seed, spread, solver, repeated, lim
     )  # fmt: skip
     if state is None:
         assert solver == "amg"
-        assert "conjugate gradients" in said or (repeated and "repeat each other" in said)
+        assert "conjugate gradients" in said or (repeated and "are linearly dependent" in said)
         return
     assert state.iterations <= limit
     assert state.settled or state.iterations == limit
     if limit == 200 and not repeated:
         assert state.settled
     if state.settled:
-        # Equations that repeat each other are solved on their flexibility, column by column to the solver's tolerance.
+        # Equations that are linearly dependent are solved on their flexibility, column by column to the solver's tolerance.
         unit = made.tolerance if repeated and solver == "amg" else 1e-14
         rounding = max(1e-9, unit * np.linalg.cond(K))
         largest = np.abs(state.multiplier).max(initial=0.0)

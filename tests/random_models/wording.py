@@ -87,7 +87,7 @@ def _said(words: str, model: SpokenModel, calls: Sequence[Call], mesh: fc.Mesh |
 
 
 def renumbered(model: SpokenModel, random: Random) -> Reworded | None:
-    """Points and the cells of every kind in another order; not where points are named by their numbers."""
+    """Points and cells in another order, cells from other corners on; not where points are named by their numbers."""
     mesh = model.mesh
     if any(name == "relate" for name, *_ in model.calls):
         return None
@@ -97,11 +97,33 @@ def renumbered(model: SpokenModel, random: Random) -> Reworded | None:
     number = np.concatenate([np.argsort(rows[name]) + mesh.offsets[name] for name in mesh.cells])
     other = fc.Mesh(
         mesh.points[order],
-        {name: new[block[rows[name]]] for name, block in mesh.cells.items()},
+        {name: new[block[rows[name]]][:, _from_another_corner(name)] for name, block in mesh.cells.items()},
         {name: number[members] for name, members in mesh.cell_groups.items()},
         {name: new[members] for name, members in mesh.point_groups.items()},
     )
     return _said("renumbered", model, model.calls, other, new=new)
+
+
+# Rotations of reference cells into themselves, the first that suits: of triangles and wedges, of squares, hexahedra and
+# pyramids, of tetrahedra.
+ROTATIONS = (
+    (np.array([[-1.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), np.array([1.0, 0.0, 0.0])),
+    (np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), np.zeros(3)),
+    (np.array([[-1.0, -1.0, -1.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), np.array([1.0, 0.0, 0.0])),
+)
+
+
+@functools.cache
+def _from_another_corner(name: str) -> list[int]:
+    """Return the nodes of a cell such that it lies the same way and begins at another corner; lines as they are."""
+    nodes = fc.mesh.elements.get(name).nodes
+    dim = nodes.shape[1]
+    for A, b in ROTATIONS if dim > 1 else ():
+        turned = nodes @ A[:dim, :dim].T + b[:dim]
+        away = np.linalg.norm(nodes[:, None] - turned, axis=2)
+        if away.min(axis=0).max() < 1e-12:
+            return [int(k) for k in away.argmin(axis=0)]
+    return list(range(len(nodes)))
 
 
 # --- turned with all its directions ---------------------------------------------------------------------------------

@@ -58,16 +58,6 @@ def test_a_displacement_of_another_mesh():
         model().internal_forces(np.zeros(3))
 
 
-def test_pictures_without_steps_or_without_the_pair():
-    pytest.importorskip("matplotlib")
-    with pytest.raises(fc.FastcontactError, match="there are no steps to draw"):
-        fc.plot.history([], "hertz")
-    loaded = model()
-    loaded.fix(GROUP, "xy")
-    with pytest.raises(fc.FastcontactError, match="contact pair"):
-        fc.plot.history(fc.solve(loaded, 1), "hertz")
-
-
 def test_fields_of_points_that_a_file_does_not_have(tmp_path):
     points, cells = SQUARE.points, [("quad", next(iter(SQUARE.solids.values())))]
     meshio.write(tmp_path / "a.msh", meshio.Mesh(np.pad(points, ((0, 0), (0, 1))), cells), file_format="gmsh")
@@ -337,15 +327,6 @@ def test_files_of_code_aster_that_are_no_mesh(tmp_path, monkeypatch):
     path.write_text("COOR_2D\nN1 0. 0.\nFINSF\nFIN\n")
     with pytest.raises(fc.MeshError, match=r"'.*a\.mail': "):
         fc.read_mesh(path)
-
-
-def test_arrays_of_meshio_that_do_not_fit_together():
-    cells = [("triangle", np.array([[0, 1, 2]]))]
-    found = meshio.Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), cells)
-    found.cell_sets = {"A": [np.array([0]), np.array([3])]}
-    found.cell_data = {"gmsh:physical": [np.array([1, 2, 3])]}
-    with pytest.raises(fc.MeshError, match="meshio's mesh"):
-        fc.from_meshio(found)
 
 
 def test_groups_without_points():

@@ -5,6 +5,8 @@ import pytest
 
 import fastcontact as fc
 
+pytestmark = pytest.mark.pairwise
+
 E, LENGTH, FORCE = 1000.0, 2.0, 3.0
 
 

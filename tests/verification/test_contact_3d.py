@@ -9,6 +9,8 @@ from scipy.spatial.transform import Rotation
 import fastcontact as fc
 from fastcontact.mesh.generate import box, merge_points, renamed, sphere_octant, sphere_on_block, union
 
+pytestmark = pytest.mark.pairwise
+
 LINEAR = ("hex8", "tet4", "wedge6", "pyramid5")
 QUADRATIC = ("hex20", "hex27", "tet10", "wedge15", "wedge18", "pyramid13")
 E, NU = 1000.0, 0.3

@@ -6,6 +6,8 @@ import pytest
 import fastcontact as fc
 from fastcontact.cases.case import build_case
 
+pytestmark = pytest.mark.pairwise
+
 E, LENGTH, HEIGHT = 1000.0, 10.0, 1.0
 INERTIA = HEIGHT**3 / 12
 MOMENT, FORCE = 0.02, 0.003

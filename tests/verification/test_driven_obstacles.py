@@ -10,8 +10,8 @@ import fastcontact as fc
 from fastcontact import obstacles
 from fastcontact.cases.case import read_case
 from fastcontact.cases.summary import lines, of_step, summarise
+from fastcontact.contact.formulations import FORMULATIONS
 from fastcontact.mesh.generate import block, box, quarter_disc
-from fastcontact.model.contact_pair import AGAINST_OBSTACLES
 
 
 def block_under_a_ball(kinematics, element="quad4", centre=3.0, **options):
@@ -43,7 +43,7 @@ def same(moved, pushed, tolerance=1e-8):
     return found
 
 
-@pytest.mark.parametrize("formulation", AGAINST_OBSTACLES)
+@pytest.mark.parametrize("formulation", FORMULATIONS)
 @pytest.mark.parametrize("element", ["quad4", "quad8"])
 @pytest.mark.parametrize("kinematics", ["plane_strain", "plane_stress", "axisymmetric"])
 def test_a_force_does_what_its_displacement_does(kinematics, element, formulation):
@@ -61,6 +61,7 @@ def test_a_force_does_what_its_displacement_does(kinematics, element, formulatio
 
 @pytest.mark.parametrize(("formulation", "element", "solver"), [
     ("node_to_segment", "hex8", "direct"), ("node_to_segment", "hex8", "amg"), ("continuous", "hex8", "direct"),
+    ("mortar", "hex8", "direct"), ("mortar", "tet10", "amg"),
 ])  # fmt: skip
 def test_a_force_does_what_its_displacement_does_in_three_dimensions(formulation, element, solver):
     moved = fc.solve(box_under_a_ball(element, motion={"z": -0.02}, formulation=formulation), fc.linear_ramp(1))[-1]
@@ -69,7 +70,7 @@ def test_a_force_does_what_its_displacement_does_in_three_dimensions(formulation
     same(moved, fc.solve(model, fc.linear_ramp(1), linear_solver=solver)[-1])
 
 
-@pytest.mark.parametrize("formulation", AGAINST_OBSTACLES)
+@pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_pushed_in_one_component_and_drawn_in_another_with_friction(formulation):
     options = {"friction": 0.3, "formulation": formulation}
     moved = fc.solve(block_under_a_ball("plane_strain", motion={"x": 0.01, "y": -0.02}, **options), fc.linear_ramp(1))[

@@ -14,16 +14,18 @@ import fastcontact as fc
 from fastcontact.mesh.generate.box import SOLIDS
 
 # What multigrid leaves to factors is told, and is no other result.
-pytestmark = pytest.mark.filterwarnings(
-    "ignore:.*stand off their arcs", "ignore:.*raise its penalty", "ignore:multigrid gave up"
-)
+pytestmark = [
+    pytest.mark.pairwise,
+    pytest.mark.filterwarnings(
+        "ignore:.*stand off their arcs", "ignore:.*raise its penalty", "ignore:multigrid gave up"
+    ),
+]
 FORMULATIONS = {
     "node_to_segment": {"formulation": "node_to_segment"},
     "continuous": {"formulation": "continuous"},
     "dual": {"formulation": "mortar", "multipliers": "dual"},
     "standard": {"formulation": "mortar", "multipliers": "standard"},
 }
-AGAINST_OBSTACLES = ("node_to_segment", "continuous")
 FACES = ("tri3", "tri6", "quad4", "quad8", "quad9")
 # Facets whose corner nodes carry no pressure, which node-to-segment refuses, on the cells that have them.
 NO_CORNERS = {"hex20": "quad8", "pyramid13": "quad8", "tet10": "tri6", "wedge15": "tri6", "wedge18": "tri6"}
@@ -165,7 +167,7 @@ def test_multigrid_gives_what_factors_give_in_a_plane(kinematics, element, formu
     compare((kinematics, element, formulation, friction, penalty, swapped))
 
 
-@pytest.mark.parametrize("formulation", AGAINST_OBSTACLES)
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous", "dual"])
 @pytest.mark.parametrize("friction", [pytest.param(0.0, marks=pytest.mark.slow), FRICTION])
 @pytest.mark.parametrize("penalty", [None, pytest.param(PENALTY, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
@@ -173,10 +175,3 @@ def test_multigrid_gives_what_factors_give_in_a_plane(kinematics, element, formu
 )  # fmt: skip
 def test_multigrid_gives_what_factors_give_on_obstacles(kinematics, element, formulation, friction, penalty):
     compare((kinematics, element, formulation, friction, penalty, False), obstacle=True)
-
-
-@pytest.mark.parametrize("multipliers", ["dual", "standard"])
-@pytest.mark.parametrize("solver", ["direct", "amg", "auto"])
-def test_mortar_on_obstacles_is_refused_with_what_does(multipliers, solver):
-    with pytest.raises(fc.ContactError, match="rigid obstacle 'mortar': known are continuous, node_to_segment"):
-        solved(model("3d", "hex8", multipliers, 0.0, None, obstacle=True), solver)

@@ -8,6 +8,8 @@ from scipy.optimize import brentq
 import fastcontact as fc
 from tests.verification.test_plasticity import bar
 
+pytestmark = pytest.mark.pairwise
+
 
 def isochoric(stretch: np.ndarray) -> np.ndarray:
     """Return stretches (3,) without their change of volume [-]."""

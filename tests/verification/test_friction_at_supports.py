@@ -5,6 +5,8 @@ import pytest
 
 import fastcontact as fc
 
+pytestmark = pytest.mark.pairwise
+
 FORMULATIONS = {
     "default": {},
     "standard": {"formulation": "mortar", "multipliers": "standard"},

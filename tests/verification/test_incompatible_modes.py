@@ -5,6 +5,8 @@ import pytest
 
 import fastcontact as fc
 
+pytestmark = pytest.mark.pairwise
+
 E, NU, LENGTH, MOMENT_STRESS = 1000.0, 0.3, 10.0, 0.01
 
 

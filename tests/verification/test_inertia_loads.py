@@ -6,6 +6,8 @@ import pytest
 import fastcontact as fc
 from fastcontact.cases.case import read_case
 
+pytestmark = pytest.mark.pairwise
+
 E, NU, RHO = 210e3, 0.3, 7.85e-9
 
 

@@ -9,6 +9,8 @@ import fastcontact as fc
 from fastcontact.cases.case import read_case
 from fastcontact.model.fingerprint import different, fingerprint
 
+pytestmark = pytest.mark.pairwise
+
 PLANE = ("plane_strain", "plane_stress", "axisymmetric")
 ELEMENTS = [(k, e) for k in PLANE for e in ("tri3", "tri6", "quad4", "quad8", "quad9")]
 ELEMENTS += [("3d", e) for e in ("tet4", "tet10", "hex8", "hex20", "wedge6", "pyramid5")]

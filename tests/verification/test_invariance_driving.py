@@ -5,6 +5,8 @@ import pytest
 
 import fastcontact as fc
 
+pytestmark = pytest.mark.pairwise
+
 FORMULATIONS = [
     ("node_to_segment", {}),
     ("continuous", {}),

@@ -7,6 +7,8 @@ import pytest
 
 import fastcontact as fc
 
+pytestmark = pytest.mark.pairwise
+
 
 @cache
 def pressed(element, size, swap, multipliers="standard"):

@@ -8,6 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from images import Image, ball, cylinder, differences, discs, floating, floating_ball, iterations, on_plane, solved
 
+pytestmark = pytest.mark.pairwise
+
 FORMULATIONS = ("node_to_segment", "continuous", "mortar")
 # From millimetres and megapascals: metres and pascals; nanometres and nanonewtons; far off.
 UNITS = {"si": (1e-3, 1e6), "nanometres": (1e6, 1e-3), "far off": (1e-12, 1e12)}

@@ -5,6 +5,8 @@ import pytest
 
 import fastcontact as fc
 
+pytestmark = pytest.mark.pairwise
+
 ELEMENTS = ("tri3", "tri6", "quad4", "quad8", "quad9")
 
 

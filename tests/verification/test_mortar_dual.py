@@ -8,6 +8,8 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.mesh import elements
 from fastcontact.mesh.generate import block, box, renamed, sphere_on_block, union
 
+pytestmark = pytest.mark.pairwise
+
 E, NU = 1000.0, 0.3
 FLAT = [(e, e) for e in ("tri3", "tri6", "quad4", "quad8", "quad9")]
 FLAT += [("quad4", "quad8"), ("tri6", "quad4"), ("quad8", "tri3"), ("tri6", "quad9")]
@@ -323,10 +325,3 @@ def test_units_do_not_matter():
     for stress, iterations in results[1:]:
         assert np.abs(stress - results[0][0]).max() < 1e-9 * np.abs(results[0][0]).max()
         assert iterations == results[0][1]
-
-
-def test_an_unknown_kind_of_multipliers_is_told():
-    with pytest.raises(fc.ContactError, match=r"kind of multipliers 'dul'.*dual"):
-        pair_of(two_squares("quad4", "quad4"), "plane_strain", False).add_contact(
-            "other", secondary="U_BOTTOM", primary="L_TOP", formulation="mortar", multipliers="dul"
-        )

@@ -10,6 +10,8 @@ from fastcontact.analysis.criteria import Criteria
 from fastcontact.cli.bench import suite
 from fastcontact.contact.configuration import Configuration
 
+pytestmark = pytest.mark.pairwise
+
 
 def with_material(mesh):
     model = fc.Model(mesh, kinematics="3d")

@@ -12,6 +12,8 @@ from fastcontact.contact.formulations._determined_field import DETERMINED, Whole
 from fastcontact.contact.integration import nodal_areas
 from fastcontact.mesh.generate import block, renamed, union
 
+pytestmark = pytest.mark.pairwise
+
 
 def named(*meshes):
     """Meshes as one, their groups after L_ and U_."""

@@ -11,6 +11,8 @@ from fastcontact.analysis.seams import seam_warnings
 from fastcontact.cases.case import read_case
 from fastcontact.mesh.generate import block, box, merge_points, renamed, union
 
+pytestmark = pytest.mark.pairwise
+
 INNER, OUTER, E, NU = 1.0, 2.0, 1000.0, 0.3
 
 
@@ -280,10 +282,12 @@ def test_a_closed_contact_at_the_ends_of_a_sector_is_that_between_planes_of_symm
 
 @pytest.mark.filterwarnings("ignore:.*across its radius")
 @pytest.mark.parametrize("slides", [0.5, 1.5])
-@pytest.mark.parametrize("element", ["hex8", "tet4", "hex20", "tet10"])
-def test_a_period_pushed_along_a_plane_has_uniform_pressure_and_shear(element, slides):
+@pytest.mark.parametrize(
+    ("element", "mu"), [("hex8", 0.3), ("tet4", 0.3), ("hex20", 0.3), ("tet10", 0.3), ("tet10", 0.5), ("tet10", 2.0)]
+)
+def test_a_period_pushed_along_a_plane_has_uniform_pressure_and_shear(element, mu, slides):
     """Pressed and pushed to the fraction `slides` of the limit of friction."""
-    mu, depth = 0.3, 1e-3
+    depth = 1e-3
     model = ring(box((1.0, 1.0, 0.5), (2, 2, 1), element), "3d")
     model.add_periodicity("XMIN", "XMAX")
     model.add_periodicity("YMIN", "YMAX")
@@ -299,10 +303,37 @@ def test_a_period_pushed_along_a_plane_has_uniform_pressure_and_shear(element, s
     assert contact.shear == pytest.approx(np.tile(shear, (len(contact.points), 1)), abs=1e-9 * pressure)
 
 
+def shrunk_on_a_shaft(element, turned, **options):
+    """The contact of a sector of a ring that is pressed on a rigid shaft and turned."""
+    mesh = block((1.0, 1.0), (4, 4), element)
+    angle = -0.25 * np.pi * mesh.points[:, 0]
+    mesh = mesh.replace(points=(1.0 + mesh.points[:, [1]]) * np.column_stack([np.cos(angle), np.sin(angle)]))
+    model = ring(mesh)
+    model.add_cyclic_symmetry("LEFT", "RIGHT", sectors=8)
+    model.prescribe("TOP", x=-0.002, y=turned, axes=fc.CylindricalAxes())
+    shaft = fc.obstacles.Sphere((0.0, 0.0), 1.0)
+    model.add_obstacle("shaft", secondary="BOTTOM", obstacle=shaft, friction=0.3, **options)
+    return fc.solve(model, 2)[-1].contact["shaft"]
+
+
+@pytest.mark.parametrize("turned", [0.0005, 0.01])
+def test_a_sector_on_a_shaft_has_uniform_pressure_and_shear_by_the_remedy_of_the_warning(turned):
+    """Tractions of the continuous form are one field of components, which a turned end breaks."""
+    with pytest.warns(fc.FastcontactWarning, match='or use formulation="mortar" with multipliers="dual"'):
+        shrunk_on_a_shaft("quad8", turned, formulation="continuous")
+    contact = shrunk_on_a_shaft("quad8", turned, formulation="mortar", multipliers="dual")
+    x, y = contact.coordinates.T
+    shear = (contact.shear[:, 1] * x - contact.shear[:, 0] * y) / contact.pressure
+    assert np.ptp(contact.pressure) < 0.003 * contact.pressure.mean()
+    assert np.ptp(shear) < 0.01 * np.abs(shear).mean()
+    assert (turned < 0.001) or shear == pytest.approx(np.full(len(x), -0.3), abs=2e-4)
+
+
 @pytest.mark.filterwarnings("ignore:.*across its radius", "ignore:a displacement of", "ignore:.*rotat")
 @pytest.mark.parametrize("solver", ["direct", "amg"])
-def test_friction_of_a_sector_that_turns_on_a_plane_follows_it_round(solver):
-    mesh = box((1.0, 1.0, 0.5), (3, 4, 2), "hex8", (1.0, 0.0, 0.0))
+@pytest.mark.parametrize("element", ["hex8", "hex20"])
+def test_friction_of_a_sector_that_turns_on_a_plane_follows_it_round(element, solver):
+    mesh = box((1.0, 1.0, 0.5), (3, 4, 2), element, (1.0, 0.0, 0.0))
     r, t = mesh.points[:, 0], 2.0 * np.pi / 5.0 * mesh.points[:, 1]
     model = fc.Model(mesh.replace(points=np.column_stack([r * np.cos(t), r * np.sin(t), mesh.points[:, 2]])), "3d")
     model.add_material(fc.LinearElastic(E=E, nu=0.0))

@@ -5,6 +5,8 @@ import pytest
 
 import fastcontact as fc
 
+pytestmark = pytest.mark.pairwise
+
 E, NU, Y = 200.0, 0.3, 1.0
 
 

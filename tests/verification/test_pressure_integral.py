@@ -13,6 +13,8 @@ from fastcontact.analysis import step_result
 from fastcontact.contact.integration import nodal_areas
 from fastcontact.mesh.generate import box, half_spheres, renamed, union
 
+pytestmark = pytest.mark.pairwise
+
 METHODS = {
     "node": {"formulation": "node_to_segment"},
     "node, averaged": {"formulation": "node_to_segment", "normals": "averaged"},

@@ -6,6 +6,8 @@ import pytest
 import fastcontact as fc
 from fastcontact import obstacles
 
+pytestmark = pytest.mark.pairwise
+
 FORCE, PRESSURE, RADIUS = 659_773.142, 2910.4071, 10.358557
 
 

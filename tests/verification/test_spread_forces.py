@@ -7,6 +7,8 @@ import fastcontact as fc
 from fastcontact.cases.case import read_case
 from fastcontact.model.spread_forces import WEIGHTINGS
 
+pytestmark = pytest.mark.pairwise
+
 FORCE = {2: {"x": 3.0, "y": -7.0}, 3: {"x": 3.0, "y": -7.0, "z": 2.0}}
 MESHES = {
     "quad4": lambda: fc.generate.block((4.0, 1.0), (16, 2), "quad4"),

@@ -7,6 +7,8 @@ from two_bodies import YOUNG, blocks, boxes
 import fastcontact as fc
 from fastcontact.analysis.criteria import Criteria
 
+pytestmark = pytest.mark.pairwise
+
 EVERY = [("node_to_segment", {}), ("continuous", {}), ("mortar", {}), ("mortar", {"multipliers": "dual"})]
 each = pytest.mark.parametrize(("formulation", "options"), EVERY, ids=["node", "continuous", "mortar", "dual"])
 PRESS, STIFFNESS, MU = 0.05, 300.0, 0.3

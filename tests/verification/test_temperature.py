@@ -7,6 +7,8 @@ from two_bodies import rings
 import fastcontact as fc
 from fastcontact.cases.case import read_case
 
+pytestmark = pytest.mark.pairwise
+
 E, NU, ALPHA, RISE = 1000.0, 0.3, 1.2e-5, 80.0
 STEEL = fc.LinearElastic(E, NU, expansion=ALPHA)
 

@@ -7,6 +7,8 @@ from two_bodies import SIDES, blocks, boxes, held, rings, touching
 import fastcontact as fc
 from fastcontact.mesh.generate import merge_points
 
+pytestmark = pytest.mark.pairwise
+
 FORMULATIONS = ("node_to_segment", "continuous", "mortar")
 ONCE = fc.linear_ramp(1)
 SKEW = np.array([[2e-3, 1e-3, -4e-4], [3e-3, -1e-3, 7e-4], [5e-4, -2e-3, 1e-3]])

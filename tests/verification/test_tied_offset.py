@@ -6,6 +6,8 @@ import pytest
 import fastcontact as fc
 from fastcontact.mesh.generate import rings
 
+pytestmark = pytest.mark.pairwise
+
 TURN = np.array([[0.0, -3e-4, 2e-4], [3e-4, 0.0, -5e-4], [-2e-4, 5e-4, 0.0]])
 FORMULATIONS = [("node_to_segment", {}), ("continuous", {}), ("mortar", {}), ("mortar", {"multipliers": "dual"})]
 NAMES = {"XMIN": "LEFT", "XMAX": "RIGHT", "YMIN": "FRONT", "YMAX": "BACK", "ZMIN": "BOTTOM", "ZMAX": "TOP"}

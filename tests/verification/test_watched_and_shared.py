@@ -6,6 +6,8 @@ from two_bodies import SIDES, YOUNG, blocks, boxes, held, ring, touching
 
 import fastcontact as fc
 
+pytestmark = pytest.mark.pairwise
+
 EVERY = [("node_to_segment", {}), ("continuous", {}), ("mortar", {}), ("mortar", {"multipliers": "dual"})]
 each = pytest.mark.parametrize(("formulation", "options"), EVERY, ids=["node", "continuous", "mortar", "dual"])
 both = pytest.mark.parametrize("kinematics", ["plane_strain", "axisymmetric", "3d"])

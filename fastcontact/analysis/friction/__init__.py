@@ -1,1 +1,1 @@
-"""Coulomb friction: the inequalities of contact and the friction cone, solved together."""
+"""Coulomb friction: unilateral contact and the friction cone, solved together."""

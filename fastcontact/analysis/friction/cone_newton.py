@@ -1,4 +1,4 @@
-r"""Newton's method for contact with Coulomb friction, whatever gives gaps and slips for forces.
+r"""Semismooth Newton method for contact with Coulomb friction, independent of how gaps and slips follow from forces.
 
 With normal forces n, tangential ones t, gaps g and slips s, in units in which each constraint has a compliance near one,
 the solution is the zero of
@@ -14,12 +14,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.friction.coulomb_law import Law
+from fastcontact.arrays import Array, Mask
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 # Residual of a solution over the largest force.
 EXACT = 1e-12
 # Newton iterations from one start, the shortest step along them, and how often a longer one may be of no use.
@@ -52,7 +50,7 @@ class Forces:
 
 
 class Linearised(Protocol):
-    """What forces do to gaps and slips, and the step of Newton's method.
+    """Map from forces to gaps and slips, and its Newton step.
 
     Attributes
     ----------

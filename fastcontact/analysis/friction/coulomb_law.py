@@ -1,4 +1,4 @@
-"""The friction law: unilateral contact and Coulomb's cone, for forces and gaps in units of each constraint's own stiffness.
+"""Unilateral contact and Coulomb's law as a complementarity function, scaled by the stiffness of each constraint.
 
 Another law begins here. Its tangential force is also used where a sliding constraint is linearised: `dense._step`,
 `eliminated.Eliminated`, and in the fallbacks `sweep_kernels` and `dense._on_edges`. Its parameters come from
@@ -11,10 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from fastcontact.arrays import Array, Indices, Mask
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +35,7 @@ class Law:
         return n, t, np.sqrt((t * t).sum(axis=0)), self.mu * np.maximum(n, 0.0)
 
     def residual(self, y: Array, gaps: Array) -> Array:
-        """Return the left-hand sides (1 + k, m) of the equations."""
+        """Return the residual (1 + k, m) of the complementarity function."""
         n, t, reach, radius = self.trial(y, gaps)
         inside = np.divide(radius, reach, out=np.ones_like(reach), where=reach > radius)
         pushed = np.maximum(n, 0.0) if self.equality is None else np.where(self.equality, n, np.maximum(n, 0.0))
@@ -49,7 +47,7 @@ class Law:
         closed = n > 0 if self.equality is None else (n > 0) | self.equality
         return closed, (n > 0) & (reach <= radius) & (self.mu > 0)
 
-    def slide(self, y: Array, gaps: Array, sliding: NDArray[np.intp]) -> tuple[Array, Array]:
+    def slide(self, y: Array, gaps: Array, sliding: Indices) -> tuple[Array, Array]:
         """Return the directions (k, q) in which constraints `sliding` (q,) slide, and how much of a turn t follows (q,)."""
         _, t, reach, radius = self.trial(y, gaps)
         along = np.maximum(reach[sliding], 1e-300)

@@ -1,4 +1,4 @@
-"""Contact with Coulomb friction on a dense compliance: forces from gaps and slips without forces.
+"""Contact with Coulomb friction on a dense Delassus operator: forces from the gaps and slips without contact forces.
 
 Gaps and slips are ``(g, s) = free + F (n, t)`` with the normal forces n and the tangential ones t. Three methods stand
 behind each other:
@@ -17,14 +17,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.friction import lemke_kernels, sweep_kernels
 from fastcontact.analysis.friction.cone_newton import Forces, newton
 from fastcontact.analysis.friction.coulomb_law import Law
+from fastcontact.arrays import Array, Mask
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 # Residual of a solution over the largest force where round-off leaves no better one.
 ACCEPTABLE = 1e-9
 # Relative changes down to which starts are swept, and the sweeps that one may take.
@@ -164,7 +162,7 @@ def _step(problem: _Problem, y: Array, gaps: Array, closed: Mask, sticking: Mask
 
 
 def _solved(A: Array, right: Array) -> Array:
-    """Solve a linear system; of constraints that repeat each other any forces do, the smallest are taken."""
+    """Solve a linear system; of minimum norm where constraints are linearly dependent."""
     try:
         found = np.linalg.solve(A, right)
         if np.abs(A @ found - right).max() <= 1e-8 * np.abs(right).max(initial=0.0):

@@ -1,4 +1,4 @@
-"""Coulomb friction for solvers that eliminate constraints: no compliance is formed.
+"""Coulomb friction with eliminated constraints: the Delassus operator is not formed.
 
 A step of Newton's method holds closed gaps and sticking slips as equations. A sliding constraint drags with ``mu n`` along
 its direction d: its multiplier acts through the rows ``B + mu d T``, see `linear.protocol`. In three dimensions t follows
@@ -11,23 +11,21 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 
 from fastcontact.analysis.friction.cone_newton import EXACT, Forces, newton
 from fastcontact.analysis.friction.coulomb_law import Law
 from fastcontact.analysis.friction.slip_directions import GIVING, aligning, compliance_of_rows, idle
 from fastcontact.analysis.solution import Accuracy
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.protocol import FrictionTerms, LoadedNonsymmetric
 from fastcontact.linear.sparse_rows import scaled, taken
 from fastcontact.linear.springs import Springs
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-# The stiffest spring across a slip, in units of what holds the constraint itself: a slip that hardly moves would ask for
-# any. The solution does not depend on it, for there nothing slips across.
+# Bound of the tangential stiffness across a slip, which is unbounded as the slip vanishes, in units of the stiffness of the
+# constraint. The solution does not depend on it, since nothing slips across there.
 STIFFEST = 100.0
 # Constraints are taken for so much softer than the unknowns that they act on are by themselves, for neighbours give way, too.
 # Nearly incompressible cells resist a single node far more than a surface (`LinearSolver.contrast`): beyond MILD, constraints
@@ -145,7 +143,7 @@ class Eliminated:
         )
 
     def _own(self, rows: tuple[csr_array, ...], yielding: Array) -> Array:
-        """Return `compliance_of_rows`, and what constraints give along their tangents: what gives way is not idle."""
+        """Return `compliance_of_rows` plus the own tangential compliance: directions with compliance are not idle."""
         own = compliance_of_rows(rows, yielding)
         slips = np.arange(1, len(rows))
         own[slips, slips] += self._gives[1:]
@@ -172,7 +170,7 @@ class Eliminated:
         return self._free + np.stack([R @ u for R in self._rows]) + self._gives * forces
 
     def _scaled(self, gaps: Array) -> Array:
-        """Return gaps in units of the constraints; what cannot close is open, by whatever."""
+        """Return scaled gaps; constraints that cannot close count as open."""
         gaps = np.where(self._usable, gaps * self._unit, 0.0)
         gaps[0, ~self._usable] = 1.0
         return gaps
@@ -212,8 +210,8 @@ class Eliminated:
         self._inexact = False
         return self._last > self._tolerance
 
-    def _sliding(self, y: Array, gaps: Array, at: NDArray[np.intp]) -> _Sliding:
-        """Return what the constraints `at` (q,) do that slide."""
+    def _sliding(self, y: Array, gaps: Array, at: Indices) -> _Sliding:
+        """Return slip directions and friction rows of the sliding constraints `at` (q,)."""
         d, turning = self.law.slide(y, gaps, at)
         pull = self.law.mu[at] * d
         if len(d) == 1:
@@ -226,8 +224,8 @@ class Eliminated:
             at, pull, _Across(across, Springs(csr_array(rows), spring), (across * self._free[1:, at]).sum(axis=0))
         )
 
-    def _drag(self, B: csr_array, shut: NDArray[np.intp], sliding: _Sliding) -> FrictionTerms:
-        """Return what sliding adds to equations B whose first rows are the gaps of `shut`."""
+    def _drag(self, B: csr_array, shut: Indices, sliding: _Sliding) -> FrictionTerms:
+        """Return the frictional terms of equations B whose first rows are the gaps of `shut`."""
         pull = np.zeros((len(self._rows) - 1, len(self._usable)))
         pull[:, sliding.at] = sliding.pull
         through = taken(self._rows[0], shut)
@@ -242,7 +240,7 @@ class Eliminated:
 
 
 def _diagonal_compliance(constraints: Constraints) -> Array:
-    """Return what constraints give way by themselves along their normals and tangents (1 + k, m) [length / force]."""
+    """Return the own compliance of constraints along normals and tangents (1 + k, m) [length / force]."""
     found = np.zeros((1 + len(constraints.tangents), len(constraints)))
     if constraints.softness is not None:
         found[0] = constraints.softness
@@ -264,7 +262,7 @@ class _Across:
 class _Sliding:
     """Constraints `at` (q,) that slide: tangential over normal forces (k, q), and springs in three dimensions."""
 
-    at: NDArray[np.intp]
+    at: Indices
     pull: Array
     springs: _Across | None = None
 

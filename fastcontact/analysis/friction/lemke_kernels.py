@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Lemke's pivots for linear complementarity problems: slow, but they end with a solution where Newton does not."""
+"""Lemke's pivoting method for linear complementarity problems: slow, but finite where Newton's method does not converge."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Directions of slip that supports leave to a contact: tangents are turned to them, others are idle.
+"""Slip directions left free by supports: tangents are aligned with them, the others are idle.
 
 All of it looks at the compliance of each constraint by itself: `own` (1 + k, 1 + k, m), its normal part first.
 """
@@ -6,12 +6,11 @@ All of it looks at the compliance of each constraint by itself: `own` (1 + k, 1 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import block_array, csr_array, diags_array
 
 from fastcontact.analysis.friction import slip_directions_kernels
+from fastcontact.arrays import Array, Mask
 
-Array = NDArray[np.float64]
 # A direction of slip in which a constraint gives less than this, relative to its gap, is none.
 IDLE = 1e-10
 # What a prescribed slip gives way, relative to its gap: next to nothing, but sticking has an equation so, which no force in
@@ -27,7 +26,7 @@ def own_compliance(F: Array, parts: int) -> Array:
 
 
 def compliance_of_rows(rows: tuple[csr_array, ...], yielding: Array) -> Array:
-    """Return the compliance (parts, parts, m) of each constraint if every unknown gave way by itself.
+    """Return the compliance (parts, parts, m) of each constraint for a diagonal stiffness matrix.
 
     Parameters
     ----------
@@ -61,7 +60,7 @@ def aligning(own: Array) -> csr_array | None:
     return csr_array(block_array([[diags_array(np.ones(m)), zero, zero], [zero, c, s], [zero, -s, c]], format="csr"))
 
 
-def idle(own: Array) -> NDArray[np.bool_]:
+def idle(own: Array) -> Mask:
     """Return the tangents (k, m) along which supports leave no motion, or none but that of the gap.
 
     At an axis and in a plane of symmetry friction has nothing to do there, and its equation would be no equation.

@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Products of the rows of constraints with each other."""
+"""Inner products of constraint rows."""
 
 import numpy as np
 

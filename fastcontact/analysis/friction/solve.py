@@ -1,4 +1,4 @@
-"""Coulomb friction: the inequalities of contact and the friction cone, solved together on their compliance.
+"""Coulomb friction: unilateral contact and the friction cone, solved together on the Delassus operator.
 
 With normal forces n >= 0 and tangential forces t of all constraints as unknowns, gaps and slips of the step are
 ``(g, s) = (g, s)_free + F (n, t)`` with ``F = R K^-1 R.T + C``, R the normal and tangential rows and C the compliance of
@@ -13,20 +13,18 @@ import dataclasses
 import logging
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import lstsq
 from scipy.sparse import csr_array, vstack
 
 from fastcontact.analysis.friction import dense, eliminated
 from fastcontact.analysis.friction.slip_directions import GIVING, aligning, idle, own_compliance
 from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.linear.flexibility import MOST_ROWS_WITH_FRICTION, check_rows
 from fastcontact.linear.protocol import Loaded, LoadedNonsymmetric
 
 log = logging.getLogger("fastcontact")
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 def solve(
@@ -98,7 +96,7 @@ def _eliminated(
 def _among(
     chosen: Mask, loaded: Loaded, constraints: Constraints, closed: Mask, u: Array, forces: Array | None
 ) -> FrictionalEquilibrium:
-    """Solve with the `chosen` constraints (m,) alone; gaps and slips of the others are what the displacement leaves."""
+    """Solve with the `chosen` constraints (m,) alone; gaps and slips of the others follow from the displacement."""
     rows = np.flatnonzero(chosen)
     k, m = len(constraints.tangents), len(constraints)
     check_rows((1 + k) * len(rows), MOST_ROWS_WITH_FRICTION)
@@ -139,8 +137,8 @@ def _among(
     )  # fmt: skip
 
 
-def _add_compliance(F: Array, constraints: Constraints, rows: NDArray[np.intp]) -> None:
-    """Add, in place, what constraints `rows` give way by themselves to the flexibility F ((1 + k) m, (1 + k) m)."""
+def _add_compliance(F: Array, constraints: Constraints, rows: Indices) -> None:
+    """Add, in place, the own compliance of constraints `rows` to the Delassus operator F ((1 + k) m, (1 + k) m)."""
     if constraints.compliance is not None and len(rows):
         along = np.stack([direction[rows] for direction in constraints.directions])
         F += _turned(constraints.compliance.block(rows), along)

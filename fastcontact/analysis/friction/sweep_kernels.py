@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Block Gauss-Seidel sweeps for contact with Coulomb friction on a dense compliance."""
+"""Block Gauss-Seidel sweeps for contact with Coulomb friction on a dense Delassus operator."""
 
 import numpy as np
 

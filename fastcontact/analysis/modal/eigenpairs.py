@@ -10,16 +10,15 @@ from __future__ import annotations
 import warnings
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.sparse import bsr_array
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh, lobpcg
 
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.errors import ConvergenceError, ModelError
 from fastcontact.linear.multigrid.solver import Multigrid
 from fastcontact.linear.protocol import LinearSolver
 
-Array = NDArray[np.float64]
 # Error of vectors, to the square of which eigenvalues are right.
 ACCURACY = 1e-5
 # Below so many unknowns all eigenvalues are found at once.
@@ -33,7 +32,7 @@ ROUND, ROUNDS = 20, 15
 
 
 def lowest(
-    solver: LinearSolver, matrices: tuple[bsr_array, bsr_array], near_nullspace: Array, free: NDArray[np.bool_],
+    solver: LinearSolver, matrices: tuple[bsr_array, bsr_array], near_nullspace: Array, free: Mask,
     n: int, shift: float,
 ) -> tuple[Array, Array]:  # fmt: skip
     """Return the n lowest eigenvalues (n,), ascending, and their vectors (size, n), orthonormal by M.
@@ -80,7 +79,7 @@ def lowest(
     return values[:n], (found @ (lower.T @ vectors))[:, :n]
 
 
-def _of_few(K: bsr_array, M: bsr_array, free: NDArray[np.intp], n: int, shift: float) -> tuple[Array, Array]:
+def _of_few(K: bsr_array, M: bsr_array, free: Indices, n: int, shift: float) -> tuple[Array, Array]:
     """Return what `lowest` does for so few unknowns `free` (k,) that all eigenvalues are found at once."""
     stiff, heavy = (np.asarray(matrix.tocsr()[free][:, free].todense()) for matrix in (K, M))
     try:  # the inverse eigenvalues, since M may be singular

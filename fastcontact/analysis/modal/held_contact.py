@@ -10,9 +10,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array, diags_array, vstack
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations import Formulation
@@ -23,13 +23,10 @@ from fastcontact.errors import ModelError
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-
 
 @dataclass(frozen=True, eq=False)
 class HeldContact:
-    """What contact does to small motions.
+    """Constraints and compliance of closed contact for small motions.
 
     Attributes
     ----------
@@ -42,7 +39,7 @@ class HeldContact:
     """
 
     rows: csr_array
-    nodes: NDArray[np.intp]
+    nodes: Indices
     springs: list[tuple[csr_array, Array]]
 
     def stiffened(self, K: bsr_array) -> bsr_array:
@@ -76,7 +73,7 @@ def held_contact(model: Model, step: StepResult | None, held: HeldMotions, hold_
 
 
 def _configuration(model: Model, step: StepResult | None, contact: ContactResult | None) -> Configuration:
-    """Return where both sides of a pair stand."""
+    """Return the configuration of both sides of a pair."""
     if step is None or contact is None:
         return Configuration.undeformed(model.mesh.points)
     still = np.zeros(model.mesh.dim)
@@ -95,8 +92,8 @@ def _worn(model: Model, contact: ContactResult) -> Array | None:
 
 def _rows(
     pair: Formulation, part: Constraints, contact: ContactResult | None, hold_sliding: bool
-) -> Iterator[tuple[csr_array, NDArray[np.intp], csr_array | None]]:
-    """Yield rows along the normal and along each tangent, their nodes, and the matrix by which they give way, if they do.
+) -> Iterator[tuple[csr_array, Indices, csr_array | None]]:
+    """Yield rows along the normal and along each tangent, their nodes, and their compliance matrix, if any.
 
     They are tested with the formulation's multipliers, as those of tied pairs are, see `contact.tied`.
     """
@@ -124,8 +121,8 @@ def _rows(
         yield csr_array(tested @ along), owners[held], compliance
 
 
-def _nodes(pair: Formulation, part: Constraints, moments: csr_array) -> NDArray[np.intp]:
-    """Return the secondary node (q,), as a position on its side, that each row of the moments (q, m) stands for."""
+def _nodes(pair: Formulation, part: Constraints, moments: csr_array) -> Indices:
+    """Return the secondary node (q,), as an index on its side, of each row of the moments (q, m)."""
     if isinstance(part.nodal, PressureField):
         field = part.nodal
         alone = moments.indices[moments.indptr[len(field.independent) : -1]]  # points on an axis

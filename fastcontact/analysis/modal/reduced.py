@@ -1,19 +1,16 @@
-"""Stiffness and mass of the motions that supports, relations and closed contact allow."""
+"""Stiffness and mass reduced to the motions that supports, multi-point constraints and closed contact allow."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import qr, solve_triangular
 from scipy.sparse import bsr_array, csr_array, diags_array
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.constrained_system import System, diagonal_of, supports_apart
 from fastcontact.linear.elimination.coupled_pivots import RepeatedError
 from fastcontact.linear.elimination.elimination import eliminate
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 # Rows that others make up but for this part of them repeat them.
 REPEATED = 1e-9
 
@@ -28,7 +25,7 @@ class Reduced:
     mass : bsr_array (n, n)
         [mass].
     rows : csr_array (m, n)
-        They may repeat each other [-].
+        They may be linearly dependent [-].
     nodes : ndarray of int (m,)
         A node that each row belongs to: a hint which unknowns to eliminate.
 
@@ -89,5 +86,5 @@ def _independent(rows: csr_array) -> tuple[Indices, csr_array]:
 
 
 def _selection(columns: Indices, n: int) -> csr_array:
-    """Return the matrix (k, n) that puts k columns in their places."""
+    """Return the selection matrix (k, n) of k columns."""
     return csr_array((np.ones(len(columns)), (np.arange(len(columns)), columns)), shape=(len(columns), n))

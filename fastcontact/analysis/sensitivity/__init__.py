@@ -1,1 +1,1 @@
-"""Derivatives of results by parameters: what `sensitivities` is made of."""
+"""Building blocks of `sensitivities`: derivatives of results with respect to parameters."""

@@ -1,4 +1,4 @@
-"""The adjoint solution of a settled load step.
+"""Adjoint solution of a converged load step.
 
 With y = (w, mu) for the unknowns and the multipliers, ``(J0 + E).T y = q``. J0 is the symmetric matrix of the step: stiffness
 and active constraints as the linear solver has them. E holds what pairing on the deformed configuration adds, and takes away
@@ -10,14 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from fastcontact.analysis.sensitivity.moving_contact import MovingContact
+from fastcontact.arrays import Array
 from fastcontact.errors import ConvergenceError
 
-Array = NDArray[np.float64]
 # What GMRES may leave of s, and how many solutions it may take.
 LEFT, SOLUTIONS = 1e-10, 200
 
@@ -48,7 +47,7 @@ class Gradient:
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """What a parameter changes in the equations, displacements and multipliers held.
+    """Partial derivatives of the residual with respect to a parameter, at fixed displacements and multipliers.
 
     Attributes
     ----------
@@ -137,7 +136,7 @@ class Adjoint:
         return self._kept(right - s, multiplier)
 
     def _kept(self, right: Array, multiplier: Array) -> tuple[Array, Array]:
-        """Return ``J0^-T`` of right-hand sides (n,) and (k,), by the linear solver as it is."""
+        """Return ``J0^-T`` applied to right-hand sides (n,) and (k,), by the linear solver of the analysis."""
         self.solutions += 1
         loaded = self._solver.load(np.ascontiguousarray(right))
         w, force = loaded.solve(self._rows, -multiplier, self._C)

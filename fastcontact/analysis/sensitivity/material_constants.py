@@ -1,4 +1,4 @@
-"""What constants of materials change in the equations of a load step, by central differences at its solution."""
+"""Derivatives of the residual with respect to material constants, by central differences at the solution."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.sensitivity.moving_contact import MovingContact
 from fastcontact.analysis.sensitivity.quantities import Asked
+from fastcontact.arrays import Array
 from fastcontact.elasticity.anisotropic_materials import NAMES, Anisotropic, Orthotropic
 from fastcontact.elasticity.materials import LinearElastic, Material
 from fastcontact.elasticity.varying_constants import varying
@@ -19,7 +19,6 @@ from fastcontact.errors import ModelError, unknown
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import combined
 
-Array = NDArray[np.float64]
 # Constants, and how the components of an orthotropic material's are called.
 CONSTANTS = {"E": "123", "nu": NAMES, "G": NAMES, "expansion": "123"}
 # By how much constants are changed, relative to what is allowed.
@@ -27,7 +26,7 @@ CHANGED = 1e-3
 
 
 def by_constant(contact: MovingContact, asked: Asked) -> tuple[Array, Array | None]:
-    """Return what a constant changes in `Change.out` (n_dofs,) and `Change.sample`, None for nothing."""
+    """Return the derivatives of `Change.out` (n_dofs,) and `Change.sample` with respect to a constant, None for zero."""
     model, name = contact.problem.model, str(asked[0])
     number, material, place = _found(model, asked)
     step = CHANGED * _room(material, name, place)

@@ -1,4 +1,4 @@
-"""The forces and gaps of settled contact as functions of where the surfaces are paired, and their derivatives.
+"""Contact forces and gaps as functions of the configuration in which surfaces are paired, and their derivatives.
 
 Contact is paired on the deformed configuration: forces ``B.T multiplier`` and gaps ``gap0 + B u`` also depend on the
 displacement through B and gap0 (Wriggers, Computational Contact Mechanics, 2006, chapter 6). These derivatives are taken by
@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array, eye_array
 
 from fastcontact.analysis.contact_result import nodal_pressure
@@ -22,12 +21,11 @@ from fastcontact.analysis.iterate import Iterate, pair_surfaces
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import Solution
 from fastcontact.analysis.state import State
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ModelError
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 REMEDY = "Take another load a little off this one, or differences of two solutions to either side"
 # By how much points are moved, in units of the shortest edge: what central differences leave is then about 1e-10.
 MOVED = 1e-5
@@ -41,7 +39,7 @@ TOGETHER = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """Contact at one place.
+    """Contact forces, gaps and pressures at one configuration.
 
     Attributes
     ----------
@@ -91,12 +89,12 @@ class MovingContact:
     instant: float
     u: Array
     solution: Solution
-    closed: NDArray[np.bool_] | None = None
+    closed: Mask | None = None
     pair: str = ""
 
     @cached_property
     def constraints(self) -> StackedConstraints:
-        """The constraints where the bodies stand."""
+        """Constraints at the current configuration."""
         return self.constraints_at(self.u)
 
     @cached_property

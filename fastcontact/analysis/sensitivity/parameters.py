@@ -1,4 +1,4 @@
-"""The parameters that results have sensitivities by, and what they change in the equations of a load step."""
+"""Parameters of sensitivities, and the derivatives of the residual with respect to them."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from dataclasses import replace
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.sensitivity.adjoint import Change
 from fastcontact.analysis.sensitivity.material_constants import CONSTANTS, by_constant, check_constant
 from fastcontact.analysis.sensitivity.moving_contact import MovingContact
 from fastcontact.analysis.sensitivity.quantities import Asked
 from fastcontact.analysis.wear import Worn
+from fastcontact.arrays import Array
 from fastcontact.elasticity.inertia_loads import Centrifugal
 from fastcontact.elasticity.loads import Load, evaluated
 from fastcontact.elasticity.temperature import Temperature
@@ -25,7 +25,6 @@ from fastcontact.model.parts.base import Support
 from fastcontact.model.pretension import Pretension, PretensionForce
 from fastcontact.model.ramp import combined, multiplier
 
-Array = NDArray[np.float64]
 Item = TypeVar("Item", bound=Load | Temperature)
 FORMS = {
     "E": '("E", material), with the number of the axis, "1", of an Orthotropic',
@@ -59,12 +58,12 @@ def check_parameter(model: Model, asked: Asked) -> None:
 
 
 def change_by(contact: MovingContact, asked: Asked) -> Change:
-    """Return what a parameter that `check_parameter` has found changes in the equations."""
+    """Return the change of the residual by a parameter that `check_parameter` has accepted."""
     return KINDS[str(asked[0])][1](contact, asked)
 
 
 def _one(kind: str, known: Mapping[str, Any], asked: Asked) -> Any:
-    """Return what has the name that is asked for; ModelError if nothing has."""
+    """Return the item of a given name; ModelError if there is none."""
     if asked[1] not in known:
         raise ModelError(unknown(kind, str(asked[1]), known))
     return known[str(asked[1])]
@@ -181,7 +180,7 @@ def _prescribing(model: Model, asked: Asked) -> tuple[list[Support], list[int]]:
 
 
 def _of_prescribed(contact: MovingContact, asked: Asked) -> Change:
-    """Return the change by the factor of what supports prescribe on a group."""
+    """Return the change by the load factor of prescribed displacements of a group."""
     problem, instant = contact.problem, contact.instant
     model = problem.model
     supports, along = _prescribing(model, asked)

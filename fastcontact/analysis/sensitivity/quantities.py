@@ -1,4 +1,4 @@
-"""The quantities that have sensitivities, and their gradients."""
+"""Quantities that sensitivities are available for, and their gradients."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The end of a load step found again, as equations that can be differentiated."""
+"""Reconstruct the end of a load step as equations that can be differentiated."""
 
 from __future__ import annotations
 

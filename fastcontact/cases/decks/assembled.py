@@ -8,14 +8,13 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.cases.decks.blocks import Place, folded
 from fastcontact.cases.decks.content import Cell, Content, Instance, Members, Part, SurfaceDefinition
 from fastcontact.cases.decks.element_types import ElementType, element_type
 from fastcontact.mesh import elements
 
-Array = NDArray[np.float64]
 # Instance (empty for what belongs to no part) and number.
 Key = tuple[str, int]
 # Names of sets that a message lists, and characters that it shows of one.

@@ -8,10 +8,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
+from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import Assembled, assembled
 from fastcontact.cases.decks.blocks import Place, folded
 from fastcontact.cases.decks.conditions import Component, Conditions, Distributed
@@ -34,7 +34,6 @@ from fastcontact.elasticity.relations import Relation
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, Table
 
-Array = NDArray[np.float64]
 # What a gap of the undeformed sides may be, relative to the size of the model, and still count as none.
 TOUCHING = 1e-6
 LONGEST_RAMP = 100_000

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.result_warnings import largest_rotation
 from fastcontact.analysis.run import solve_steps
 from fastcontact.analysis.support_forces import multipliers
+from fastcontact.arrays import Array, Numbers
 from fastcontact.cases.decks.blocks import Place, read_blocks
 from fastcontact.cases.decks.building import Building
 from fastcontact.cases.decks.content import Content
@@ -85,7 +85,7 @@ class Deck:
         for step in solve_steps(self.model, self.ramp, **{"criteria": self.criteria, **options}):
             yield self.finished(step)
 
-    def points_of(self, name: str) -> NDArray[np.int32]:
+    def points_of(self, name: str) -> Numbers:
         """Return the sorted point numbers (n,) of a node set, in any case; of sets of parts ``Instance.set``.
 
         MeshError if there is none of that name.
@@ -129,7 +129,7 @@ class Deck:
         work = {"work": {name: t * value for name, value in step.work.items()}} if step.work else {}
         return replace(step, reaction=t * reaction, contact=whole, iterations=step.iterations | work)
 
-    def _supports_alone(self, reaction: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _supports_alone(self, reaction: Array) -> Array:
         """Return nodal forces (n_points, dim) without those of relations, found where no support acts [force]."""
         links = self.building.links
         if not links:

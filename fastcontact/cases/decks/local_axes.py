@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import Assembled
 from fastcontact.cases.decks.blocks import Place, folded
 from fastcontact.cases.decks.content import Axes, Content
 
-Array = NDArray[np.float64]
 ROUND_OFF = 1e-9
 
 

@@ -6,8 +6,8 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.cases.decks.blocks import Block, Row, folded
 from fastcontact.cases.decks.content import Amplitude, Axes, Content, Interaction, Material, Part, Section
 from fastcontact.contact.overclosure import OverclosureLaw
@@ -74,7 +74,7 @@ def _with_axes(current: Material, block: Block, kind: str) -> None:
     current.law = law
 
 
-def _moduli(values: list[float]) -> NDArray[np.float64]:
+def _moduli(values: list[float]) -> Array:
     """Return moduli (6, 6) [pressure] from those of a deck, its upper triangle by columns 11, 22, 33, 12, 13, 23."""
     D = np.zeros((6, 6))
     places = [(i, j) for j in range(6) for i in range(j + 1)]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import facet_points
 from fastcontact.cases.decks.content import Equation, Link, Pin
 from fastcontact.cases.decks.local_axes import local_axes, local_directions, orientation_of
@@ -16,8 +16,6 @@ from fastcontact.elasticity.relations import Relation
 from fastcontact.errors import ModelError
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.couplings import ReferencePoint, Term, distributing_rows, relation, rigid_rows
-
-Array = NDArray[np.float64]
 
 
 def make_rotations(found: DeckMesh) -> None:

@@ -1,4 +1,4 @@
-"""Faces cut by the faces opposite in their own plane, and integrated piece by piece (Puso, 2004).
+"""Segmentation of secondary faces by clipping with the primary faces, and integration over the segments (Puso, 2004).
 
 Both sides are followed along the normal of the secondary facet, so that each piece has one facet on either side.
 Curved facets are cut by their corner polygons, an error of second order in the facet's length over its radius.
@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.contact.formulations import _cut_faces_kernels
 from fastcontact.contact.formulations._overlap import Coupling, Overlap
 from fastcontact.contact.search.box_tree_kernels import build, tree_order
@@ -21,7 +21,6 @@ from fastcontact.contact.surface_smoothing import Smoothing
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements, quadrature
 
-Array = NDArray[np.float64]
 # Facets face each other if their normals enclose more than about 95 degrees.
 FACING = -0.1
 # How far off what faces a facet may be: in distances of the closest primary facet, and radii of the facet itself.
@@ -72,7 +71,7 @@ def face_overlap(
 
 
 def _heights(
-    smoothing: Smoothing | None, pairs: NDArray[np.intp], first: tuple[int, int], blocks: tuple[_Polygons, _Polygons]
+    smoothing: Smoothing | None, pairs: Indices, first: tuple[int, int], blocks: tuple[_Polygons, _Polygons]
 ) -> tuple[Array, Array, Array]:
     """Return the heights of the facets of two blocks above their planes, and the factors (n_pairs, 2) of `Smoothing.shared`.
 
@@ -112,7 +111,7 @@ class _Polygons:
         return cls(block, nodes, count, origin, axes, radius, corners.min(axis=1), corners.max(axis=1))
 
 
-def _facing(ours: _Polygons, theirs: _Polygons, reach: Array) -> NDArray[np.intp]:
+def _facing(ours: _Polygons, theirs: _Polygons, reach: Array) -> Indices:
     """Return the pairs of facets (n, 2) that face each other with a part, in ascending order."""
     numbers = tree_order(theirs.origin)
     tree = build(theirs.low[numbers], theirs.high[numbers])
@@ -129,14 +128,16 @@ def _facing(ours: _Polygons, theirs: _Polygons, reach: Array) -> NDArray[np.intp
 
 
 def _integrated(
-    ours: _Polygons, theirs: _Polygons, pairs: NDArray[np.intp], reference: Array, heights: tuple[Array, Array, Array]
+    ours: _Polygons, theirs: _Polygons, pairs: Indices, reference: Array, heights: tuple[Array, Array, Array]
 ) -> tuple[Coupling, Array, Array]:
-    """Return the coupling of pairs of facets, and of the secondary ones over what they face there the mass and `closer`."""
+    """Return the coupling of pairs of facets, and mass and `closer` of the secondary ones over the overlap."""
     one, other = elements.get(ours.block.element), elements.get(theirs.block.element)
     to_terms, other_to_terms = tables(one.n_nodes).to_terms, tables(other.n_nodes).to_terms
     n, k = ours.block.facets.shape
     mass, integrals, closer = np.empty((n, k, k)), np.empty((len(pairs), k, other.n_nodes)), np.empty((n, k))
     degree = DEGREE[one.n_nodes] + max(DEGREE[one.n_nodes], DEGREE[other.n_nodes])
+    if one.n_nodes == other.n_nodes == 3:  # integrated without error, whichever the first corner
+        degree = max(degree, heights[0].shape[1])
     wrong = _cut_faces_kernels.integrate(
         ours.nodes, ours.count, ours.origin, ours.axes,
         to_terms @ ours.nodes, to_terms @ reference[ours.block.facets], to_terms, _middle(one),

@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Facets that face each other in 3D: one polygon is clipped by the other in the plane of the first, and integrated there.
+"""Polygon clipping of facets in 3D, in the plane of the secondary facet, and integration over the clipped polygon.
 
 A facet is a polynomial with coefficients ``terms`` (n_terms, 3) of the terms in `contact.search.facet_tables`. Its corners
 make the polygon that is cut, in the ``axes`` (3, 3) of its plane: two tangents and the unit normal.

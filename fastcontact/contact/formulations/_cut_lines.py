@@ -1,4 +1,4 @@
-"""Lines cut opposite the nodes of the other side, and integrated piece by piece.
+"""Segmentation of secondary lines at the projected primary nodes, and integration over the segments.
 
 The gap between facets that do not match has a kink wherever a node of the primary side stands opposite; between two of
 those it is smooth (Popp, Gee and Wall, 2009). Where the primary side ends, what is opposite lies along the normal there:
@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.formulations._overlap import Coupling, Overlap
 from fastcontact.contact.pairing import Candidates, pair
 from fastcontact.contact.projection import CORNER, facet_normals, nodal_normals
@@ -20,7 +20,6 @@ from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.mesh import elements, quadrature
 
-Array = NDArray[np.float64]
 # Parts of a facet shorter than this, in its own length, are rounding errors of the cut.
 SLIVER = 1e-10
 # Lines face each other if their normals enclose more than 120 degrees: beside a corner the flank is closest, but not faced.
@@ -34,7 +33,7 @@ NO_BORDERS = np.empty(0, np.intp), np.empty(0)
 class LinePoints:
     """Integration points of all pieces of a block: facet (n,), xi (n,), shape (n, k), reference area (n,)."""
 
-    facet: NDArray[np.intp]
+    facet: Indices
     xi: Array
     shape: Array
     area: Array
@@ -48,7 +47,7 @@ def line_points(
     axisymmetric: bool,
     n_gauss: int,
     tolerance: float,
-    borders: tuple[NDArray[np.intp], Array] = NO_BORDERS,
+    borders: tuple[Indices, Array] = NO_BORDERS,
 ) -> LinePoints:
     """Cut the facets of a block on the deformed configuration and put Gauss points on every piece.
 
@@ -69,12 +68,13 @@ def line_points(
 
 
 def _cuts(
-    block: FacetBlock, primary: Surface, deformed: Array, tolerance: float, borders: tuple[NDArray[np.intp], Array]
-) -> tuple[NDArray[np.intp], Array, Array]:
+    block: FacetBlock, primary: Surface, deformed: Array, tolerance: float, borders: tuple[Indices, Array]
+) -> tuple[Indices, Array, Array]:
     """Return (facet, begin, end) of the pieces of the facets of a block, in their reference coordinate."""
     n = len(block.facets)
-    between, along = _opposite_nodes(block, primary, deformed)
-    ending, place = _opposite_ends(block, primary, deformed, tolerance)
+    normals = nodal_normals(primary, deformed)
+    between, along = _opposite_nodes(block, primary, deformed, normals)
+    ending, place = _opposite_ends(block, primary, deformed, normals, tolerance)
     facet = np.concatenate([np.arange(n), np.arange(n), between, borders[0], ending])
     xi = np.concatenate([np.full(n, -1.0), np.full(n, 1.0), along, borders[1], place])
     order = np.lexsort((xi, facet))
@@ -90,7 +90,7 @@ def normals_at(block: FacetBlock, coordinates: Array, points: LinePoints) -> Arr
     return np.column_stack([tangent[:, 1], -tangent[:, 0]]) / np.linalg.norm(tangent, axis=1, keepdims=True)
 
 
-def _opposite_nodes(block: FacetBlock, primary: Surface, deformed: Array) -> tuple[NDArray[np.intp], Array]:
+def _opposite_nodes(block: FacetBlock, primary: Surface, deformed: Array, normals: Array) -> tuple[Indices, Array]:
     """Return (facet, xi) of the points of a block that lie opposite the ends of primary facets.
 
     Where two of these meet, that is on the line which halves the angle between them: beside it another facet is nearer. The
@@ -99,7 +99,6 @@ def _opposite_nodes(block: FacetBlock, primary: Surface, deformed: Array) -> tup
     ends, and at its corners, beside which the flank is not faced.
     """
     ends, own = np.unique(np.concatenate([other.local[:, :2].ravel() for other in primary.blocks]), return_index=True)
-    normals = nodal_normals(primary, deformed)
     foot, normal = deformed[primary.points[ends]], normals[ends]
     opposite = closest(foot, deformed[block.facets])
     along = opposite.xi[:, 0]
@@ -114,7 +113,7 @@ def _opposite_nodes(block: FacetBlock, primary: Surface, deformed: Array) -> tup
     return np.concatenate([opposite.facet[inside], beside.ravel()[row]]), np.concatenate([along[inside], xi])
 
 
-def _corners(side: Surface, coordinates: Array, normals: Array) -> NDArray[np.bool_]:
+def _corners(side: Surface, coordinates: Array, normals: Array) -> Mask:
     """Return which nodes (m,) of a side are corners, where a facet leans much from the nodal `normals` (m, 2)."""
     lean = np.ones(len(side.points))
     for block in side.blocks:
@@ -129,7 +128,7 @@ def _across(points: Array, foot: Array, normal: Array) -> Array:
     return np.asarray(away[..., 0] * normal[..., None, 1] - away[..., 1] * normal[..., None, 0])
 
 
-def _neighbours(block: FacetBlock) -> NDArray[np.intp]:
+def _neighbours(block: FacetBlock) -> Indices:
     """Return the facets (n, 2) before and behind each facet of a block, -1 where there is none."""
     size = int(block.local.max()) + 1
     begins, ends = np.full(size, -1), np.full(size, -1)
@@ -138,12 +137,12 @@ def _neighbours(block: FacetBlock) -> NDArray[np.intp]:
 
 
 def _opposite_ends(
-    block: FacetBlock, primary: Surface, deformed: Array, tolerance: float
-) -> tuple[NDArray[np.intp], Array]:
+    block: FacetBlock, primary: Surface, deformed: Array, normals: Array, tolerance: float
+) -> tuple[Indices, Array]:
     """Return (facet, xi) of the points of a block that lie on the normals at the ends of the primary side."""
     # A tolerance for rounding errors alone is no part of the side: a cut there would leave a strip that faces it.
     ends = (1.0, 1.0 + 2.0 * tolerance) if tolerance > ROUNDING else (1.0,)
-    normals, first, facets, places = nodal_normals(primary, deformed), 0, [], []
+    first, facets, places = 0, [], []
     for other in primary.blocks:
         shape = elements.get(other.element).shape
         for end, s in [(end, sign * beyond) for end, sign in ((0, -1.0), (1, 1.0)) for beyond in ends]:
@@ -159,7 +158,7 @@ def _opposite_ends(
     return np.concatenate(facets), np.concatenate(places)
 
 
-def _zeros(values: Array) -> tuple[NDArray[np.intp], Array]:
+def _zeros(values: Array) -> tuple[Indices, Array]:
     """Return (row, xi) of the zeros inside lines of two or three nodes with nodal `values` (n, k)."""
     a, b = values[:, 0], values[:, 1]
     slope, middle = 0.5 * (b - a), 0.5 * (a + b) if values.shape[1] == 2 else values[:, 2]

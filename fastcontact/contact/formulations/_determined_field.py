@@ -1,4 +1,4 @@
-r"""Pressure fields that their integration points determine, however little of a facet takes part.
+r"""Pressure fields that remain determined by their integration points on partly covered facets.
 
 The points of a facet that faces the other side with a strip of itself determine next to nothing of a field over all of
 it: on a strip of a fraction :math:`\theta` at the end of a line, what a polynomial of degree k is at the other end weighs
@@ -13,17 +13,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, diags_array, lil_array
 
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.integration import facet_measure, fine_rule
 from fastcontact.contact.pair_options import spread
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.mesh import elements
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-Indices = NDArray[np.intp]
 # A line is determined by a seventh of it, a parabola by two fifths; values at the other end count no more than thirtyfold.
 DETERMINED = 1e-3
 # Facets whose mass matrix differs by less than this part are whole.
@@ -32,7 +29,7 @@ WHOLE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class WholeFacets:
-    """What the fields of the facets of a block weigh over all of them.
+    """Mass matrices of the fields over whole facets of a block.
 
     Attributes
     ----------
@@ -58,7 +55,7 @@ class WholeFacets:
         return cls(block, to_corners, np.einsum("fq,qa,qb->fab", dA, N, N))
 
     def degrees(self, mass: Array) -> Indices:
-        """Return what field (n_facets,) `mass` (n_facets, k, k) over what takes part determines.
+        """Return the degree of the field (n_facets,) that `mass` (n_facets, k, k) over the covered part determines.
 
         2 all of it, 1 one that is linear between the corners, 0 none, -1 where nothing takes part.
         """

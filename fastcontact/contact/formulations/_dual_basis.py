@@ -1,4 +1,4 @@
-r"""Shape functions of pressure that are biorthogonal to those of displacement, facet by facet.
+r"""Dual shape functions: biorthogonal to the displacement shape functions on each facet.
 
 For positive shape functions :math:`\tilde N` of a facet that sum to one, the dual functions
 
@@ -20,12 +20,10 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Mask
 from fastcontact.mesh import elements
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 # Share of a mid node's function that either end of its edge gets: 1/4 makes parabolas Bernstein polynomials; without a
 # centre node, 3/8 is the least that leaves no negative part, that of (a + b) / 4 + 1 / 2 for a, b in [-1, 1].
 SHARE, SHARE_WITHOUT_CENTRE = 0.25, 0.375
@@ -57,7 +55,7 @@ def positive(name: str) -> Array:
 
 
 def _edges(element: elements.Element) -> tuple[tuple[int, int], ...]:
-    """Return the ends of what each mid node halves."""
+    """Return the end nodes of the edge of each mid node."""
     return ((0, 1),) if element.dim == 1 else element.edges
 
 

@@ -9,13 +9,13 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.contact.cohesive_layer import bonded
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Compliance, Constraints
-from fastcontact.contact.held_motions import TOGETHER, HeldMotions, distinct_directions
+from fastcontact.contact.held_motions import TOGETHER, HeldMotions, alike, spanned, without
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.contact.pair_options import PairOptions
@@ -28,7 +28,6 @@ from fastcontact.contact.tied import TiedPair, tied
 from fastcontact.contact.tied_offset import with_arms
 from fastcontact.errors import ContactError, unknown
 
-Array = NDArray[np.float64]
 # Vectors shorter than this have no direction; unit normals that differ by less are the same.
 TINY, ALIKE = 1e-300, 1e-9
 SLIPS = ("symmetric", "primary")
@@ -96,6 +95,7 @@ class Formulation(ABC):
     name: ClassVar[str]
     # Pair again after every active-set iteration (True), or after the active set has settled (False).
     geometry_in_loop: ClassVar[bool]
+    against_obstacles: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         if self.normals is None:
@@ -133,6 +133,11 @@ class Formulation(ABC):
     def eliminable(self) -> bool:
         """Whether iterative solvers can eliminate closed constraints; penalties, which are springs, do not prevent it."""
         return True
+
+    @property
+    def faceted(self) -> bool:
+        """Whether normals are those of single facets, between which points may flip."""
+        return isinstance(self.primary, Surface) and self.normals == "facet" and not self.options.tied
 
     @property
     def corner_functions(self) -> csr_array | None:
@@ -180,7 +185,7 @@ class Formulation(ABC):
         return wetted(part, at, self.secondary, self.options.source[self.secondary.points], self.points)
 
     def _softened(self, part: Constraints, at: Configuration) -> Constraints:
-        """Return constraints that give way by penalties along the normal and along the tangents, where there are any."""
+        """Return constraints with the compliance of normal and tangential penalties, if any."""
         normal, tangential, areas = self.options.penalty, self.options.tangential_penalty, part.areas
         if normal is None and tangential is None:
             return part
@@ -217,8 +222,8 @@ class Formulation(ABC):
             part = with_arms(part, pairing, self.primary, self.points)
         return tied(part)
 
-    def never_opening(self, positions: Array, at: Configuration) -> NDArray[np.bool_] | None:
-        """Return which reference places (m, dim) [length] never open again, (m,); None if all may."""
+    def never_opening(self, positions: Array, at: Configuration) -> Mask | None:
+        """Return which constraints, by reference position (m, dim) [length], do not separate (m,); None if all may."""
         if self.options.always_closed:
             return np.ones(len(positions), bool)
         if at.never_opening is None:
@@ -226,7 +231,7 @@ class Formulation(ABC):
         return np.asarray(_at_places(at.never_opening, positions))
 
     def facing(self, candidates: Candidates, at: Configuration, tolerance: float | None = None) -> Pairing:
-        """Return what candidates face on the displaced configuration, by the options of the pair.
+        """Return the pairing of candidates on the deformed configuration, by the options of the pair.
 
         `tolerance` takes the place of `projection_tolerance` where it is given.
         """
@@ -234,7 +239,8 @@ class Formulation(ABC):
         beyond = self.projection_tolerance if tolerance is None else tolerance
         assert self.normals is not None
         assert beyond is not None
-        pairing = pair(candidates.positions(deformed), self.primary, deformed, beyond, self.normals, at.stance)
+        positions = candidates.positions(deformed)
+        pairing = pair(positions, self.primary, deformed, beyond, self.normals, at.stance, at.rounded)
         if self.normals != "secondary":
             return pairing
         return opposed(pairing, self._secondary_normals(candidates, deformed))
@@ -265,7 +271,7 @@ class Formulation(ABC):
     def slips(
         self, candidates: Candidates, pairing: Pairing, directions: Sequence[Array], at: Configuration
     ) -> tuple[tuple[csr_array, ...], Array | None]:
-        """Return rows (n, n_dofs) of the slip of candidates along k tangents (n, dim), and what it is beside these (k, n).
+        """Return rows (n, n_dofs) of the slip of candidates along k tangents (n, dim), and its constant part (k, n).
 
         The latter: what a rigid primary side moves in the step, or minus the part that closes a gap [length]; None is zero.
         """
@@ -281,7 +287,7 @@ class Formulation(ABC):
         return along, drift
 
     def added_gap(self, candidates: Candidates, pairing: Pairing, at: Configuration) -> Array:
-        """Return what clearances and wear add to the gaps (n,) of candidates, zero where nothing is faced [length]."""
+        """Return the contribution of clearances and wear to the gaps (n,) of candidates, zero if unpaired [length]."""
         added = self.options.added_gap(candidates, pairing, self.primary, self.points, at.clearance_factor)
         if at.worn is None:
             return added
@@ -306,12 +312,12 @@ class Formulation(ABC):
         return closer
 
     def turning(self, candidates: Candidates, at: Configuration) -> Array | None:
-        """Return how far the rotation of an obstacle carries what candidates face (n, dim) [length]; None without any."""
+        """Return the displacement of the points faced by candidates due to obstacle rotation (n, dim) [length], or None."""
         assert isinstance(self.primary, RigidSide)
         now, before = (candidates.positions(self.points + u) for u in (at.displacement, at.start))
         return self.primary.turning(now, before, at.stance, at.stance_start)
 
-    def without_slip(self, at: Configuration) -> list[tuple[Array, NDArray[np.bool_]]]:
+    def without_slip(self, at: Configuration) -> list[tuple[Array, Mask]]:
         """Return directions (n_nodes, dim) in which both sides are held, and do not move apart, with the nodes (n_nodes,).
 
         So it is in a plane of symmetry and on an axis: slip is zero there whatever the traction, which nothing determines.
@@ -321,42 +327,36 @@ class Formulation(ABC):
         if not len(nodes) or self.held is None:
             return []
         points = self.secondary.points[nodes]
-        moved = (at.displacement - at.start)[points]
+        both, moved = self.held.at(points), (at.displacement - at.start)[points]
         candidates = Candidates(points[:, None], np.ones((len(nodes), 1)))
+        pairing = self.facing(candidates, at, max(self.projection_tolerance or 0.0, ON_SYMMETRY))
         if isinstance(self.primary, RigidSide):
-            theirs = np.broadcast_to(np.eye(moved.shape[1]), (len(nodes), *2 * moved.shape[1:]))
             moved = moved - (at.obstacle - at.obstacle_start)
             turning = self.turning(candidates, at)
             moved = moved if turning is None else moved - turning
         else:
-            pairing = self.facing(candidates, at, max(self.projection_tolerance or 0.0, ON_SYMMETRY))
-            nodes, moved = nodes[pairing.paired], moved[pairing.paired]
-            facing = places(self.primary, pairing.facet[pairing.paired], pairing.xi[pairing.paired])
-            theirs = np.einsum("nk,nkde->nde", facing.shape, self.held.at(facing.nodes))
-            moved = moved - np.einsum("nk,nkd->nd", facing.shape, (at.displacement - at.start)[facing.nodes])
-        ours = self.held.at(self.secondary.points[nodes])
-        round_off = ALIKE * max(np.abs(at.displacement).max(), np.abs(at.start).max())
-        found = []
-        for direction in distinct_directions(ours):
-            both = np.einsum("d,nde,e->n", direction, ours, direction) >= TOGETHER**2
-            both &= np.einsum("d,nde,e->n", direction, theirs, direction) >= 0.5
-            both &= np.abs(moved @ direction) <= round_off
-            mask = np.zeros(len(self.secondary.points), bool)
-            mask[nodes[both]] = True
-            mask = self.without_whole_facets(mask)
-            if mask.any():
-                along = np.tile(direction, (len(mask), 1))
-                along[nodes] = ours @ direction  # round a curved rim each node has its own
-                along[~mask] = direction
-                found.append((along / np.linalg.norm(along, axis=1, keepdims=True), mask))
-        return found
+            rows = np.flatnonzero(pairing.paired)
+            facing, theirs = places(self.primary, pairing.facet[rows], pairing.xi[rows]), np.zeros_like(both)
+            theirs[rows] = np.einsum("nk,nkde->nde", facing.shape, self.held.at(facing.nodes))
+            moved[rows] -= np.einsum("nk,nkd->nd", facing.shape, (at.displacement - at.start)[facing.nodes])
+            both = spanned(both @ theirs @ both, 0.5)
+        both = without(both, pairing.normal, np.sqrt(0.5))
+        moved -= np.einsum("nd,nd->n", moved, pairing.normal)[:, None] * pairing.normal
+        both = without(both, moved, ALIKE * max(np.abs(at.displacement).max(), np.abs(at.start).max()))
+        held = np.zeros((len(self.secondary.points), *both.shape[1:]))
+        held[nodes] = both
+        return alike(self._without_whole_facets(held), self.points[self.secondary.points])
 
-    def without_whole_facets(self, nodes: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Return secondary `nodes` (n_nodes,) without those of facets all of whose nodes are among them."""
-        found = nodes.copy()
-        whole = [block.local[nodes[block.local].all(axis=1)].ravel() for block in self.secondary.blocks]
-        found[np.concatenate(whole)] = False
-        return found
+    def _without_whole_facets(self, held: Array) -> Array:
+        """Return projectors (n_nodes, dim, dim) without the directions in which all nodes of a facet are held."""
+        whole = np.zeros_like(held)
+        for block in self.secondary.blocks:
+            around = held[block.local]
+            vectors = np.linalg.eigh(around.mean(axis=1))[1]
+            least = np.einsum("fdk,fnde,fek->fnk", vectors, around, vectors).min(axis=1) >= TOGETHER**2
+            vectors = np.where(least[:, None], vectors, 0.0)
+            np.add.at(whole, block.local, (vectors @ vectors.transpose(0, 2, 1))[:, None])
+        return spanned(held - held @ spanned(whole, 0.5) @ held, 0.5)
 
     def _closing_slip(
         self, candidates: Candidates, pairing: Pairing, directions: Sequence[Array], at: Configuration
@@ -415,8 +415,8 @@ class Formulation(ABC):
         return np.where(pairing.paired, gap0 + G @ u.ravel(), np.inf), pairing.normal
 
 
-def _at_places(known: tuple[Array, NDArray[Any]], positions: Array) -> NDArray[Any]:
-    """Return what is `known` at places (k, dim) [length], values (k, ...), at the one nearest to each of `positions`."""
+def _at_places(known: tuple[Array, AnyArray], positions: Array) -> AnyArray:
+    """Return `known` values (k, ...) at the point (k, dim) [length] nearest to each of `positions`."""
     from scipy.spatial import cKDTree
 
     places_before, values = known

@@ -1,15 +1,19 @@
-"""What faces what: integrals of products of shape functions over the parts where two surfaces face each other."""
+"""Mortar integrals: products of shape functions over the overlap of two surfaces.
+
+`_cut_lines` and `_cut_faces` cut the facets of two meshed sides; against a rigid obstacle Gauss points of whole facets do.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fastcontact.contact.surface import FacetBlock
-
-Array = NDArray[np.float64]
+from fastcontact.arrays import Array, Indices
+from fastcontact.contact.integration import facet_measure, fine_rule
+from fastcontact.contact.obstacles.rigid_side import RigidSide, Stance
+from fastcontact.contact.surface import FacetBlock, Surface
+from fastcontact.mesh import elements
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +31,7 @@ class Coupling:
 
     secondary: FacetBlock
     primary: FacetBlock
-    pairs: NDArray[np.intp]
+    pairs: Indices
     integrals: Array
 
 
@@ -43,9 +47,39 @@ class Overlap:
     couplings : list of Coupling
     closer : list of ndarray (n_facets, n_nodes, dim)
         For each block, integrals of its shape functions times by how much the smooth surfaces are closer to each other than
-        the facets, see `surface_smoothing`, along the normals that the secondary side faces [volume].
+        the facets, see `surface_smoothing`, along the normals that the secondary side faces [volume]. Against an obstacle,
+        which has no points in the mesh, by the places on it that are faced.
     """
 
     mass: list[Array]
     couplings: list[Coupling]
     closer: list[Array]
+
+
+def obstacle_overlap(
+    secondary: Surface, obstacle: RigidSide, points: tuple[Array, Array], axisymmetric: bool, stance: Stance
+) -> Overlap:
+    """Integrate the secondary facets over what faces a rigid obstacle; areas are those of the reference.
+
+    Parameters
+    ----------
+    secondary : Surface
+    obstacle : RigidSide
+    points : (ndarray, ndarray)
+        Reference and deformed coordinates (n_points, dim) [length].
+    axisymmetric : bool
+    stance : Stance
+        Where the obstacle stands.
+    """
+    mass, faced = [], []
+    for block in secondary.blocks:
+        xi, weights = fine_rule(block.element)
+        N = elements.get(block.element).shape(xi)
+        positions = np.einsum("qk,fkd->fqd", N, points[1][block.facets])
+        gap, normal, paired, _ = obstacle.facing(positions.reshape(-1, positions.shape[2]), stance)
+        foot = positions - (np.where(paired, gap, 0.0)[:, None] * normal).reshape(positions.shape)
+        area = facet_measure(block.facets, block.element, points[0], xi, axisymmetric) * weights
+        area = np.where(paired.reshape(area.shape), area, 0.0)
+        mass.append(np.einsum("fq,qa,qb->fab", area, N, N))
+        faced.append(np.einsum("fq,qa,fqd->fad", area, N, foot))
+    return Overlap(mass, [], faced)

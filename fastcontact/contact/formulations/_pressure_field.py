@@ -24,10 +24,10 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, diags_array
 from scipy.sparse.linalg import splu
 
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints, NodalField
 from fastcontact.contact.formulations._formulation import Formulation
@@ -35,8 +35,6 @@ from fastcontact.contact.multiplier_field import Projection
 from fastcontact.contact.pairing import Candidates, Pairing, normals
 from fastcontact.errors import ContactError
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 # The area of a node on the axis vanishes but for rounding errors; what is below this part of the largest is none.
 NO_AREA = 1e-9
 # Corners of quadratic faces have next to none, or less.
@@ -71,8 +69,8 @@ class PressureField(NodalField):
 
     projection: Projection
     nodes: csr_array
-    independent: NDArray[np.intp]
-    around: NDArray[np.intp]
+    independent: Indices
+    around: Indices
     shape: Array
     renewed: bool
     nodal_areas: Array
@@ -80,8 +78,8 @@ class PressureField(NodalField):
 
     @classmethod
     def of_points(
-        cls, points: tuple[NDArray[np.intp], Array], areas: tuple[Array, Array], rho: float,
-        field: tuple[csr_array, NDArray[np.intp]], renewed: bool,
+        cls, points: tuple[Indices, Array], areas: tuple[Array, Array], rho: float,
+        field: tuple[csr_array, Indices], renewed: bool,
     ) -> PressureField:  # fmt: skip
         """Return the field of points in facets with nodes and shape functions (m, n); `field` are `nodes` and `independent`.
 
@@ -106,7 +104,7 @@ class PressureField(NodalField):
 
     @property
     def covered(self) -> Array:
-        """What part of the areas takes part; all of it for nodes without area."""
+        """Covered part of the nodal areas; one for nodes without area."""
         whole = self.nodal_areas
         with_area = np.abs(whole) > NO_AREA * np.abs(whole).max(initial=0.0)
         return np.divide(self.covered_areas, whole, out=np.ones_like(whole), where=with_area)
@@ -115,7 +113,7 @@ class PressureField(NodalField):
         """Return the field times the areas that take part."""
         return self.pressure(force) * self.covered_areas
 
-    def weighted_gaps(self, gaps: Array) -> tuple[Array, NDArray[np.intp]]:
+    def weighted_gaps(self, gaps: Array) -> tuple[Array, Indices]:
         """Return means of gaps with the shape functions of the nodes: where points are closed they are zero, gaps may not be.
 
         Corners of quadratic faces without area have none, and no points are theirs.
@@ -158,14 +156,14 @@ class PressureField(NodalField):
         return (self.projection.areas > 0) & (field - self.projection.rho * gap > 0)
 
 
-def _nearest(around: NDArray[np.intp], shape: Array, n_nodes: int) -> Mask:
+def _nearest(around: Indices, shape: Array, n_nodes: int) -> Mask:
     """Return the nodes (n_nodes,) with the largest shape functions (m, n) at any of the points; several where equal."""
     found = np.zeros(n_nodes, bool)
     found[around[shape >= shape.max(axis=1, keepdims=True, initial=-np.inf) - ROUNDING]] = True
     return found
 
 
-def shapes_at(shape: Array, local: NDArray[np.intp], n_nodes: int) -> csr_array:
+def shapes_at(shape: Array, local: Indices, n_nodes: int) -> csr_array:
     """Return the shape functions (m, n_nodes) of all nodes at points, from those (m, n) of the nodes `local` (m, n)."""
     row = np.broadcast_to(np.arange(len(shape))[:, None], shape.shape)
     return coo_array((shape.ravel(), (row.ravel(), local.ravel())), shape=(len(shape), n_nodes)).tocsr()
@@ -187,7 +185,7 @@ class PressureFieldFormulation(Formulation):
 
     @property
     def eliminable(self) -> bool:
-        """See `Formulation`: what the field does not represent gives way, but its values can be eliminated.
+        """See `Formulation`: the part outside the field is compliant, but the field values can be eliminated.
 
         In space, without friction, which would couple them along all directions.
         """
@@ -198,8 +196,8 @@ class PressureFieldFormulation(Formulation):
         if not self.augmentation > 0:
             raise ContactError(f"augmentation = {self.augmentation} must be positive; 1 suits most problems")
 
-    def repeated(self, field: tuple[csr_array, NDArray[np.intp]]) -> tuple[csr_array, NDArray[np.intp]]:
-        """Return a field, its nodal by its independent values and their nodes, with one value for nodes at one place."""
+    def repeated(self, field: tuple[csr_array, Indices]) -> tuple[csr_array, Indices]:
+        """Return a field with one value for coincident nodes: nodal by independent values, and the nodes of the latter."""
         same, (values, nodes) = self.options.same_place, field
         if same is None:
             return field

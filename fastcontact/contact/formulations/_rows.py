@@ -1,4 +1,4 @@
-"""Sparse matrices of mortar contact: put together facet by facet, turned into rows of displacements."""
+"""Sparse mortar matrices: assembly facet by facet, and rows of degrees of freedom."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
-Array = NDArray[np.float64]
+from fastcontact.arrays import Array, Numbers
 
 
 class Entries:
     """Entries of a sparse matrix, collected facet by facet."""
 
     def __init__(self) -> None:
-        self._rows: list[NDArray[np.int32]] = []
-        self._columns: list[NDArray[np.int32]] = []
+        self._rows: list[Numbers] = []
+        self._columns: list[Numbers] = []
         self._values: list[Array] = []
 
     def add(self, rows: NDArray[np.integer], columns: NDArray[np.integer], values: Array) -> None:
@@ -26,6 +26,8 @@ class Entries:
 
     def matrix(self, size: tuple[int, int]) -> csr_array:
         """Return the sum of all entries."""
+        if not self._rows:
+            return csr_array(size)
         place = np.concatenate(self._rows), np.concatenate(self._columns)
         return csr_array(coo_array((np.concatenate(self._values), place), shape=size))
 

@@ -1,4 +1,4 @@
-r"""Mortar contact in the plane with a pressure field, integrated exactly over the pieces where two facets face each other.
+r"""Segment-based mortar contact in the plane with a multiplier field, integrated exactly over the segments.
 
 Every secondary facet is cut in each pairing, see `_cut_lines`, and every piece gets Gauss points of its own (Puso and
 Laursen, 2004). A uniform pressure then passes between meshes that do not match without error, which neither
@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations._cut_lines import line_points
@@ -28,7 +28,6 @@ from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError
 from fastcontact.mesh import quadrature
 
-Array = NDArray[np.float64]
 # A facet that faces less than this part of its length takes no part: its multipliers would have next to no equation.
 COVERED = 1e-3
 
@@ -52,6 +51,7 @@ class SegmentMortar(PressureFieldFormulation):
     multipliers: str = "standard"
 
     name: ClassVar[str] = "mortar"
+    against_obstacles: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -83,7 +83,7 @@ class SegmentMortar(PressureFieldFormulation):
         field = self._pressure_field(facet, shape, np.where(kept, area, 0.0), area)
         return self.of_points(candidates, pairing, field, at)
 
-    def _pressure_field(self, facet: NDArray[np.intp], shape: Array, area: Array, whole: Array) -> PressureField:
+    def _pressure_field(self, facet: Indices, shape: Array, area: Array, whole: Array) -> PressureField:
         """Set up the pressure field on the nodes of facets that take part, from points (m,), shapes (m, n), areas (m,).
 
         `area` is zero where a point takes no part, `whole` nowhere.

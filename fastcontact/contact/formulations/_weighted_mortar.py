@@ -8,6 +8,9 @@ of the node's share of the pressure; the normal is the mean of those of the prim
 node of that side, on quadratic facets also the ends of the edge in the middle of which it lies. So constraints are
 eliminated one by one, the corners first, and the matrix stays sparse and positive definite. ``"standard"`` functions are
 linear between the corners, also on quadratic facets; only corners have gaps.
+
+Against a rigid obstacle the integrals run over whole facets by Gauss points, and :math:`x_p` is the place on the obstacle
+nearest to each.
 """
 
 from __future__ import annotations
@@ -21,25 +24,24 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from fastcontact.arrays import Array, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints, NodalField
 from fastcontact.contact.formulations._cut_faces import face_overlap
 from fastcontact.contact.formulations._cut_lines import line_overlap
 from fastcontact.contact.formulations._dual_basis import COVERED, dual_functions, positive
 from fastcontact.contact.formulations._formulation import Formulation
-from fastcontact.contact.formulations._overlap import Overlap
+from fastcontact.contact.formulations._overlap import Overlap, obstacle_overlap
 from fastcontact.contact.formulations._rows import Entries, rows_of
 from fastcontact.contact.integration import facet_measure, fine_rule, nodal_areas
-from fastcontact.contact.pairing import Candidates, tangents_by_axes
+from fastcontact.contact.obstacles.rigid_side import RigidSide, Stance
+from fastcontact.contact.pairing import Candidates, tangents
 from fastcontact.contact.prescribed_normals import Normals
 from fastcontact.contact.projection import facet_normals, nodal_normals, smooth_normals
-from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError, unknown
 from fastcontact.linear.sparse_rows import scaled
 from fastcontact.mesh import elements
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 MULTIPLIERS = ("standard", "dual")
 # What faces the other side with less than this fraction of its area is left out.
 LEAST = 1e-3
@@ -114,8 +116,9 @@ class WeightedMortar(Formulation):
         linear = elements.get(element.linear).shape(element.nodes)
         return np.vstack([linear.T, np.zeros((element.n_nodes - element.n_corners, element.n_nodes))])
 
-    def _overlap(self, deformed: Array) -> Overlap:
-        assert isinstance(self.primary, Surface)
+    def _overlap(self, deformed: Array, stance: Stance) -> Overlap:
+        if isinstance(self.primary, RigidSide):
+            return obstacle_overlap(self.secondary, self.primary, (self.points, deformed), self.axisymmetric, stance)
         if deformed.shape[1] == 3:
             return face_overlap(self.secondary, self.primary, self.points, deformed, self.smoothing)
         return line_overlap(
@@ -131,7 +134,7 @@ class WeightedMortar(Formulation):
     def unilateral(self, at: Configuration) -> Constraints:
         """Cut and pair on the displaced configuration and return one mean gap per node."""
         deformed = self.points + at.displacement
-        overlap = self._overlap(deformed)
+        overlap = self._overlap(deformed, at.stance)
         covered = [mass.sum(axis=2) @ T.T for T, mass in zip(self._test, overlap.mass, strict=True)]
         kept = self._taking_part(covered)
         own, across, closer = self._weighted(overlap, covered, kept)
@@ -139,7 +142,7 @@ class WeightedMortar(Formulation):
         sums = np.where(self.options.excluded_nodes(self.secondary), 0.0, np.asarray(own.sum(axis=1)).ravel())
         weight = np.where(sums > 0.0, sums, np.inf)
         mean = scaled(csr_array(own - across), 1.0 / weight)
-        normal = self._mean_normals(overlap, deformed)
+        normal = self._mean_normals(overlap, deformed, at.stance)
         B = rows_of(mean, normal)
         gap0 = B @ self.points.ravel() + at.clearance_factor * self._clearance(own, across, weight)
         gap0 -= np.einsum("nd,nd->n", closer, normal) / weight
@@ -150,18 +153,31 @@ class WeightedMortar(Formulation):
         if not self.slides:
             return part
         candidates = Candidates(points[:, None], np.ones((len(part), 1)))
-        directions, rubbing = self.options.rubbing(tangents_by_axes(normal), candidates)
-        slips, apart = self._slips(rubbing, overlap, covered, kept, mean, weight, at)
+        held = self.without_slip(at)
+        directions, rubbing = self.options.rubbing(_tangents(normal, held), candidates)
+        slips, apart = self._slips(rubbing, held, overlap, covered, kept, mean, weight, at)
         return replace(
             part,
             tangents=slips,
             directions=directions,
             friction=self.options.coefficients(self.friction, candidates),
-            drift=self._closing_slip_of_nodes(apart, normal, rubbing, at) if self.slip == "symmetric" else None,
+            drift=self._drift(mean, apart, normal, rubbing, at),
         )
 
+    def _drift(
+        self, mean: csr_array, apart: Array, normal: Array, directions: tuple[Array, ...], at: Configuration
+    ) -> Array | None:
+        """Return the slip (k, m) beside that by displacements: by a rigid obstacle, or see `_closing_slip_of_nodes`."""
+        if not isinstance(self.primary, RigidSide):
+            return self._closing_slip_of_nodes(apart, normal, directions, at) if self.slip == "symmetric" else None
+        moved = np.tile(at.obstacle - at.obstacle_start, (len(normal), 1))
+        now, before = (mean @ (self.points + u) for u in (at.displacement, at.start))
+        turning = self.primary.turning(now, before, at.stance, at.stance_start)
+        moved = moved if turning is None else moved + turning
+        return -np.stack([np.einsum("nd,nd->n", t, moved) for t in directions])
+
     def _nodal(self, weight: Array) -> WeightedPressures:
-        """Return what forces mean at the nodes; `weight` (m,) are the areas of the gaps [area]."""
+        """Return the nodal interpretation of forces; `weight` (m,) are the areas of the gaps [area]."""
         quadratic = [
             (elements.get(block.element).n_corners, T, block.local)
             for block, T in zip(self.secondary.blocks, self._test, strict=True)
@@ -196,8 +212,8 @@ class WeightedMortar(Formulation):
         return np.stack([closing * np.einsum("nd,nd->n", along, between) for along in directions])
 
     def _slips(
-        self, directions: Sequence[Array], overlap: Overlap, covered: list[Array], kept: Mask, mean: csr_array,
-        weight: Array, at: Configuration,
+        self, directions: Sequence[Array], without_slip: list[tuple[Array, Mask]], overlap: Overlap, covered: list[Array],
+        kept: Mask, mean: csr_array, weight: Array, at: Configuration,
     ) -> tuple[tuple[csr_array, ...], Array]:  # fmt: skip
         """Return rows (m, n_dofs) of the slips along tangents (m, dim), and how far apart nodes start (m, dim) [length].
 
@@ -209,7 +225,7 @@ class WeightedMortar(Formulation):
         start = self.points + at.start
         apart = mean @ start
         held = np.zeros((len(weight), *2 * self.points.shape[1:]))
-        for along, nodes in self.without_slip(at):
+        for along, nodes in without_slip:
             if not (nodes & kept).any():
                 continue
             own, across, _ = self._weighted(overlap, covered, kept & ~nodes)
@@ -268,9 +284,14 @@ class WeightedMortar(Formulation):
             rescued[block.local[lost][np.arange(len(most)), most]] = True
         return (enough | rescued) & (whole > 0.0)
 
-    def _mean_normals(self, overlap: Overlap, deformed: Array) -> Array:
-        """Return unit means (m, dim) of the primary normals that the nodes face; the last axis for nodes without."""
-        assert isinstance(self.primary, Surface)
+    def _mean_normals(self, overlap: Overlap, deformed: Array, stance: Stance) -> Array:
+        """Return unit means (m, dim) of the primary normals that the nodes face; the last axis for nodes without.
+
+        Against an obstacle the normals at the nodes themselves, which lie in planes of symmetry.
+        """
+        if isinstance(self.primary, RigidSide):
+            _, normal, paired, _ = self.primary.facing(deformed[self.secondary.points], stance)
+            return np.where(paired[:, None], normal, -nodal_normals(self.secondary, deformed))
         if self.normals == "secondary":
             return -nodal_normals(self.secondary, deformed)
         if not isinstance(self.normals, str):
@@ -289,7 +310,7 @@ class WeightedMortar(Formulation):
         return np.where(length > 0, mean / np.where(length > 0, length, 1.0), np.eye(mean.shape[1])[-1])
 
     def _clearance(self, own: csr_array, across: csr_array, weight: Array) -> Array:
-        """Return what clearances add to the mean gaps (m,), interpolated between the nodes of both sides [length]."""
+        """Return the contribution of nodal clearances on both sides to the weighted gaps (m,) [length]."""
         added = np.zeros(own.shape[0])
         for matrix, side, clearance in (
             (own, self.secondary, self.options.clearance), (across, self.primary, self.options.clearance_primary)
@@ -299,6 +320,20 @@ class WeightedMortar(Formulation):
                 values[side.points] = clearance(self.points[side.points])
                 added += matrix @ values / weight
         return added
+
+
+def _tangents(normal: Array, without_slip: list[tuple[Array, Mask]]) -> list[Array]:
+    """Return `tangents`, turned where there is no slip in some direction so that one of them is along that."""
+    found = tangents(normal)
+    if len(found) == 1 or not without_slip:
+        return found
+    held = sum(
+        np.where(nodes[:, None, None], along[:, :, None] * along[:, None, :], 0.0) for along, nodes in without_slip
+    )
+    first, mixed, second = (np.einsum("md,mde,me->m", found[a], held, found[b]) for a, b in ((0, 0), (0, 1), (1, 1)))
+    angle = 0.5 * np.arctan2(2 * mixed, first - second)[:, None]
+    turned = np.cos(angle) * found[0] + np.sin(angle) * found[1]
+    return [turned, np.cross(normal, turned)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -326,12 +361,12 @@ class WeightedPressures(NodalField):
     held: Mask
 
     def pressure(self, force: Array) -> Array:
-        """Return forces over the areas that their gaps stand for; at mid nodes without a gap, the mean of their corners."""
+        """Return forces over the areas of their gaps; at mid nodes without a gap, the mean of their corners."""
         return self._at_nodes(force / self.weight, only_without_gap=True)
 
     @property
     def covered(self) -> Array:
-        """What part of the whole areas the gaps stand for; at mid nodes without a gap, the mean of their corners."""
+        """Covered part of the nodal areas; at mid nodes without a gap, the mean of their corners."""
         usable = np.isfinite(self.weight)
         part = np.divide(self.weight, self.tested, out=np.zeros_like(self.weight), where=usable & (self.tested > 0.0))
         return self._at_nodes(part, only_without_gap=True)

@@ -1,4 +1,4 @@
-r"""Continuous contact: a pressure field on the secondary facets, contact decided at integration points.
+r"""Continuous formulation: a multiplier field on the secondary facets, contact status at integration points.
 
 The integration points stay where they are on the secondary facets; see `_pressure_field` for the equations.
 """
@@ -10,9 +10,9 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array, eye_array
 
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations._pressure_field import PressureField, PressureFieldFormulation, shapes_at
@@ -24,7 +24,6 @@ from fastcontact.contact.surface import FacetBlock
 from fastcontact.errors import ContactError, unknown
 from fastcontact.mesh import elements, quadrature
 
-Array = NDArray[np.float64]
 RULES = ("gauss", "simpson", "node")
 
 
@@ -113,7 +112,7 @@ class Continuous(PressureFieldFormulation):
             areas[np.abs(areas) < 1e-3 * areas[:, 2:]] = 0.0
         return areas.ravel()
 
-    def _determined(self, P: csr_array, areas: Array) -> tuple[csr_array, NDArray[np.intp]]:
+    def _determined(self, P: csr_array, areas: Array) -> tuple[csr_array, Indices]:
         """Return the matrix (n_nodes, k) from independent to nodal values of the field, and the nodes (k,) of the former.
 
         The identity, but for a quadratic line that ends on the axis when the points are the nodes: that end has no
@@ -146,7 +145,7 @@ class Continuous(PressureFieldFormulation):
         return part
 
     @cached_property
-    def _at_axis(self) -> NDArray[np.bool_]:
+    def _at_axis(self) -> Mask:
         """The points (m,) that are nodes on the axis: without area, but nothing else keeps those nodes apart.
 
         Not with a penalty, which acts on areas.

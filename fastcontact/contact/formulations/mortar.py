@@ -1,4 +1,4 @@
-"""Mortar contact: gaps integrated exactly over the pieces where two facets face each other.
+"""Mortar contact: gaps integrated exactly over the segments where two facets overlap.
 
 Two methods share this name. With standard multipliers in the plane contact is decided at integration points, see
 `_segment_mortar`; between faces in space, and with dual multipliers, each node has one weighted gap, see `_weighted_mortar`.
@@ -15,7 +15,7 @@ from fastcontact.contact.formulations._weighted_mortar import WeightedMortar
 
 
 class Mortar(SegmentMortar):
-    """The mortar formulation of a user; `variant` tells which method it is."""
+    """Mortar formulation as named by the user; `variant` selects the method."""
 
     @classmethod
     def variant(cls, dim: int, options: Mapping[str, Any]) -> type[Formulation]:

@@ -1,4 +1,4 @@
-"""Node-to-segment contact: every secondary node keeps off the primary facet it faces.
+"""Node-to-segment contact: no secondary node penetrates the primary facet it projects onto.
 
 One constraint per secondary node, enforced exactly; the multiplier is the nodal contact force. The pairing, the
 normal of the primary facet and the projection are held during an active-set solution (code_aster, R5.03.50,
@@ -14,9 +14,9 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse.linalg import SuperLU, splu
 
+from fastcontact.arrays import Array
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints, NodalField
 from fastcontact.contact.formulations._formulation import Formulation
@@ -26,7 +26,6 @@ from fastcontact.contact.pairing import Candidates, Pairing
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError, unknown
 
-Array = NDArray[np.float64]
 OPPOSITE = ("facet", "node")
 
 
@@ -66,7 +65,7 @@ class NodeToSegment(Formulation):
             )
 
     def facing(self, candidates: Candidates, at: Configuration, tolerance: float | None = None) -> Pairing:
-        """Return what candidates face: facets, or the primary nodes nearest to them."""
+        """Return the pairing of candidates with facets, or with the nearest primary nodes."""
         found = super().facing(candidates, at, tolerance)
         if self.opposite == "facet":
             return found

@@ -1,4 +1,4 @@
-"""Rigid obstacles: shapes that a body may touch but not enter; one file each kind.
+"""Rigid obstacles, one file each kind.
 
 An obstacle answers one question, in its own frame: how far from it is a point, and where is outside? Distances are
 signed, positive outside. Where only a height is given (paraboloid, cone, a function of position), the distance is the
@@ -14,14 +14,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
+from fastcontact.arrays import Array
 from fastcontact.contact.obstacles.meshed import MeshedSurface
 from fastcontact.contact.obstacles.shapes import Cylinder, FlatPunch, HalfSpace, Height, Sphere, cone, paraboloid
 from fastcontact.errors import no_attribute
-
-Array = NDArray[np.float64]
 
 
 class Obstacle(Protocol):

@@ -1,4 +1,4 @@
-"""The facets of a rigid surface: which side is out, who is neighbour to whom, normals where facets meet.
+"""Facets of a rigid surface: orientation, adjacency, averaged normals.
 
 Facets are numbered through blocks of one kind each. Their ridges are what two facets share: the ends of a line in two
 dimensions, the edges of a face in three.
@@ -10,17 +10,15 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
+from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 # Ridges of a facet at most: four sides of a quadrangle.
 MOST_RIDGES = 4
 
@@ -74,7 +72,7 @@ class SurfaceFacets(NamedTuple):
     normals: list[Array]  # (n, k, dim) for each block: unit normals at the nodes [-]
     smooth: list[Array]  # the same, of the smooth surface [-]
     at_points: Array  # (n_points, dim): normals of points [-]
-    on_border: NDArray[np.bool_]  # (n_points,): whether the surface ends there
+    on_border: Mask  # (n_points,): whether the surface ends there
 
 
 def surface_facets(mesh: Mesh, group: str, flip: bool, crease: float) -> SurfaceFacets:
@@ -126,7 +124,7 @@ def _oriented_blocks(mesh: Mesh, group: str, flip: bool) -> list[Block]:
     return blocks
 
 
-def _out_of_solids(nodes: NDArray[np.int32], outer: NDArray[np.int32] | None) -> NDArray[np.int32]:
+def _out_of_solids(nodes: Numbers, outer: Numbers | None) -> Numbers:
     """Return facets with those that are among `outer` replaced by it."""
     if outer is None:
         return nodes
@@ -140,7 +138,7 @@ def _out_of_solids(nodes: NDArray[np.int32], outer: NDArray[np.int32] | None) ->
 
 
 def _described(blocks: list[Block], facet: int) -> str:
-    """Return number, kind and place of a facet, in words."""
+    """Return number, kind and position of a facet, in words."""
     for block in blocks:
         if facet < len(block.nodes):
             break
@@ -188,9 +186,7 @@ def _ridge_table(blocks: list[Block]) -> tuple[Indices, Indices, Indices, Indice
     return np.concatenate(facets), np.concatenate(ridges), np.concatenate(keys), np.concatenate(signs)
 
 
-def _check_orientation(
-    blocks: list[Block], group: str, one: Indices, other: Indices, consistent: NDArray[np.bool_]
-) -> None:
+def _check_orientation(blocks: list[Block], group: str, one: Indices, other: Indices, consistent: Mask) -> None:
     """Refuse neighbours that look to different sides, naming a facet of the smaller part."""
     if consistent.all():
         return

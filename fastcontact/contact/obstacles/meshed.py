@@ -5,16 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.obstacles._facets import Block, SurfaceFacets, surface_facets
 from fastcontact.contact.search.closest import Closest, closest_of_kinds
 from fastcontact.errors import ContactError
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 # Reference coordinates of a projection nearer than this to a side of its facet lie on it.
 ON_SIDE = 1e-12
@@ -121,7 +118,7 @@ class MeshedSurface:
         nothing = on_border & (aside > BEYOND * size) & (aside > LEAN * height)
         return np.where(nothing, np.inf, distance), normal
 
-    def _frames(self, found: Closest) -> tuple[Array, Array, NDArray[np.bool_], NDArray[np.bool_]]:
+    def _frames(self, found: Closest) -> tuple[Array, Array, Mask, Mask]:
         """Return, at projections, a vector that tells in from out (n, dim), smooth normals, what is on a ridge or border.
 
         Inside a facet its normal tells; on an edge the mean of the facets that meet there, at a corner that of all

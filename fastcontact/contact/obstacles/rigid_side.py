@@ -6,19 +6,16 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import REFUSAL, Array, Mask, Numbers, is_masked
 from fastcontact.contact.obstacles import Obstacle
 from fastcontact.contact.obstacles.rotation import Rotation
 from fastcontact.errors import ContactError
-from fastcontact.masks import REFUSAL, is_masked
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class Stance:
-    """Where a rigid obstacle stands.
+    """Position and rotation of a rigid obstacle.
 
     Attributes
     ----------
@@ -34,18 +31,18 @@ class Stance:
 
 @dataclass(frozen=True, eq=False)
 class RigidSide:
-    """A rigid obstacle that may move and turn; where it stands is part of the configuration."""
+    """A rigid obstacle that may translate and rotate; its position is part of the configuration."""
 
     obstacle: Obstacle  # where it stands at rest
     motion: Array  # (dim,): its displacement where the multiplier of its history is 1 [length]
     rotation: Rotation | None = None
 
     @property
-    def points(self) -> NDArray[np.int32]:
+    def points(self) -> Numbers:
         """The nodes of the side (0,): none."""
         return np.empty(0, np.int32)
 
-    def facing(self, positions: Array, at: Stance) -> tuple[Array, Array, NDArray[np.bool_], Array]:
+    def facing(self, positions: Array, at: Stance) -> tuple[Array, Array, Mask, Array]:
         """Return (gap, normal, paired, offset) of points at `positions` (n, dim) [length].
 
         Near there the gap is ``offset + normal . x``.

@@ -7,12 +7,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fastcontact.arrays import Array
 from fastcontact.errors import ContactError
 from fastcontact.mesh.argument_types import typed
-
-Array = NDArray[np.float64]
 
 
 def _positive(**values: float) -> None:

@@ -9,13 +9,12 @@ power of two by empty boxes, which are infinitely far from every point.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._jit.decorators import inlined_kernel, kernel
+from fastcontact.arrays import Array
 
 # Room for the boxes that a search has still to open; a squared distance that no facet exceeds.
 DEPTH, FAR = 64, 1e300
-Array = NDArray[np.float64]
 
 
 class Tree(NamedTuple):

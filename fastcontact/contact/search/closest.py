@@ -6,16 +6,14 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._jit.parallel import portions, shared
+from fastcontact.arrays import Array, Indices
 from fastcontact.contact.search import facets_3d_kernels, search_2d_kernels, search_3d_kernels
 from fastcontact.contact.search.box_tree_kernels import build, tree_order
 from fastcontact.contact.search.facet_tables import flat_triangles, tables
 from fastcontact.contact.search.projection_3d_kernels import Domain, Facets
 from fastcontact.errors import ContactError
-
-Array = NDArray[np.float64]
 
 # So many points that follow each other in the order of the search need not be sorted among themselves.
 TOGETHER = 16
@@ -27,7 +25,7 @@ class Closest(NamedTuple):
     Normals point to the right of a line's direction, and to the side from which a face's nodes run counter-clockwise.
     """
 
-    facet: NDArray[np.intp]  # (n,): row of the facet; of equally close ones the first
+    facet: Indices  # (n,): row of the facet; of equally close ones the first
     xi: Array  # (n, dim - 1): reference coordinates of the projection [-]
     normal: Array  # (n, dim): unit normal of the facet there [-]
     overhang: Array  # (n,): how far the point stands out beyond the end of its facet, in facet lengths; 0 within [-]
@@ -95,7 +93,7 @@ def _on_faces(points: Array, corners: Array, found: Closest) -> None:
     )
 
 
-def _refuse(points: Array, facet: NDArray[np.intp], corners: Array) -> None:
+def _refuse(points: Array, facet: Indices, corners: Array) -> None:
     """Raise ContactError for points whose projection failed."""
     if facet[0] < 0:
         raise ContactError(

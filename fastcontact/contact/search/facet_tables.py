@@ -10,12 +10,10 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements
-
-Array = NDArray[np.float64]
 
 _NAMES = {3: "tri3", 4: "quad4", 6: "tri6", 8: "quad8", 9: "quad9"}
 _TRIANGLE_SIDES = np.array([[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [1.0, 1.0, 1.0]])
@@ -60,7 +58,7 @@ def tables(n_nodes: int) -> Tables:
     return Tables(nodes, sides, to_terms, weights)
 
 
-def flat_triangles(n_nodes: int) -> NDArray[np.intp]:
+def flat_triangles(n_nodes: int) -> Indices:
     """Return the flat triangles (n, 3) between the nodes of a facet in 3D, normals as those of the facet."""
     return np.array(_FLAT[n_nodes])
 

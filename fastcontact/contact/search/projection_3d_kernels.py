@@ -8,15 +8,14 @@ A facet is a polynomial with coefficients ``terms`` (n_facets, m, 3) of the term
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._jit.decorators import inlined_kernel, kernel
+from fastcontact.arrays import Array, Indices
 from fastcontact.contact.search.straight_3d_kernels import ON_SIDE, cross, dot, minus, on_flat, rest, unit
 
 # Steps in reference coordinates below which a projection has converged.
 STEP = 1e-13
 MAX_ITERATIONS = 100
-Array = NDArray[np.float64]
 
 
 class Facets(NamedTuple):
@@ -37,7 +36,7 @@ class Domain(NamedTuple):
     """Reference nodes (m, 2), flat triangles between them (n_triangles, 3), and sides (n_sides, 3) of facets of a kind."""
 
     nodes: Array
-    triangles: NDArray[np.intp]
+    triangles: Indices
     sides: Array
 
 

@@ -11,15 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact._jit.decorators import inlined_kernel, kernel
+from fastcontact.arrays import Array, Mask, Numbers
 
-Indices = NDArray[np.int32]
 Offsets = NDArray[np.int64]
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 @kernel
-def parents(start: Indices, rows: Indices, parent: Indices) -> None:
+def parents(start: Numbers, rows: Numbers, parent: Numbers) -> None:
     """Fill `parent` (n,) with the elimination tree."""
     n = len(parent)
     ancestor = np.full(n, -1, np.int32)  # like the parent, but on a shorter way to the root
@@ -36,7 +34,7 @@ def parents(start: Indices, rows: Indices, parent: Indices) -> None:
 
 
 @kernel
-def postordered(parent: Indices, order: Indices) -> None:
+def postordered(parent: Numbers, order: Numbers) -> None:
     """Fill `order` (n,) with the columns so that every subtree stands together, children before their parent."""
     n, count = len(parent), 0
     first, beside, stack = np.full(n, -1, np.int32), np.full(n, -1, np.int32), np.empty(n, np.int32)
@@ -61,7 +59,7 @@ def postordered(parent: Indices, order: Indices) -> None:
 
 
 @kernel
-def counts(start: Indices, rows: Indices, parent: Indices, order: Indices, count: Indices) -> None:
+def counts(start: Numbers, rows: Numbers, parent: Numbers, order: Numbers, count: Numbers) -> None:
     """Fill `count` (n,) with the entries of each column of the factor, the diagonal included.
 
     `order` (n,) is that of `postordered`. By the leaves of row subtrees (Gilbert, Ng and Peyton, 1994).
@@ -97,7 +95,7 @@ def counts(start: Indices, rows: Indices, parent: Indices, order: Indices, count
 
 
 @inlined_kernel
-def _common(j: int, ancestor: Indices) -> int:
+def _common(j: int, ancestor: Numbers) -> int:
     """Return the root of the set that j belongs to; the way there is shortened."""
     root = j
     while root != ancestor[root]:
@@ -111,7 +109,7 @@ def _common(j: int, ancestor: Indices) -> int:
 
 @kernel
 def supernodes(
-    parent: Indices, count: Indices, given: Mask, widths: Offsets, shares: Array, first: Offsets, below: Offsets
+    parent: Numbers, count: Numbers, given: Mask, widths: Offsets, shares: Array, first: Offsets, below: Offsets
 ) -> int:
     """Find runs of columns with the same rows below them, or nearly so; return how many.
 
@@ -146,7 +144,7 @@ def supernodes(
 
 @inlined_kernel
 def _joined(
-    parent: Indices, given: Mask, widths: Offsets, shares: Array, first: Offsets, below: Offsets, entries: Offsets,
+    parent: Numbers, given: Mask, widths: Offsets, shares: Array, first: Offsets, below: Offsets, entries: Offsets,
     top: int, end: int,
 ) -> int:  # fmt: skip
     """Join the run `top`, which ends before column `end`, with those just before it while that adds few zeros."""
@@ -166,8 +164,8 @@ def _joined(
 
 @kernel
 def rows_below(
-    start: Indices, rows: Indices, order: Indices, place: Indices, parent: Indices, first: Offsets, begin: Offsets,
-    found: Indices,
+    start: Numbers, rows: Numbers, order: Numbers, place: Numbers, parent: Numbers, first: Offsets, begin: Offsets,
+    found: Numbers,
 ) -> None:  # fmt: skip
     """Fill `found` with the rows of each run of columns below it, ascending; those of run s begin at ``begin[s]``.
 

@@ -10,11 +10,11 @@ from scipy.sparse import bsr_array, csc_array, eye_array
 from scipy.sparse.linalg import spilu
 
 from fastcontact._jit.parallel import on_one_blas_thread
+from fastcontact.arrays import Indices, Mask, Numbers
 from fastcontact.errors import ModelError
 from fastcontact.linear.cholesky import elimination_tree_kernels, factorisation_kernels
 from fastcontact.linear.cholesky.symmetric_factors import LowerTriangle, SymmetricFactors
 
-Indices = NDArray[np.intp]
 # Zeros that supernodes may take in so that there are fewer of them, as shares of their entries, by their width.
 WIDTHS, SHARES = np.array([4, 16, 48]), np.array([0.8, 0.5, 0.1, 0.05])
 # Pivots that are smaller than this in units of what was on the diagonal are round-off.
@@ -88,10 +88,10 @@ def factors(K: bsr_array, last: Indices) -> SymmetricFactors:
 class Tree(NamedTuple):
     """Elimination tree: its order, the inverse of that, and parents and entries of columns in this order, all (n,)."""
 
-    order: NDArray[np.int32]
-    place: NDArray[np.int32]
-    parent: NDArray[np.int32]
-    entries: NDArray[np.int32]
+    order: Numbers
+    place: Numbers
+    parent: Numbers
+    entries: Numbers
 
 
 class Supernodes(NamedTuple):
@@ -99,7 +99,7 @@ class Supernodes(NamedTuple):
 
     first: NDArray[np.int64]
     begin: NDArray[np.int64]
-    rows: NDArray[np.int32]
+    rows: Numbers
 
 
 def elimination_tree(A: csc_array) -> Tree:
@@ -114,7 +114,7 @@ def elimination_tree(A: csc_array) -> Tree:
     return Tree(order, place, np.where(above < 0, np.intc(-1), place[above]), count[order])
 
 
-def supernodes(A: csc_array, tree: Tree, late: NDArray[np.bool_]) -> Supernodes:
+def supernodes(A: csc_array, tree: Tree, late: Mask) -> Supernodes:
     """Return the supernodes of A (n, n), none of which has both columns that are `late` (n,) and others."""
     n = A.shape[0]
     first, below = np.empty(n + 1, np.int64), np.empty(n + 1, np.int64)

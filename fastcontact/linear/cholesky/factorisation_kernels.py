@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact._jit.decorators import inlined_kernel, kernel
+from fastcontact.arrays import Array, Numbers
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int32]
 Offsets = NDArray[np.int64]
 
 # Columns that are eliminated together, and rows of what they change that are computed together.
@@ -24,7 +23,7 @@ SMALL = 20_000
 
 
 @kernel
-def room(parent: Indices, first: Offsets, begin: Offsets) -> tuple[int, int]:
+def room(parent: Numbers, first: Offsets, begin: Offsets) -> tuple[int, int]:
     """Return the entries of the largest front, and those that fronts leave at most at a time."""
     count = len(first) - 1
     front = most = used = top = 0
@@ -45,8 +44,8 @@ def room(parent: Indices, first: Offsets, begin: Offsets) -> tuple[int, int]:
 
 @kernel
 def factorise(
-    start: Indices, rows: Indices, values: Array, order: Indices, place: Indices, parent: Indices, first: Offsets,
-    begin: Offsets, below: Indices, sizes: tuple[int, int], begins: Offsets, L: Array, d: Array,
+    start: Numbers, rows: Numbers, values: Array, order: Numbers, place: Numbers, parent: Numbers, first: Offsets,
+    begin: Offsets, below: Numbers, sizes: tuple[int, int], begins: Offsets, L: Array, d: Array,
 ) -> int:  # fmt: skip
     """Fill L and `d` (n,); return the first column whose pivot, then in `d`, is not positive, or -1.
 
@@ -105,7 +104,7 @@ def factorise(
 
 @kernel
 def _gather(
-    start: Indices, rows: Indices, values: Array, order: Indices, place: Indices, low: int, high: int, rest: Indices,
+    start: Numbers, rows: Numbers, values: Array, order: Numbers, place: Numbers, low: int, high: int, rest: Numbers,
     local: Offsets, F: Array,
 ) -> None:  # fmt: skip
     """Fill a front with the columns `low` to ``high - 1`` of the matrix, and `local` with the places of its rows."""
@@ -138,7 +137,7 @@ def _store(F: Array, low: int, width: int, begins: Offsets, L: Array, d: Array, 
 
 
 @kernel
-def _add(rest: Array, rows: Indices, local: Offsets, F: Array) -> None:
+def _add(rest: Array, rows: Numbers, local: Offsets, F: Array) -> None:
     """Add what a front left for its `rows` (m,) to the front above."""
     m = len(rows)
     for i in range(m):

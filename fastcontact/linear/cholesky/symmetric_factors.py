@@ -9,10 +9,8 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dpotri
 
 from fastcontact._jit.parallel import on_one_blas_thread
+from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.linear.cholesky import triangular_kernels
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 
 class LowerTriangle(NamedTuple):
@@ -22,7 +20,7 @@ class LowerTriangle(NamedTuple):
     values: Array
     first: NDArray[np.int64]
     begin: NDArray[np.int64]
-    rows: NDArray[np.int32]
+    rows: Numbers
 
 
 class SymmetricFactors:

@@ -12,15 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact._jit.decorators import kernel, summing_kernel
+from fastcontact.arrays import Array, Mask, Numbers
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int32]
 Offsets = NDArray[np.int64]
 
 
 @kernel
 def block(
-    start: Offsets, values: Array, first: Offsets, begin: Offsets, rows: Indices, wanted: Offsets, out: Array
+    start: Offsets, values: Array, first: Offsets, begin: Offsets, rows: Numbers, wanted: Offsets, out: Array
 ) -> None:
     """Fill `out` (m, m), zero before, with the rows and columns of L that `wanted` (n,) numbers; it is -1 for the others."""
     for s in range(len(first) - 1):
@@ -37,7 +36,7 @@ def block(
 
 
 @kernel
-def forward(start: Offsets, values: Array, first: Offsets, begin: Offsets, rows: Indices, x: Array) -> None:
+def forward(start: Offsets, values: Array, first: Offsets, begin: Offsets, rows: Numbers, x: Array) -> None:
     """Replace x (n,) by ``L^-1 x``."""
     moved = np.empty(len(x))
     for s in range(len(first) - 1):
@@ -63,7 +62,7 @@ def forward(start: Offsets, values: Array, first: Offsets, begin: Offsets, rows:
 
 @summing_kernel
 def backward(
-    start: Offsets, values: Array, first: Offsets, begin: Offsets, rows: Indices, given: NDArray[np.bool_], x: Array
+    start: Offsets, values: Array, first: Offsets, begin: Offsets, rows: Numbers, given: Mask, x: Array
 ) -> None:
     """Replace x (n,) by the solution of ``L.T y = x`` in which the entries `given` (n,) keep their values.
 

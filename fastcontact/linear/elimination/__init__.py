@@ -1,1 +1,1 @@
-"""Linear equations among unknowns, eliminated: which unknown each equation eliminates, and what that does to vectors."""
+"""Elimination of linear constraints: choice of pivots, and the transformation of vectors."""

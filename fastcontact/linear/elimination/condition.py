@@ -1,4 +1,4 @@
-"""How ill conditioned a factorised matrix is, from a few solutions with its factors.
+"""Condition estimate of a factorised matrix from a few solutions.
 
 The diagonal of triangular factors does not tell: that of two equal rows among many may be as large as the others'.
 """
@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-Array = NDArray[np.float64]
+from fastcontact.arrays import Array
+
 Apply = Callable[[Array], Array]
 # Steps of the estimate; two or three are the rule.
 STEPS = 5

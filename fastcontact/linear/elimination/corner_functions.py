@@ -1,4 +1,4 @@
-"""Equations of the corners of quadratic facets, eliminated along functions that are linear on facets.
+"""Basis transformation on quadratic facets: constraints at corners eliminated along facet-wise linear functions.
 
 Gaps that are weighted with such functions, those of standard mortar multipliers, have next to no entries of their own at
 corners: the integral of a corner's quadratic function is none on triangles, and negative on quadrangles. With nodal pivots
@@ -12,16 +12,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.linear.elimination import elimination_kernels, pivot_order
 from fastcontact.linear.elimination.coupled_pivots import CoupledPivots
 from fastcontact.linear.elimination.elimination import Elimination, eliminate
 from fastcontact.linear.sparse_rows import scaled
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +50,7 @@ class CornerElimination(Elimination):
             x[self.pivots] += offset
 
     def move_forces(self, r: Array) -> None:
-        """See `Elimination.move_forces`: what is left does no work along the corners' functions."""
+        """See `Elimination.move_forces`: the remainder does no work along the corner functions."""
         W = self.force_weights
         elimination_kernels.add_rows(W.indptr, W.indices, W.data, self.multiplier(r[self.pivots]), r)
 
@@ -64,7 +61,7 @@ class CornerElimination(Elimination):
         r[self.pivots] = forces
 
     def full_weights(self) -> csr_array:
-        """See `Elimination.full_weights`: what becomes of the pivots (q, n)."""
+        """See `Elimination.full_weights`."""
         inverse = self.own_inverse if self.coupled is None else csr_array(self.coupled.solve(np.eye(len(self.corners))))
         assert inverse is not None
         return self._following(inverse, self.weights)
@@ -122,7 +119,7 @@ def eliminate_corners(
     Raises
     ------
     RepeatedError
-        If equations repeat each other.
+        If constraints are linearly dependent.
     """
     B, n = csr_array(B, copy=True), B.shape[1]
     B.eliminate_zeros()

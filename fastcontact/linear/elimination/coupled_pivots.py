@@ -1,4 +1,4 @@
-"""The columns of pivots inverted: small independent blocks, or a factorisation where equations of many nodes are coupled.
+"""Inverse of the pivot columns: small independent blocks, or a factorisation where constraints of many nodes are coupled.
 
 Gaps weighted with standard multipliers are coupled by a mass matrix of the secondary surface, whose inverse is full. Its
 factors are not: a solution costs next to nothing beside a product with the stiffness. Preconditioners need sparse weights
@@ -8,17 +8,15 @@ and take a sparse inverse instead, that of one block a node which does the same 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array, csr_array
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.elimination.condition import condition
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
-# Equations whose inverse is larger, in units of their entries, repeat each other but for round-off.
+# Constraints whose inverse is larger, in units of their entries, are linearly dependent up to round-off.
 SINGULAR = 1e12
 # Coupled columns with a larger condition number suit no elimination: errors would grow.
 ILL_CONDITIONED = 1e6
@@ -27,12 +25,12 @@ LUMPED = 0.3
 
 
 class RepeatedError(ConvergenceError):
-    """Equations repeat each other."""
+    """Constraints are linearly dependent."""
 
     def __init__(self) -> None:
         super().__init__(
-            "active contact constraints repeat each other, so that an iterative solver cannot eliminate them: leave out one "
-            "of two contacts on the same nodes, or use the direct solver"
+            "active contact constraints are linearly dependent, so that an iterative solver cannot eliminate them: leave out "
+            "one of two contacts on the same nodes, or use the direct solver"
         )
 
 

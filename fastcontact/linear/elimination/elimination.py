@@ -1,18 +1,15 @@
-"""Elimination of linear equations ``B u = c``: one unknown of each is a weighted sum of others plus an offset."""
+"""Elimination of linear constraints ``B u = c``: each pivot is a weighted sum of other unknowns plus an offset."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.linear.elimination import elimination_kernels, pivot_order
 from fastcontact.linear.elimination.coupled_pivots import CoupledPivots
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +46,7 @@ class Elimination:
     compliance: Array | None = None
 
     def shifted(self, c: Array) -> Array:
-        """Return how far the pivots (m,) move if the equations' right-hand sides rise by c (m,)."""
+        """Return the change of the pivots (m,) for a change c (m,) of the right-hand sides."""
         if self.coupled is not None:
             return self.coupled.solve(c)
         assert self.own_inverse is not None
@@ -116,7 +113,7 @@ def eliminate(
     Raises
     ------
     RepeatedError
-        If equations repeat each other, so that there is no unknown to eliminate for each.
+        If constraints are linearly dependent, so that there is no pivot for each.
     """
     B = csr_array(B, copy=True)
     if not B.has_canonical_format:

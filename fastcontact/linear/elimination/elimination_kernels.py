@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Eliminated unknowns in long vectors. Pivots follow ``x[pivots] = W x``, W in compressed rows that may involve pivots."""
+"""Eliminated unknowns in long vectors: ``x[pivots] = W x``, W in compressed rows that may involve pivots."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What iterative solvers share: a right-hand side solved for under equations, eliminated where they can be."""
+"""Common part of iterative solvers: solution under linear constraints, eliminated where possible."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import logging
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.linear.elimination.corner_functions import eliminated
 from fastcontact.linear.elimination.pivot_order import RepeatedError
 from fastcontact.linear.field_compliance import FieldCompliance
@@ -17,7 +17,6 @@ from fastcontact.linear.flexibility import multipliers
 from fastcontact.linear.protocol import Monitor
 
 log = logging.getLogger("fastcontact")
-Array = NDArray[np.float64]
 
 
 class LoadedIteration:
@@ -48,9 +47,9 @@ class LoadedIteration:
 
     def solve(
         self, B: csr_array, c: Array, C: Array | FieldCompliance | None = None, guess: Array | None = None,
-        monitor: Monitor | None = None, tolerance: float | None = None, nodes: NDArray[np.intp] | None = None,
+        monitor: Monitor | None = None, tolerance: float | None = None, nodes: Indices | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
-        """See `Loaded`: equations that repeat each other or have a compliance go through columns of K^-1."""
+        """See `Loaded`: linearly dependent constraints, and those with a compliance, go through columns of K^-1."""
         solver = self._solver
         if C is None or not B.shape[0]:
             try:

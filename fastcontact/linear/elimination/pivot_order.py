@@ -1,4 +1,4 @@
-"""Which unknown each equation eliminates, and the inverse of the columns of these pivots.
+"""Choice of the pivot of each constraint, and the inverse of the pivot columns.
 
 Six ways, the first that succeeds: every equation has an unknown that no other equation has; the equations of a node have
 unknowns that those of no other node have; layers of equations, each with an unknown that no later layer has; layers of nodes,
@@ -11,16 +11,13 @@ unknowns otherwise, factorised (`coupled_pivots`).
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import qr
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.csgraph import connected_components, min_weight_full_bipartite_matching
 
+from fastcontact.arrays import Indices, Mask
 from fastcontact.linear.elimination.coupled_pivots import CoupledError, CoupledPivots, RepeatedError, block_inverse
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 # An unknown is taken as pivot where its entry is at least this part of the largest one of the equation.
 SMALLEST = 0.25
 # Up to so many equations that share unknowns are inverted as a block; and where factors do not suit them.
@@ -51,7 +48,7 @@ def chosen(B: csr_array, nodes: Indices | None = None, size: int = 1) -> tuple[I
     Raises
     ------
     RepeatedError
-        If equations repeat each other.
+        If constraints are linearly dependent.
     """
     if not B.shape[0]:
         return np.empty(0, np.intp), csr_array((0, 0))

@@ -1,1 +1,1 @@
-"""What all direct solvers share: right-hand sides and equations by the factors of the matrix."""
+"""Common part of direct solvers: right-hand sides and constraints by the factors of the matrix."""

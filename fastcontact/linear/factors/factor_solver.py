@@ -1,14 +1,15 @@
-"""What direct solvers share: right-hand sides by factors of K, equations by columns of K^-1."""
+"""Common part of direct solvers: right-hand sides by factors of K, constraints by the Schur complement."""
 
 from __future__ import annotations
 
 import logging
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csc_array, csr_array
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.linear.cholesky.symmetric_factors import SymmetricFactors
 from fastcontact.linear.factors.known_loads import KnownLoads
 from fastcontact.linear.field_compliance import FieldCompliance
@@ -16,8 +17,6 @@ from fastcontact.linear.flexibility import FlexibilityColumns, check_rows, multi
 from fastcontact.linear.protocol import Counters, LinearSolver, Monitor
 
 log = logging.getLogger("fastcontact")
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 # Beyond this many unknowns last, their dense block costs more than the solutions it saves.
 LAST_UP_TO = 4000
 ROUND_OFF = 1e-14
@@ -111,28 +110,19 @@ class FactorSolver(LinearSolver):
         """Return the prepared matrix with right-hand side `f` (n,)."""
         return LoadedFactor(self, f, self.known_loads.solution(f, self.back_substitute))
 
-    def snapshot(self) -> Any:
-        """See `LinearSolver.snapshot`."""
-        return self.known_loads.snapshot()
-
-    def put_back(self, snapshot: Any) -> None:
-        """See `LinearSolver.put_back`."""
-        if snapshot is not None:
-            self.known_loads.put_back(snapshot)
-
-    def memory(self) -> dict[str, Any]:
-        """See `LinearSolver.memory`: columns of ``K^-1`` asked for, and right-hand sides that others are made of."""
-        kept = {"asked": list(self.columns.asked), "loads": self.known_loads.memory()}
+    def snapshot(self) -> dict[str, Any]:
+        """See `LinearSolver.snapshot`: columns of ``K^-1`` computed so far, and stored right-hand sides."""
+        kept = {"asked": list(self.columns.asked), "loads": self.known_loads.snapshot()}
         return {**kept, "refines": True} if self.refines else kept
 
-    def remember(self, memory: dict[str, Any]) -> None:
-        """See `LinearSolver.remember`."""
-        self.refines = memory.get("refines", False)
-        self.columns.ask_again(memory["asked"])
-        self.known_loads.remember(memory["loads"], self.n, self._solution)
+    def put_back(self, snapshot: Mapping[str, Any]) -> None:
+        """See `LinearSolver.put_back`."""
+        self.refines = snapshot.get("refines", False)
+        self.columns.put_back(snapshot["asked"])
+        self.known_loads.put_back(snapshot["loads"], self.n, self._solution)
 
     def improve(self, excess: float) -> bool:
-        """See `LinearSolver.improve`: correct later solutions once by what they leave out of balance."""
+        """See `LinearSolver.improve`: one step of iterative refinement for later solutions."""
         if self.refines:
             return False
         log.info(
@@ -166,7 +156,7 @@ class LoadedFactor:
 
     def solve(
         self, B: csr_array, c: Array, C: Array | FieldCompliance | None = None, guess: Array | None = None,
-        monitor: Monitor | None = None, tolerance: float | None = None, nodes: NDArray[np.intp] | None = None,
+        monitor: Monitor | None = None, tolerance: float | None = None, nodes: Indices | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         """See `Loaded`."""
         if B.shape[0] == 0:
@@ -225,7 +215,7 @@ class CondensedProblem:
 
     def solve(
         self, B: csr_array, c: Array, C: Array | FieldCompliance | None = None, guess: Array | None = None,
-        monitor: Monitor | None = None, tolerance: float | None = None, nodes: NDArray[np.intp] | None = None,
+        monitor: Monitor | None = None, tolerance: float | None = None, nodes: Indices | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         """See `Loaded`."""
         if B.shape[0] == 0:

@@ -1,14 +1,14 @@
-"""Solutions for right-hand sides that a load ramp combines from a few."""
+"""Reuse of solutions for right-hand sides that are linear combinations of earlier ones."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from fastcontact.arrays import Array
+
 # Right-hand sides kept: loads and supports have seldom more ramps.
 KEPT = 4
 # What a combination may miss of a right-hand side, in 2-norms: its round-off.
@@ -16,7 +16,7 @@ MISSED = 16 * np.finfo(float).eps
 
 
 class KnownLoads:
-    """Keeps the last right-hand sides and their solutions; combines them where that is exact to round-off."""
+    """Stores the last right-hand sides and solutions, and combines them where that is exact to round-off."""
 
     def __init__(self) -> None:
         self._loads: list[Array] = []
@@ -36,7 +36,7 @@ class KnownLoads:
         return size * u
 
     def _projected(self, f: Array) -> tuple[Array, Array]:
-        """Return the weights of the loads kept that come closest to f, and what they leave of it (n,)."""
+        """Return the least-squares weights of the stored loads for f, and the remainder (n,)."""
         weights, left = np.zeros(len(self._loads)), f
         if self._loads:
             gram = np.array([[one @ other for other in self._loads] for one in self._loads])
@@ -48,22 +48,17 @@ class KnownLoads:
     def _keep(self, f: Array, u: Array) -> None:
         self._loads, self._solutions = [*self._loads[1 - KEPT :], f], [*self._solutions[1 - KEPT :], u]
 
-    def snapshot(self) -> tuple[list[Array], list[Array]]:
-        """Return what is kept now, for `put_back`; arrays are replaced, never written into."""
-        return self._loads, self._solutions
-
-    def put_back(self, snapshot: tuple[list[Array], list[Array]]) -> None:
-        """Keep again what was kept when the snapshot was taken."""
-        self._loads, self._solutions = snapshot
-
-    def memory(self) -> list[dict[str, Array | NDArray[np.intp]]]:
+    def snapshot(self) -> list[dict[str, Any]]:
         """Return the right-hand sides kept, few of whose entries are not zero: ``places`` and ``values``."""
         places = [np.flatnonzero(f) for f in self._loads]
         return [{"places": at, "values": f[at]} for at, f in zip(places, self._loads, strict=True)]
 
-    def remember(self, memory: Sequence[dict[str, Any]], n: int, solve: Callable[[Array], Array]) -> None:
-        """Take the `memory` of others for the same matrix (n, n); see `solution` for `solve`."""
-        for kept in memory:
+    def put_back(self, snapshot: Sequence[Mapping[str, Any]], n: int, solve: Callable[[Array], Array]) -> None:
+        """Keep what was kept at a `snapshot`, for the same matrix (n, n); solve only for what is not kept now."""
+        now = list(zip(self._loads, self._solutions, strict=True))
+        self._loads, self._solutions = [], []
+        for kept in snapshot:
             f = np.zeros(n)
             f[kept["places"]] = kept["values"]
-            self._keep(f, solve(f))
+            known = [u for load, u in now if np.array_equal(load, f)]
+            self._keep(f, known[0] if known else solve(f))

@@ -10,11 +10,10 @@ from collections import deque
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.linear.krylov import krylov_kernels
 
-Array = NDArray[np.float64]
 # ``multiply(p, q)`` fills q (n,) with ``A p``; ``precondition(r, norm, z)`` fills z (n,) with an approximation of ``A^-1 r``,
 # given the 2-norm of r.
 Multiply = Callable[[Array, Array], None]
@@ -150,7 +149,7 @@ class ConjugateResiduals(Iteration):
         return True
 
     def _keep(self, z: Array, q: Array, size: float) -> None:
-        """Keep a direction and its image, of the norm `size`, in the place of the oldest one where there is no room."""
+        """Store a direction and its image, of norm `size`, replacing the oldest one when full."""
         if len(self._kept) >= self._room:
             pair = self._kept.popleft()
         else:

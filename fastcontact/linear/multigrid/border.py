@@ -1,4 +1,4 @@
-"""Equations ``B u + C multiplier = c`` that give way together, beside those eliminated: unknowns of their own.
+"""Saddle-point system of constraints ``B u + C multiplier = c`` that are not eliminated.
 
 The matrix of displacements and multipliers, ``[A, -B.T; B, C]``, is bordered and not positive definite. Conjugate residuals
 solve it, preconditioned by its lower triangle: multigrid for A, and for the multipliers ``C + B D^-1 B.T``, D the diagonal of
@@ -10,16 +10,15 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array, diags_array
 from scipy.sparse.linalg import splu
 
+from fastcontact.arrays import Array
 from fastcontact.linear.krylov.iterations import Multiply, Precondition
 
-Array = NDArray[np.float64]
 # By how much displacements give way more than the diagonal of their matrix says.
 SOFTER = 2.0
-# Part of what they have by themselves that is added to multipliers in the preconditioner: some equations repeat each other.
+# Part of what they have by themselves that is added to multipliers in the preconditioner: some are linearly dependent.
 REPEATED = 1e-10
 
 
@@ -40,7 +39,7 @@ class Border:
         return len(self.right)
 
     def prepare(self, diagonal: Array) -> None:
-        """Factorise what preconditions the multipliers, given the diagonal (n,) of A [force / length]."""
+        """Factorise the preconditioner of the multipliers, given the diagonal (n,) of A [force / length]."""
         yielding = np.divide(1.0, diagonal, out=np.zeros(len(diagonal)), where=diagonal > 0.0)
         S = self.compliance + SOFTER * (self.rows @ diags_array(yielding) @ self.rows.T)
         own = S.diagonal()

@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import splu
 
+from fastcontact.arrays import AnyArray
 from fastcontact.linear.multigrid import cycle_kernels
 
-Values = NDArray[Any]
 # A dense factor of more unknowns costs more than a sparse one.
 DENSE_UP_TO = 1500
 
@@ -32,7 +31,7 @@ class Coarse:
     def __init__(self, A: csc_array) -> None:
         self.n, self.matrix = A.shape[0], A
         self._lu: Any = None
-        self._factor: Values = np.empty((0, 0))
+        self._factor: AnyArray = np.empty((0, 0))
         self._reciprocal, self._work = np.empty(self.n), np.empty(self.n)
         self._changed = True
         self.set(None)
@@ -59,7 +58,7 @@ class Coarse:
         K = diags_array(kept) @ A @ diags_array(kept) + diags_array(1.0 - kept)
         self._lu = splu(csc_array(K), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
 
-    def solve(self, b: Values, x: Values) -> None:
+    def solve(self, b: AnyArray, x: AnyArray) -> None:
         """Fill `x` with the solution for the right-hand side `b`, both (n,)."""
         if self._lu is None:
             cycle_kernels.solve_dense(self._factor, self._reciprocal, b, self._work, x)

@@ -1,4 +1,4 @@
-"""A multigrid hierarchy under eliminated equations: local changes of its levels, made and taken back.
+"""Multigrid hierarchy under eliminated constraints: local updates of its levels, applied and undone.
 
 The prolongators stay those without equations, except for the rows of the eliminated unknowns, the pivots. Only Galerkin
 products near the pivots change. The changes are stored beside the matrices of the levels, which stay as they are. On the
@@ -10,12 +10,11 @@ displacements, which coarser levels correct, they are far stiffer than the bodie
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
+from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.multigrid import cycle_kernels
 from fastcontact.linear.multigrid.hierarchy import Hierarchy, Level
@@ -25,9 +24,6 @@ from fastcontact.linear.multigrid.stiffened_nodes import FreeMotions, composed, 
 from fastcontact.linear.multigrid.symmetric_change import SymmetricChange
 from fastcontact.linear.springs import Springs
 
-Array = NDArray[np.float64]
-Values = NDArray[Any]
-Nodes = NDArray[np.intp]
 # By how much equations may stiffen a node, beside its own stiffness, before the finest spectrum is estimated again.
 SPECTRUM_CHANGED = 2.0
 # Largest eigenvalue of the finest level, beside its diagonal, from which it counts as wide; 3 to 4 on well-shaped hexahedra.
@@ -55,7 +51,7 @@ class ConstrainedHierarchy:
     def __init__(self, hierarchy: Hierarchy, A: BlockMatrix) -> None:
         self.hierarchy, self.A = hierarchy, A
         self.stiffening = 0.0
-        self._kept: list[tuple[Level, Nodes, Values]] = []
+        self._kept: list[tuple[Level, Indices, AnyArray]] = []
 
     def constrain(self, elimination: Elimination | None, springs: Springs | None = None) -> None:
         """Make the hierarchy that of the matrix under the equations eliminated; None: without equations.
@@ -118,7 +114,7 @@ class ConstrainedHierarchy:
             level.eliminated = level.change = level.springs = None
             level.followers = level.free_motions = None
 
-    def _stiffened(self, change: LocalChange, elimination: Elimination) -> Nodes:
+    def _stiffened(self, change: LocalChange, elimination: Elimination) -> Indices:
         """Return the nodes without pivots that equations stiffen by much, and set `stiffening`."""
         size = change.size
         of_all = self.hierarchy.levels[0].diagonal.reshape(-1, size * size)[change.nodes]
@@ -128,7 +124,7 @@ class ConstrainedHierarchy:
         return change.nodes[(by > MUCH) & ~np.isin(change.nodes, elimination.pivots // size)]
 
     def _turned_round(
-        self, elimination: Elimination, springs: Springs | None, stiffened: Nodes, of_springs: list[LocalChange]
+        self, elimination: Elimination, springs: Springs | None, stiffened: Indices, of_springs: list[LocalChange]
     ) -> list[SymmetricChange]:
         """Let coarser levels see stiffened nodes follow the pivots; return the changes there. See `stiffened_nodes`."""
         top, size = self.hierarchy.levels[0], len(self.A.rows)
@@ -141,7 +137,7 @@ class ConstrainedHierarchy:
             changes.append(SymmetricChange.of_springs(springs.under(following.pivots, following.weights), size))
         return changes
 
-    def _own_inverses(self, nodes: Nodes, of_springs: list[LocalChange]) -> Array:
+    def _own_inverses(self, nodes: Indices, of_springs: list[LocalChange]) -> Array:
         """Return the inverses (k, size, size) of finest diagonal blocks of some nodes, with springs, without equations."""
         size = len(self.A.rows)
         blocks = np.zeros((self.hierarchy.n // size, size**2))

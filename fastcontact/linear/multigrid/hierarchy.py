@@ -14,18 +14,16 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import DTypeLike
 from scipy.sparse import csr_matrix
 
+from fastcontact.arrays import Array, Numbers
 from fastcontact.linear.multigrid import cycle_kernels, galerkin_kernels
 from fastcontact.linear.multigrid.coarse import Coarse
 from fastcontact.linear.multigrid.level import Level
 from fastcontact.linear.multigrid.matrix import BlockMatrix
 from fastcontact.linear.multigrid.restriction import Restriction
 from fastcontact.linear.multigrid.smoother import DEGREE, SAFETY, chebyshev, largest_eigenvalue
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int32]
 
 # The coarsest level has at most so many unknowns, or a level fewer than this part of the unknowns of the one above.
 COARSEST = 200
@@ -160,14 +158,14 @@ class Hierarchy:
             level.relax(level.r, *factor)
 
 
-def by_columns(P: BlockMatrix, n: int) -> tuple[Indices, Indices, Indices]:
+def by_columns(P: BlockMatrix, n: int) -> tuple[Numbers, Numbers, Numbers]:
     """Return where the blocks of each of n block columns begin, their rows, ascending, and their numbers."""
     numbers = np.arange(len(P.indices), dtype=np.int32)
     found = csr_matrix((numbers, P.indices, P.indptr), shape=(len(P.indptr) - 1, n)).tocsc()
     return found.indptr, found.indices, found.data
 
 
-def product(A: BlockMatrix, P: BlockMatrix, index: tuple[Indices, Indices, Indices]) -> BlockMatrix:
+def product(A: BlockMatrix, P: BlockMatrix, index: tuple[Numbers, Numbers, Numbers]) -> BlockMatrix:
     """Return ``P.T A P`` for a symmetric A; `index` from `by_columns`."""
     n_coarse = len(index[0]) - 1
     count, near = np.zeros(n_coarse, np.int32), np.zeros(n_coarse, np.int32)

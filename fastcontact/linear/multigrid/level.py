@@ -1,21 +1,18 @@
-"""A level of the multigrid hierarchy: a matrix, its smoother, the way to the next coarser level, and work space."""
+"""A level of the multigrid hierarchy: matrix, smoother, transfer operators, work space."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import AnyArray
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.multigrid import cycle_kernels
 from fastcontact.linear.multigrid.matrix import BlockMatrix
 from fastcontact.linear.multigrid.restriction import Restriction
 from fastcontact.linear.multigrid.stiffened_nodes import FreeMotions
 from fastcontact.linear.springs import Springs
-
-Values = NDArray[Any]
 
 
 @dataclass(eq=False)
@@ -49,20 +46,20 @@ class Level:
     """
 
     A: BlockMatrix
-    diagonal: Values
-    inverse: Values
+    diagonal: AnyArray
+    inverse: AnyArray
     bound: float
     P: BlockMatrix | None = None
     R: Restriction | None = None
     eliminated: Elimination | None = None
-    change: tuple[Values, ...] | None = None
+    change: tuple[AnyArray, ...] | None = None
     springs: Springs | None = None
     followers: Elimination | None = None
     free_motions: FreeMotions | None = None
-    b: Values = field(init=False)
-    x: Values = field(init=False)
-    r: Values = field(init=False)
-    d: Values = field(init=False)
+    b: AnyArray = field(init=False)
+    x: AnyArray = field(init=False)
+    r: AnyArray = field(init=False)
+    d: AnyArray = field(init=False)
 
     def __post_init__(self) -> None:
         n = (len(self.A.indptr) - 1) * len(self.A.rows)
@@ -73,7 +70,7 @@ class Level:
         """Number of unknowns."""
         return len(self.b)
 
-    def relax(self, r: Values, first: float, second: float, begin: bool = False) -> None:
+    def relax(self, r: AnyArray, first: float, second: float, begin: bool = False) -> None:
         """Make a Chebyshev step: see `cycle_kernels.relax`."""
         kind = r.dtype.type
         cycle_kernels.relax(self.inverse, r, kind(first), kind(second), self.d, self.x, self.A.rows, begin)
@@ -86,7 +83,7 @@ class Level:
         """Fill `r` with ``b - A x``."""
         self.subtract_product(self.x, self.b, self.r)
 
-    def subtract_product(self, x: Values, b: Values, r: Values) -> None:
+    def subtract_product(self, x: AnyArray, b: AnyArray, r: AnyArray) -> None:
         """Fill `r` with ``b - A x``, eliminated equations included."""
         self.A.combine(-1.0, x, 1.0, b, r)
         if self.eliminated is not None:
@@ -97,14 +94,14 @@ class Level:
             numbers, indptr, indices, data = self.change
             cycle_kernels.subtract_rows(numbers, indptr, indices, (data,), x, r, self.A.rows)
 
-    def restrict(self, coarse: Values) -> None:
+    def restrict(self, coarse: AnyArray) -> None:
         """Fill the right-hand side of the next coarser level with the residual `r`, which is lost."""
         assert self.R is not None
         if self.followers is not None:
             self.followers.move_forces(self.r)
         self.R.multiply(self.r, coarse)
 
-    def correct(self, coarse: Values) -> None:
+    def correct(self, coarse: AnyArray) -> None:
         """Add the correction of the next coarser level."""
         assert self.P is not None
         if self.followers is None:

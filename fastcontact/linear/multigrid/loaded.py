@@ -1,4 +1,4 @@
-"""A right-hand side for multigrid, solved for under equations some of which give way by themselves.
+"""Multigrid solution under linear constraints, some of which have a compliance of their own.
 
 An equation with a compliance of its own is a spring along its row. Springs not much stiffer than the body become part of the
 matrix and of the hierarchy; stiffer ones are eliminated like equations that do not give way, see `reduced`.
@@ -11,9 +11,9 @@ import logging
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.linear.elimination.corner_functions import eliminated
 from fastcontact.linear.elimination.elimination import Elimination, eliminate
 from fastcontact.linear.elimination.loaded import LoadedIteration
@@ -25,8 +25,6 @@ from fastcontact.linear.sparse_rows import scaled
 from fastcontact.linear.springs import Springs
 
 log = logging.getLogger("fastcontact")
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 # Equations whose own stiffness is more than so many times that of the unknowns they act on are eliminated: as springs they
 # take half as many iterations again there, and the root of the ratio as many beyond. The second where pivots are coupled,
 # whose weights are nearly right only.
@@ -41,9 +39,9 @@ class LoadedMultigrid(LoadedIteration):
 
     def solve(
         self, B: csr_array, c: Array, C: Array | FieldCompliance | None = None, guess: Array | None = None,
-        monitor: Monitor | None = None, tolerance: float | None = None, nodes: NDArray[np.intp] | None = None,
+        monitor: Monitor | None = None, tolerance: float | None = None, nodes: Indices | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
-        """See `Loaded`: equations with a full compliance, and those that repeat each other, go through columns of K^-1."""
+        """See `Loaded`: constraints with a full compliance, and linearly dependent ones, go through columns of K^-1."""
         parts: _Parts | None = None
         if C is not None and len(c) and (isinstance(C, FieldCompliance) or C.ndim == 1):
             try:
@@ -71,7 +69,7 @@ class LoadedMultigrid(LoadedIteration):
         return np.asarray(self._solver.diagonal())
 
     def solve_nonsymmetric(
-        self, B: csr_array, c: Array, nodes: NDArray[np.intp], guess: Array, tolerance: float,
+        self, B: csr_array, c: Array, nodes: Indices, guess: Array, tolerance: float,
         friction: FrictionTerms | None = None, C: Array | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         """See `LoadedNonsymmetric`."""
@@ -136,14 +134,14 @@ class LoadedMultigrid(LoadedIteration):
         return u, parts.multiplier(u, solver.multiplier(elimination, u, f, springs), at_edge, c)
 
     def _parts(
-        self, B: csr_array, c: Array, C: Array | None, nodes: NDArray[np.intp] | None, through: csr_array | None = None
+        self, B: csr_array, c: Array, C: Array | None, nodes: Indices | None, through: csr_array | None = None
     ) -> _Parts:
-        """Return what is eliminated and what becomes springs, of multipliers that act `through` rows, B by default.
+        """Split constraints into eliminated ones and springs; multipliers act `through` rows, B by default.
 
         Raises
         ------
         RepeatedError
-            If equations that do not give way repeat each other.
+            If exact constraints are linearly dependent.
         """
         size = self._solver.K.blocksize[0]
         if C is None or not C.any():
@@ -173,10 +171,10 @@ class _Parts:
 
     @classmethod
     def of(
-        cls, B: csr_array, c: Array, C: Array, stiff: Mask, nodes: NDArray[np.intp] | None, size: int,
+        cls, B: csr_array, c: Array, C: Array, stiff: Mask, nodes: Indices | None, size: int,
         through: csr_array | None, functions: csr_array | None,
     ) -> _Parts:  # fmt: skip
-        """Return the parts of ``B u + C multiplier = c``; RepeatedError where those that are stiff repeat each other."""
+        """Return the parts of ``B u + C multiplier = c``; RepeatedError if stiff ones are linearly dependent."""
         gives = C[stiff].any()
         if gives:  # excesses take the places of nodal pivots
             functions = None
@@ -200,7 +198,7 @@ class _Parts:
 
     @property
     def giving(self) -> bool:
-        """Whether equations eliminated give way."""
+        """Whether eliminated constraints have a compliance."""
         return self.elimination is not None and self.elimination.compliance is not None
 
     def pushed(self, f: Array, c: Array) -> Array:
@@ -231,7 +229,7 @@ class _FieldParts:
 
     @classmethod
     def of(cls, B: csr_array, c: Array, C: FieldCompliance, size: int) -> _FieldParts:
-        """Return the parts; RepeatedError where equations that do not give way repeat each other."""
+        """Return the parts; RepeatedError if exact constraints are linearly dependent."""
         field, elimination = C.of_field(B, c), None
         if not field.edge.all():
             rows = csr_array(field.rows[~field.edge])
@@ -257,6 +255,6 @@ class _FieldParts:
         return self.weights * (self.field.P @ p) + self.springs.stiffness * (c - self.springs.rows @ u)
 
 
-def _nodes(rows: csr_array, size: int) -> NDArray[np.intp]:
+def _nodes(rows: csr_array, size: int) -> Indices:
     """Return the node (m,) that each row involves most; a node has `size` unknowns."""
     return np.asarray(abs(rows).argmax(axis=1), np.intp).ravel() // size

@@ -1,24 +1,20 @@
-"""A change of a few block rows of a symmetric block matrix, and its Galerkin product on the next coarser level."""
+"""Local update of a symmetric block matrix, and its Galerkin product on the next coarser level."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import DTypeLike
 from scipy.sparse import bsr_array, csc_array
 
+from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.linear.multigrid.matrix import BlockMatrix, diagonal_blocks
-
-Array = NDArray[np.float64]
-Values = NDArray[Any]
-Nodes = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
 class LocalChange:
-    """What is added to the blocks of some nodes; nothing beyond them.
+    """Update of the blocks among some nodes.
 
     Attributes
     ----------
@@ -28,11 +24,11 @@ class LocalChange:
         Symmetric, in canonical format; `size` unknowns a node.
     """
 
-    nodes: Nodes
+    nodes: Indices
     blocks: bsr_array
 
     @classmethod
-    def of_diagonal(cls, nodes: Nodes, blocks: Array) -> LocalChange:
+    def of_diagonal(cls, nodes: Indices, blocks: Array) -> LocalChange:
         """Return the change of diagonal `blocks` (k, size, size) alone."""
         n = blocks.shape[0] * blocks.shape[1]
         return cls(nodes, bsr_array((blocks, np.arange(len(nodes)), np.arange(len(nodes) + 1)), shape=(n, n)))
@@ -42,11 +38,11 @@ class LocalChange:
         """Unknowns of a node."""
         return int(self.blocks.blocksize[0])
 
-    def diagonal(self) -> Values:
+    def diagonal(self) -> AnyArray:
         """Return the diagonal blocks (k * size * size,)."""
         return diagonal_blocks(self.blocks.indptr, self.blocks.indices, self.blocks.data, self.size)
 
-    def rows(self, kind: DTypeLike) -> tuple[Values, ...]:
+    def rows(self, kind: DTypeLike) -> tuple[AnyArray, ...]:
         """Return nodes, and `indptr`, `indices` (of all nodes) and `data` of their block rows, in a precision."""
         columns = self.nodes[self.blocks.indices].astype(np.int32)
         return self.nodes, self.blocks.indptr, columns, self.blocks.data.astype(kind).ravel()
@@ -67,7 +63,7 @@ class LocalChange:
         indptr = np.r_[0, np.cumsum(count)]
         return bsr_array((change.data, self.nodes[change.indices], indptr), shape=(n, n)).tocsc()
 
-    def spread(self, nodes: Nodes) -> bsr_array:
+    def spread(self, nodes: Indices) -> bsr_array:
         """Return the blocks on more `nodes` (l,), ascending."""
         place = np.searchsorted(nodes, self.nodes)
         count = np.zeros(len(nodes), np.intp)
@@ -86,7 +82,7 @@ def merged(one: LocalChange, *others: LocalChange) -> LocalChange:
     return one
 
 
-def block_rows(A: BlockMatrix, nodes: Nodes, n: int) -> bsr_array:
+def block_rows(A: BlockMatrix, nodes: Indices, n: int) -> bsr_array:
     """Return the block rows `nodes` of a matrix with n columns, in double precision."""
     rows, cols = len(A.rows), len(A.cols)
     count = np.diff(A.indptr)[nodes]

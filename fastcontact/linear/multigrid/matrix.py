@@ -1,4 +1,4 @@
-"""Block matrices of multigrid, and the stiffness that is solved with: one store of its numbers for two precisions.
+"""Block matrices of multigrid, and the stiffness matrix stored once for two precisions.
 
 The multigrid cycle reads K in single precision, the iteration around it in double precision. Each number of K is therefore
 stored as two numbers in single precision, a high and a low part (see `split_matrix_kernels`): the cycle reads the high part,
@@ -10,18 +10,14 @@ from __future__ import annotations
 
 import contextlib
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import bsr_array
 
+from fastcontact.arrays import AnyArray, Array, Indices, Numbers
 from fastcontact.linear.multigrid import cycle_kernels, split_matrix_kernels, symmetric_storage_kernels
 
-Array = NDArray[np.float64]
-Values = NDArray[Any]
-Indices = NDArray[np.int32]
-Storage = tuple[Indices, Indices, Indices, int]
+Storage = tuple[Numbers, Numbers, Numbers, int]
 
 # Every block is stored.
 ALL: Storage = (np.empty(0, np.int32), np.empty(0, np.int32), np.empty(0, np.int32), 0)
@@ -51,16 +47,16 @@ class BlockMatrix:
         all of them are: see `symmetric_storage_kernels`.
     """
 
-    indptr: Indices
-    indices: Indices
-    data: Values
+    indptr: Numbers
+    indices: Numbers
+    data: AnyArray
     rows: tuple[int, ...]
     cols: tuple[int, ...]
-    low: Values | None = None
+    low: AnyArray | None = None
     storage: Storage = ALL
 
     @property
-    def exact(self) -> tuple[Values, ...]:
+    def exact(self) -> tuple[AnyArray, ...]:
         """The numbers as kernels take them that need them all: (data,) or (high part, low part)."""
         return (self.data,) if self.low is None else (self.data, self.low)
 
@@ -71,11 +67,11 @@ class BlockMatrix:
             self.indptr.nbytes + self.indices.nbytes + self.data.nbytes + sum(part.nbytes for part in self.storage[:3])
         )
 
-    def multiply(self, x: Values, y: Values) -> None:
+    def multiply(self, x: AnyArray, y: AnyArray) -> None:
         """Fill `y` with ``A x``."""
         self.combine(1.0, x, 0.0, y, y)
 
-    def combine(self, factor: float, x: Values, share: float, z: Values, y: Values) -> None:
+    def combine(self, factor: float, x: AnyArray, share: float, z: AnyArray, y: AnyArray) -> None:
         """Fill `y` with ``share z + factor A x``, in the precision of x; x and y are different arrays."""
         kind = x.dtype.type
         numbers = (self.data,) if x.dtype == self.data.dtype else self.exact
@@ -94,7 +90,7 @@ class BlockMatrix:
         parts = [self.diagonal_part(part).astype(float, copy=False) for part in self.exact]
         return np.asarray(sum(parts[1:], parts[0])).reshape(-1, size, size)
 
-    def diagonal_part(self, part: Values) -> Values:
+    def diagonal_part(self, part: AnyArray) -> AnyArray:
         """Return the diagonal blocks (n_rows * size * size,) of a square matrix, from the high or the low part."""
         size = len(self.rows)
         if self.storage is ALL:
@@ -117,7 +113,7 @@ class BlockMatrix:
         return bsr_array((data.reshape(-1, size, size), self.indices, self.indptr), shape=2 * (n * size,))
 
 
-def diagonal_blocks(indptr: Indices, indices: Indices, data: Values, size: int) -> Values:
+def diagonal_blocks(indptr: Numbers, indices: Numbers, data: AnyArray, size: int) -> AnyArray:
     """Return the diagonal blocks (n * size * size,) of a square matrix in canonical format, zero where there is none."""
     out = np.zeros((len(indptr) - 1) * size * size, data.dtype)
     pattern = (part.astype(np.int32, copy=False) for part in (indptr, indices))
@@ -186,7 +182,7 @@ class ScaledMatrix:
         self.combine(1.0, u, 0.0, out, out)
         return out
 
-    def forces_at(self, dofs: NDArray[np.intp], u: Array, f: Array) -> Array:
+    def forces_at(self, dofs: Indices, u: Array, f: Array) -> Array:
         """Return ``(K u - f)[dofs]``, shape (m,) [force]."""
         A, out = self.scaled, np.empty(len(dofs))
         split_matrix_kernels.forces_at(
@@ -194,7 +190,7 @@ class ScaledMatrix:
         )  # fmt: skip
         return out
 
-    def add_forces_of(self, dofs: NDArray[np.intp], values: Array, out: Array) -> None:
+    def add_forces_of(self, dofs: Indices, values: Array, out: Array) -> None:
         """Add ``K[:, dofs] values`` to `out` (n,) [force]."""
         A = self.scaled
         split_matrix_kernels.forces_of(
@@ -235,7 +231,7 @@ def _split(K: bsr_array, unit: float, release: bool) -> BlockMatrix:
     return BlockMatrix(indptr, indices, high, (0,) * size, (0,) * size, low, storage)
 
 
-def _keep_stored(indptr: Indices, indices: Indices, storage: Storage, numbers: Values, square: int) -> None:
+def _keep_stored(indptr: Numbers, indices: Numbers, storage: Storage, numbers: AnyArray, square: int) -> None:
     """Move the stored blocks, of `square` numbers, to the beginning of the numbers of all blocks."""
     start, widest = storage[0], int(np.diff(indptr).max(initial=0))
     end, n = 0, len(indptr) - 1
@@ -246,7 +242,7 @@ def _keep_stored(indptr: Indices, indices: Indices, storage: Storage, numbers: V
         symmetric_storage_kernels.store_rows(first, end, widest, indptr, indices, storage, numbers, square, numbers)
 
 
-def _halve(unit: float, numbers: Values, high: Values) -> None:
+def _halve(unit: float, numbers: AnyArray, high: AnyArray) -> None:
     """Fill the high parts (n,) of ``unit numbers``; the low parts take the place of the first half of the numbers."""
     end, n, low = 0, len(numbers), numbers.view(np.float32)[: len(numbers)]
     while end < n:
@@ -254,7 +250,7 @@ def _halve(unit: float, numbers: Values, high: Values) -> None:
         split_matrix_kernels.split(first, end, unit, numbers, high, low)
 
 
-def symmetric_storage(indptr: Indices, indices: Indices) -> Storage:
+def symmetric_storage(indptr: Numbers, indices: Numbers) -> Storage:
     """Return how a symmetric matrix is stored.
 
     That is `ALL` where the pattern is not sorted, or has no diagonal or a block without its transpose.

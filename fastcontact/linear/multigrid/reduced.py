@@ -1,4 +1,4 @@
-"""The matrix of an iteration: K and springs under eliminated equations, some of which may give way by themselves.
+"""Reduced operator of the iteration: K and springs under eliminated constraints, with or without compliance.
 
 Equations ``B u + C multiplier = c`` with a diagonal compliance C are eliminated like others, but their pivots move by
 ``P^-1 s`` more, P the pivots' columns of B. Their excess ``s = B u - c = -C multiplier`` is an unknown of its own, with the
@@ -11,14 +11,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from fastcontact.arrays import Array
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.multigrid.matrix import ScaledMatrix
 from fastcontact.linear.springs import Springs
-
-Array = NDArray[np.float64]
 
 
 class Reduced:
@@ -51,7 +49,7 @@ class Reduced:
 
     @property
     def bare(self) -> bool:
-        """Whether neither springs nor equations give way."""
+        """Whether there are neither springs nor compliant constraints."""
         return self.springs is None and self._excess is None
 
     def begin(self, x: Array, f: Array, r: Array) -> None:
@@ -118,7 +116,7 @@ def multiplier(K: ScaledMatrix, elimination: Elimination | None, springs: Spring
 
 
 class _Excess:
-    """By how much equations that give way are not met: an unknown in each pivot's place. See `Reduced` for parameters."""
+    """Violation of compliant constraints, an unknown in place of each pivot. See `Reduced` for parameters."""
 
     def __init__(self, diagonal: Array, elimination: Elimination, compliance: Array) -> None:
         self._elimination, self._pivots = elimination, elimination.pivots
@@ -135,7 +133,7 @@ class _Excess:
         self._u = np.empty(len(diagonal))
 
     def begin(self, x: Array, multiplier: Array | None) -> None:
-        """Put excesses in the pivots' places: those of the forces there, by which what was open before begins with none."""
+        """Replace pivots by the violations that balance the forces there; constraints that were open begin with none."""
         x[self._pivots] = 0.0 if multiplier is None else -self._compliance * multiplier
 
     def displacement(self, x: Array, offset: Array | None) -> Array:

@@ -1,16 +1,13 @@
-"""From a level of the multigrid hierarchy to the next coarser one: products with the transpose of its prolongator."""
+"""Restriction: products with the transpose of the prolongator."""
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import AnyArray
 from fastcontact.linear.multigrid import restriction_kernels
 from fastcontact.linear.multigrid.matrix import BlockMatrix
 
-Values = NDArray[Any]
 # Parts of the rows, of so many at least; each has work space of its own.
 PARTS, SHORTEST = 32, 1024
 
@@ -38,7 +35,7 @@ class Restriction:
         """Memory without P [bytes]."""
         return self._work.nbytes
 
-    def multiply(self, x: Values, y: Values) -> None:
+    def multiply(self, x: AnyArray, y: AnyArray) -> None:
         """Fill `y` with ``P.T x``."""
         P = self.P
         restriction_kernels.multiply_transposed(

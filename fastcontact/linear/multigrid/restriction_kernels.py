@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Products with the transpose of a block matrix, which is read row by row and not stored a second time.
+"""Products with the transpose of a block matrix stored by rows.
 
 The rows are divided into parts. Each part adds into a stretch of its own, from the first to the last column that it has; the
 stretches are then added in the order of the parts, so that the number of threads changes no bit.

@@ -1,4 +1,4 @@
-"""The smoother of multigrid: a Chebyshev iteration preconditioned by the diagonal blocks, for the upper part of the spectrum.
+"""Chebyshev smoother, preconditioned by the diagonal blocks.
 
 It smooths the eigenvalues of ``D^-1 A`` in [SMOOTHED bound, bound], D the diagonal blocks (Adams, Brezina, Hu and Tuminaro,
 2003). Unlike Gauss-Seidel it gives the same bits for any number of threads. `Level.relax` makes one of its steps.

@@ -10,10 +10,10 @@ from __future__ import annotations
 import logging
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array
 
 from fastcontact._jit.decorators import check_threads
+from fastcontact.arrays import Array
 from fastcontact.errors import ConvergenceError, ModelError
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.flexibility import FlexibilityColumns
@@ -34,7 +34,6 @@ from fastcontact.linear.protocol import Counters, Monitor
 from fastcontact.linear.springs import Springs
 
 log = logging.getLogger("fastcontact")
-Array = NDArray[np.float64]
 MAX_ITERATIONS, MAX_NONSYMMETRIC = 1000, 300
 # Columns of K^-1, each a solution, up to which they cost less than factors do.
 MOST_COLUMNS = 300
@@ -160,11 +159,15 @@ class Multigrid:
             known = self._hierarchy_springs
             alike = known is None if springs is None else springs.alike(known)
             if not (alike and _alike(sparse, self._hierarchy_equations)):
-                self._constrained.constrain(sparse, None if springs is None else springs.scaled(self.K.unit))
-                self._hierarchy_equations, self._hierarchy_springs = sparse, springs
+                self._change_hierarchy(sparse, springs)
                 self._worked(CHANGE)
             gives = elimination is not None and elimination.compliance is not None
             self._reduced = Reduced(self.K, elimination, springs, self.diagonal() if gives else None)
+
+    def _change_hierarchy(self, sparse: Elimination | None, springs: Springs | None) -> None:
+        """Change the hierarchy to that under equations with sparse weights and springs."""
+        self._constrained.constrain(sparse, None if springs is None else springs.scaled(self.K.unit))
+        self._hierarchy_equations, self._hierarchy_springs = sparse, springs
 
     def solution(
         self, f: Array, elimination: Elimination | None, guess: Array | None, monitor: Monitor | None = None,
@@ -368,7 +371,7 @@ class Multigrid:
         cg.start()
 
     def _scale(self, f: Array, elimination: Elimination | None) -> float:
-        """Return the size of the right-hand side, forces that impose the equations included."""
+        """Return the norm of the right-hand side, constraint forces included."""
         square = self._cg.dot(f, f)
         if elimination is not None and elimination.offset.any():
             forces = np.zeros(len(f))

@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Numbers split into a high part, the nearest number in single precision, and a low part, what that misses.
+"""Double-precision numbers split into two of single precision, high and low.
 
 Together both parts have 48 of the 53 bits of double precision. Kernels take numbers as a tuple: (high, low) where they are
 split, (numbers,) where they are not.

@@ -1,4 +1,4 @@
-"""Nodes that equations tie to a much stiffer body: what the smoother and coarser levels need there.
+"""Nodes constrained to a much stiffer body: corrections of the smoother and of coarser levels.
 
 Equations let the unknowns of one side, the pivots, follow those of the other. Where the pivots' side is much stiffer, nodes
 of the other side become as stiff as that, and two things go wrong:
@@ -13,18 +13,14 @@ of the other side become as stiff as that, and two things go wrong:
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import bsr_array, coo_array, csc_array, csr_array, diags_array, vstack
 from scipy.sparse.linalg import splu
 
+from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.linear.elimination.elimination import Elimination
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
-# Equations that repeat each other on the stiffened nodes are told apart by so much of their own compliance.
+# Constraints that are linearly dependent on the stiffened nodes are regularised by this part of their own compliance.
 REPEATED = 1e-6
 # Unknowns follow where translations of their side move the pivots by at least this part of them.
 LEAST = 0.3
@@ -58,7 +54,7 @@ class FreeMotions:
         shifted = compliance + diags_array(REPEATED * compliance.diagonal(), format="csr")
         self._factors = splu(csc_array(shifted), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
 
-    def correct(self, r: NDArray[Any], factor: float, step: NDArray[Any], x: NDArray[Any]) -> None:
+    def correct(self, r: AnyArray, factor: float, step: AnyArray, x: AnyArray) -> None:
         """Add `factor` times the correction for the residual r (n,) to the last `step` (n,) and to x (n,)."""
         own = r[self._at].astype(float)
         found = self._yielding @ own - self._moves @ self._factors.solve(self._pulls @ own)

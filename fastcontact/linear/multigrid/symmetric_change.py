@@ -1,4 +1,4 @@
-"""A symmetric change of a matrix that few rows give, ``D.T G + G.T D``, and its Galerkin product.
+"""Symmetric low-rank update ``D.T G + G.T D`` of a matrix, and its Galerkin product.
 
 Equations say ``u = u + D u`` at their pivots, with rows D of weights less one. They turn A into ``T.T A T``, which changes
 it by ``D.T G + G.T D`` with ``G = A[pivots] + A[pivots][:, pivots] D / 2``. Springs along rows R change it by ``R.T S R``,
@@ -10,18 +10,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csc_array, csr_array
 
+from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.linear.multigrid import symmetric_change_kernels
 from fastcontact.linear.multigrid.local_change import LocalChange
 from fastcontact.linear.multigrid.matrix import BlockMatrix
 from fastcontact.linear.sparse_rows import scaled
 from fastcontact.linear.springs import Springs
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int32]
-Pivots = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +36,7 @@ class SymmetricChange:
     size: int
 
     @classmethod
-    def of_equations(cls, A: BlockMatrix, pivots: Pivots, weights: csr_array) -> SymmetricChange:
+    def of_equations(cls, A: BlockMatrix, pivots: Indices, weights: csr_array) -> SymmetricChange:
         """Return ``T.T A T - A`` for a symmetric A (n, n), where ``u = T u`` says ``u[pivots] = weights u``."""
         m, size, shape = len(pivots), len(A.rows), weights.shape
         D = csr_array(weights + csr_array((np.full(m, -1.0), pivots, np.arange(m + 1)), shape=shape))
@@ -85,8 +81,8 @@ class SymmetricChange:
 class _Restricted:
     """Rows of blocks: coarse nodes and, for each, as many numbers as it has unknowns."""
 
-    indptr: Indices
-    nodes: Indices
+    indptr: Numbers
+    nodes: Numbers
     numbers: Array
 
 
@@ -124,5 +120,5 @@ def _symmetric_product(E: _Restricted, H: _Restricted, cols: tuple[int, ...]) ->
     return LocalChange(nodes, total)
 
 
-def _pointers(count: Indices) -> Indices:
+def _pointers(count: Numbers) -> Numbers:
     return np.concatenate([[0], np.cumsum(count)]).astype(np.int32)

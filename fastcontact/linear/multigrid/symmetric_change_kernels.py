@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Rows D and G of a symmetric change ``D.T G + G.T D``: what equations make of a matrix, restricted and multiplied.
+"""Factors D and G of a symmetric update ``D.T G + G.T D``, restricted and multiplied.
 
 Sparse rows come as ``indptr`` and ``indices``, whose order does not matter, and numbers. Restricted ones have a block of as
 many numbers as the tuple `cols` for each coarse node. Every row of a result is computed by one thread in a fixed order.

@@ -10,18 +10,19 @@ from __future__ import annotations
 
 import functools
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.flexibility import TooManyColumnsError
-from fastcontact.linear.lower_tolerance import tighten
+from fastcontact.linear.lower_tolerance import put_back_tolerance, tighten
 from fastcontact.linear.multigrid.loaded import LoadedMultigrid
+from fastcontact.linear.multigrid.reduced import Reduced
 from fastcontact.linear.multigrid.solver import (
     MAX_ITERATIONS,
     MAX_NONSYMMETRIC,
@@ -34,7 +35,6 @@ from fastcontact.linear.solvers.direct import Direct
 from fastcontact.linear.springs import Springs
 
 log = logging.getLogger("fastcontact")
-Array = NDArray[np.float64]
 # Unknowns up to which a factorisation replaces multigrid, by the number of components of a displacement.
 FACTORS_UP_TO = {1: 3_000_000, 2: 3_000_000, 3: 150_000}
 # Equations that stiffen a node by more than this leave the softer body too little of multigrid's tolerance; coupled ones,
@@ -64,6 +64,7 @@ class Amg(Multigrid, LinearSolver):
     def __init__(self, tolerance: float = 1e-10, precision: str = "single") -> None:
         super().__init__(tolerance, precision)
         self.instead: Direct | None = None
+        self._factored: Direct | None = None  # kept where an analysis goes back to before that
         self.gave_up = ""
 
     def __repr__(self) -> str:
@@ -79,11 +80,11 @@ class Amg(Multigrid, LinearSolver):
         return self.instead is None
 
     def prepare(
-        self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None, release: bool = False
+        self, K: bsr_array, rigid_modes: Array, involved: Indices | None = None, release: bool = False
     ) -> bsr_array | Product:
         """Build the hierarchy of K; see `LinearSolver.prepare`."""
         self.build(K, rigid_modes, release)
-        self._involved, self.instead, self.gave_up = involved, None, ""
+        self._involved, self.instead, self._factored, self.gave_up = involved, None, None, ""
         self.patience = MAX_NONSYMMETRIC if self._may_factorise else MAX_ITERATIONS
         return self.K if release else K
 
@@ -111,36 +112,41 @@ class Amg(Multigrid, LinearSolver):
             return True
         return tighten(self, excess)
 
-    def memory(self) -> dict[str, Any]:
-        """See `LinearSolver.memory`: equations and bounds of the hierarchy, columns of K^-1. Result files hold these keys."""
-        tied = None
-        if self._hierarchy_equations is not None:
-            rows = self._hierarchy_equations.weights
-            arrays = (self._hierarchy_equations.pivots, rows.indptr, rows.indices, rows.data)
-            tied = dict(zip(("pivots", "indptr", "indices", "data"), arrays, strict=True))
-        kept = {
-            "precision": self.precision,
-            "tolerance": self.tolerance,
-            "bounds": self.hierarchy.bounds,
-            "asked": list(self.columns.asked),
-        }
-        instead = None if self.instead is None else {"why": self.gave_up, **self.instead.memory()}
-        springs = self._hierarchy_springs
-        return {**kept, "tied": tied, "springs": springs and springs.to_dict(), "instead": instead}
+    def snapshot(self) -> dict[str, Any]:
+        """See `LinearSolver.snapshot`: equations and bounds of the hierarchy, columns of K^-1; keys of result files."""
+        instead = None if self.instead is None else {"why": self.gave_up, **self.instead.snapshot()}
+        return {
+            "precision": self.precision, "tolerance": self.tolerance, "bounds": self.hierarchy.bounds,
+            "asked": list(self.columns.asked), **self._constrained_by(), "instead": instead,
+        }  # fmt: skip
 
-    def remember(self, memory: dict[str, Any]) -> None:
-        """See `LinearSolver.remember`."""
-        if memory.get("instead"):
-            self._factorise(memory["instead"]["why"]).remember(memory["instead"])
+    def _constrained_by(self) -> dict[str, Any]:
+        """Return the equations and springs that the hierarchy was changed for, as plain arrays."""
+        equations, springs, tied = self._hierarchy_equations, self._hierarchy_springs, None
+        if equations is not None:
+            rows = equations.weights
+            tied = {"pivots": equations.pivots, "indptr": rows.indptr, "indices": rows.indices, "data": rows.data}
+        return {"tied": tied, "springs": springs and springs.to_dict()}
+
+    def put_back(self, snapshot: Mapping[str, Any]) -> None:
+        """See `LinearSolver.put_back`."""
+        if (instead := snapshot.get("instead")) is not None:
+            (self.instead or self._factorise(instead["why"])).put_back(instead)
             return
-        self.tolerance = memory.get("tolerance", self.tolerance)
-        if memory["precision"] != self.precision:
-            self.build_in(memory["precision"])
-        self.columns.ask_again(memory["asked"])
-        tied, springs = memory["tied"], memory.get("springs")
-        n = self.hierarchy.n
-        self.constrain(tied and _elimination(tied, n), springs and Springs.from_dict(springs, n))
-        self.hierarchy.bounds = memory["bounds"]
+        if self.instead is not None:  # multigrid was given up later
+            self._factored, self.instead, self.gave_up, self.error = self.instead, None, "", 0.0
+        put_back_tolerance(self, snapshot)
+        if snapshot["precision"] != self.precision:
+            self.build_in(snapshot["precision"])
+        self.columns.put_back(snapshot["asked"])
+        now, then = self._constrained_by(), {name: snapshot.get(name) for name in ("tied", "springs")}
+        if not all(_equal(now[name], then[name]) for name in then):
+            n = self.hierarchy.n
+            equations, springs = then["tied"], then["springs"]
+            self._reduced = Reduced(self.K, None)
+            equations, springs = equations and _elimination(equations, n), springs and Springs.from_dict(springs, n)
+            self._change_hierarchy(equations, springs)
+        self.hierarchy.bounds = snapshot["bounds"]
 
     def constrain(self, elimination: Elimination | None, springs: Springs | None = None) -> None:
         """See `Multigrid.constrain`.
@@ -183,18 +189,29 @@ class Amg(Multigrid, LinearSolver):
         return bool(self.K.shape[0] <= FACTORS_UP_TO[self.K.blocksize[0]])
 
     def _factorise(self, why: str) -> Direct:
-        log.warning("%s", why)
-        self.gave_up, self.instead = why, Direct()
-        self.instead.counters = self.counters
-        self.instead.prepare(self.K.restored(), self._modes.astype(float), self._involved)
+        if self._factored is None:
+            log.warning("%s", why)
+            self._factored = Direct()
+            self._factored.counters = self.counters
+            self._factored.prepare(self.K.restored(), self._modes.astype(float), self._involved)
+        else:
+            self._factored.put_back({"asked": [], "loads": []})
+        self.gave_up, self.instead = why, self._factored
         # What is asked of later solutions is what factors give.
         self.asked = self.tolerance if self.asked is None else self.asked
         self.tolerance, self.error = self.instead.tolerance, self.instead.error
         return self.instead
 
 
-def _elimination(tied: dict[str, Any], n: int) -> Elimination:
-    """Return the elimination of `Amg.memory`; its offsets and multipliers are not needed any more."""
+def _equal(first: Mapping[str, Any] | None, second: Mapping[str, Any] | None) -> bool:
+    """Return whether two sets of arrays, or none, are the same."""
+    if first is None or second is None:
+        return first is second
+    return all(np.array_equal(values, second[name]) for name, values in first.items())
+
+
+def _elimination(tied: Mapping[str, Any], n: int) -> Elimination:
+    """Return the elimination of `Amg.snapshot`; its offsets and multipliers are not needed any more."""
     m = len(tied["pivots"])
     rows = csr_array((tied["data"], tied["indices"], tied["indptr"]), shape=(m, n))
     return Elimination(tied["pivots"], rows, np.zeros(m), rows, csr_array((m, m)))
@@ -228,7 +245,7 @@ class _Loaded(LoadedMultigrid):
         return self._solver.instead.load(self._f)
 
     def solve_nonsymmetric(
-        self, B: csr_array, c: Array, nodes: NDArray[np.intp], guess: Array, tolerance: float,
+        self, B: csr_array, c: Array, nodes: Indices, guess: Array, tolerance: float,
         friction: FrictionTerms | None = None, C: Array | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         if self._solver.instead is not None:

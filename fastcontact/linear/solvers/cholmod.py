@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csc_array, csr_array
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.linear.cholesky.factorisation import fill_reducing, singular
 from fastcontact.linear.cholesky.symmetric_factors import LowerTriangle, SymmetricFactors
 from fastcontact.linear.factors.factor_solver import FactorSolver
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 # Systems that CHOLMOD solves: K x = b, and the one whose solution is b in the order of elimination.
 WHOLE, PERMUTE = 0, 7
 

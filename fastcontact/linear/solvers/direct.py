@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csc_array
 from scipy.sparse.linalg import SuperLU, splu
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.linear.cholesky.factorisation import factors, singular
 from fastcontact.linear.cholesky.symmetric_factors import SymmetricFactors
 from fastcontact.linear.factors.factor_solver import FactorSolver
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 
 class Direct(FactorSolver):

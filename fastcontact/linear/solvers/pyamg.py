@@ -7,24 +7,28 @@ of its own for the matrix ``T.T K T``.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import bsr_array, bsr_matrix, csr_array, diags_array, eye_array
 from scipy.sparse.linalg import cg
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.elimination.loaded import LoadedIteration
 from fastcontact.linear.flexibility import FlexibilityColumns
-from fastcontact.linear.lower_tolerance import tighten
+from fastcontact.linear.lower_tolerance import put_back_tolerance, tighten
 from fastcontact.linear.protocol import Counters, LinearSolver, Monitor
 
-Array = NDArray[np.float64]
 MAX_ITERATIONS = 1000
-# All neighbours are strong, as in our multigrid; everything else as pyamg has it.
-OPTIONS: dict[str, Any] = {"strength": ("symmetric", {"theta": 0.0}), "max_coarse": 200}
+# All neighbours are strong, as in our multigrid; rigid-body modes need no improvement, and polynomials smooth cheapest.
+SMOOTHER = ("chebyshev", {"degree": 2, "iterations": 1})
+OPTIONS: dict[str, Any] = {
+    "strength": ("symmetric", {"theta": 0.0}), "max_coarse": 200, "improve_candidates": None,
+    "presmoother": SMOOTHER, "postsmoother": SMOOTHER,
+}  # fmt: skip
 
 
 class Pyamg(LinearSolver):
@@ -51,7 +55,7 @@ class Pyamg(LinearSolver):
         return f"Pyamg({len(self._hierarchy.levels)} levels, unknowns {sizes}, operator complexity {complexity:.2f})"
 
     def prepare(
-        self, K: bsr_array, rigid_modes: Array, involved: NDArray[np.intp] | None = None, release: bool = False
+        self, K: bsr_array, rigid_modes: Array, involved: Indices | None = None, release: bool = False
     ) -> bsr_array:
         """Build the hierarchy of K, and leave K as it is; see `LinearSolver.prepare`."""
         self.K, self._modes = K, rigid_modes
@@ -124,14 +128,14 @@ class Pyamg(LinearSolver):
         """See `LinearSolver.improve`."""
         return tighten(self, excess)
 
-    def memory(self) -> dict[str, Any]:
-        """See `LinearSolver.memory`: columns of ``K^-1`` asked for, and the tolerance."""
+    def snapshot(self) -> dict[str, Any]:
+        """See `LinearSolver.snapshot`: columns of ``K^-1`` asked for, and the tolerance."""
         return {"asked": list(self.columns.asked), "tolerance": self.tolerance}
 
-    def remember(self, memory: dict[str, Any]) -> None:
-        """See `LinearSolver.remember`."""
-        self.tolerance = memory.get("tolerance", self.tolerance)
-        self.columns.ask_again(memory["asked"])
+    def put_back(self, snapshot: Mapping[str, Any]) -> None:
+        """See `LinearSolver.put_back`."""
+        put_back_tolerance(self, snapshot)
+        self.columns.put_back(snapshot["asked"])
 
 
 SOLVER = Pyamg

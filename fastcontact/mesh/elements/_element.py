@@ -13,7 +13,8 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from fastcontact.arrays import Array
+
 Indices = NDArray[np.int64]
 Function = Callable[[Array], Array]
 

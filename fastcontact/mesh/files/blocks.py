@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fastcontact.errors import FastcontactWarning, MeshError
+from fastcontact.arrays import AnyArray, Indices
+from fastcontact.errors import MeshError, warn
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
@@ -18,8 +16,7 @@ VERTEX = "vertex"
 # How many unknown kinds of cells a message names, and how much of each name.
 SHOWN = 12
 
-Rows = NDArray[np.intp]
-Groups = dict[str, NDArray[Any]]
+Groups = dict[str, AnyArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,12 +24,12 @@ class Block:
     """Cells of one kind, an element or ``"vertex"``: connectivity (n_cells, n_nodes), and the rows of it in each group."""
 
     kind: str
-    nodes: NDArray[Any]
-    groups: Mapping[str, Rows] = field(default_factory=dict)
+    nodes: AnyArray
+    groups: Mapping[str, Indices] = field(default_factory=dict)
 
 
 def build_mesh(
-    points: NDArray[Any], blocks: Iterable[Block], point_groups: Mapping[str, NDArray[Any]], names: Iterable[str] = ()
+    points: AnyArray, blocks: Iterable[Block], point_groups: Mapping[str, AnyArray], names: Iterable[str] = ()
 ) -> Mesh:
     """Return one Mesh of all blocks, with `points` (n_points, 2 or 3) [length].
 
@@ -93,7 +90,7 @@ def without_duplicates(block: Block) -> Block:
 
 def _numbered(blocks: list[Block]) -> Groups:
     """Return the groups as numbers of cells in the sequence of all blocks."""
-    groups: dict[str, list[Rows]] = {}
+    groups: dict[str, list[Indices]] = {}
     start = 0
     for block in blocks:
         for name, rows in block.groups.items():
@@ -114,16 +111,14 @@ def _add_vertices(point_groups: Groups, block: Block, solid: list[Block]) -> lis
             continue
         lost = np.setdiff1d(points, np.concatenate(carried))
         if len(lost):
-            warnings.warn(
+            warn(
                 f"group '{name}' mixes cells with single points: {len(lost)} points that its cells do "
-                "not have are left out; give them a group of their own",
-                FastcontactWarning,
-                stacklevel=2,
+                "not have are left out; give them a group of their own"
             )
     return turned
 
 
-def _without_flat_z(points: NDArray[Any], dim: int) -> NDArray[Any]:
+def _without_flat_z(points: AnyArray, dim: int) -> AnyArray:
     """Drop the third coordinate where it only says that the mesh is flat."""
     if points.ndim != 2 or points.shape[1] != 3 or dim == 3 or not len(points):
         return points

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import AnyArray, Array
 from fastcontact.errors import FileError, MeshError, unknown
 from fastcontact.mesh.files import med, meshio_files
 from fastcontact.mesh.files.hdf5 import opened, values
 from fastcontact.mesh.files.paths import PathLike, existing_file
 from fastcontact.mesh.files.point_fields import MED_SUFFIXES, SAME_PLACE, VTKHDF_SUFFIXES
-
-Array = NDArray[np.float64]
 
 
 class CellField(NamedTuple):
@@ -52,7 +50,7 @@ def read_cell_field(path: PathLike, name: str) -> CellField:
     return CellField(None, _one(path, name, field[None]), middles)
 
 
-def _one(path: PathLike, name: str, field: NDArray[Any]) -> Array:
+def _one(path: PathLike, name: str, field: AnyArray) -> Array:
     """Return a field (n_instants, n_cells, ...) with one component as (n_instants, n_cells)."""
     count = int(np.prod(field.shape[2:], dtype=np.int64))
     if count != 1:
@@ -60,7 +58,7 @@ def _one(path: PathLike, name: str, field: NDArray[Any]) -> Array:
     return np.asarray(field, np.float64).reshape(field.shape[:2])
 
 
-def _vtkhdf(path: Path, name: str) -> tuple[NDArray[Any], Array]:
+def _vtkhdf(path: Path, name: str) -> tuple[AnyArray, Array]:
     """Read a field at the cells of an unstructured grid in the format of VTK in HDF5, of one instant and one part."""
     with opened(path) as file:
         grid = file.get("VTKHDF", {})

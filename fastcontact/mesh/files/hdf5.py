@@ -11,8 +11,8 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import AnyArray
 from fastcontact.errors import FastcontactError, FileError
 from fastcontact.mesh.files.paths import PathLike, existing_file
 
@@ -124,7 +124,7 @@ def check_size(where: str, shape: tuple[int, ...], file: Any) -> None:
         raise FileError(f"{where} is an array of {size:.3g} bytes, which a file of its size cannot hold: write it anew")
 
 
-def values(group: Any, name: str) -> NDArray[Any]:
+def values(group: Any, name: str) -> AnyArray:
     """Return a data set of `group` as an array of numbers or of strings of fixed length, or raise FileError."""
     import h5py
 

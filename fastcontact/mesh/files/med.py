@@ -11,8 +11,8 @@ from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.errors import FileError, MeshError, unknown
 from fastcontact.mesh import elements
 from fastcontact.mesh.argument_types import typed
@@ -23,8 +23,6 @@ from fastcontact.mesh.files.hdf5_driver import new_hdf5
 from fastcontact.mesh.files.med_families import Families, checked_name, decoded
 from fastcontact.mesh.files.paths import PathLike, replacing
 from fastcontact.mesh.mesh import Mesh
-
-Array = NDArray[np.float64]
 
 # Elements whose nodes MED numbers otherwise than we do: our node k is node NODE_ORDER[code][k] of MED. MED sees the
 # base of a solid from outside, where we see it from inside: its cells are ours in the mirror.
@@ -149,7 +147,7 @@ def _read_blocks(step: Any, families: Families) -> Iterator[Block]:
         yield Block(kind, nodes, _members(entry, len(nodes), families))
 
 
-def _members(entry: Any, count: int, families: Families) -> dict[str, NDArray[np.intp]]:
+def _members(entry: Any, count: int, families: Families) -> dict[str, Indices]:
     if "FAM" not in entry:
         return {}
     numbers = values(entry, "FAM")
@@ -165,7 +163,7 @@ def _cell_count(entry: Any) -> int:
     return int(attribute(entry["NOD"], "NBR", 0)) if "NOD" in entry else 0
 
 
-def _read_nodes(entry: Any, code: str) -> NDArray[Any]:
+def _read_nodes(entry: Any, code: str) -> AnyArray:
     flat = values(entry, "NOD")
     size = 1 if code == "PO1" else elements.BY_MED[code].n_nodes
     if len(flat) % size:
@@ -260,7 +258,7 @@ def _write_cells(step: Any, mesh: Mesh, folder: Any) -> None:
         med_families.write_families(folder.create_group("ELEME"), families)
 
 
-def _write_array(group: Any, name: str, array: NDArray[Any], count: int) -> None:
+def _write_array(group: Any, name: str, array: AnyArray, count: int) -> None:
     dataset = group.create_dataset(name, data=np.ascontiguousarray(array).ravel())
     _set(dataset, CGT=1, NBR=count)
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fastcontact.errors import FastcontactWarning, FileError
+from fastcontact.arrays import AnyArray, Indices, Numbers
+from fastcontact.errors import FileError, warn
 from fastcontact.mesh.files.hdf5 import attribute, values
 
 GROUP_NAME_SIZE = 80
@@ -63,26 +62,24 @@ def _group_names(family: Any) -> tuple[str, ...]:
     return tuple(name for name in map(decoded, fields) if name)
 
 
-def members(numbers: NDArray[Any], families: Families) -> dict[str, NDArray[np.intp]]:
+def members(numbers: AnyArray, families: Families) -> dict[str, Indices]:
     """Return the rows of each group, from the family number of each row."""
-    found: dict[str, list[NDArray[np.intp]]] = {}
+    found: dict[str, list[Indices]] = {}
     order = np.argsort(np.abs(numbers), kind="stable")
     starts = np.flatnonzero(np.diff(numbers[order])) + 1
     for rows in np.split(order, starts) if len(numbers) else []:
         number = int(numbers[rows[0]])
         if number and number not in families:
-            warnings.warn(
+            warn(
                 f"{len(rows)} cells or points belong to family {number}, which the MED file does not "
-                "describe: they are in no group",
-                FastcontactWarning,
-                stacklevel=2,
+                "describe: they are in no group"
             )
         for name in families.get(number, ()):
             found.setdefault(name, []).append(rows)
     return {name: np.unique(np.concatenate(parts)) for name, parts in found.items()}
 
 
-def families_of(groups: Mapping[str, NDArray[Any]], count: int, sign: int) -> tuple[NDArray[np.int32], Families]:
+def families_of(groups: Mapping[str, AnyArray], count: int, sign: int) -> tuple[Numbers, Families]:
     """Return the family number of each of `count` cells or points, and the groups of each family.
 
     One family is made for each combination of groups that occurs, and one for all groups without members.

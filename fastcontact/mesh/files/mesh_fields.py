@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Numbers
 from fastcontact.errors import FileError, MeshError, unknown
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.files.cell_fields import at_cells, read_cell_field
@@ -14,7 +14,6 @@ from fastcontact.mesh.files.paths import PathLike
 from fastcontact.mesh.files.point_fields import at_points_of, read_point_field
 from fastcontact.mesh.mesh import Mesh
 
-Array = NDArray[np.float64]
 OVER = ("cells", "points")
 # How far a time of a file may lie from the one that is wanted, relative to the latest.
 SAME_TIME = 1e-9
@@ -74,7 +73,7 @@ def read_field(
     return np.where(np.isfinite(found), found, found[wanted].mean())
 
 
-def _cells(mesh: Mesh, groups: Sequence[str] | str | None) -> list[NDArray[np.int32]]:
+def _cells(mesh: Mesh, groups: Sequence[str] | str | None) -> list[Numbers]:
     """Return the nodes of the solid cells of groups, by element in the order of the mesh."""
     if groups is None:
         return list(mesh.solids.values())

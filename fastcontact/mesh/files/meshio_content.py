@@ -7,8 +7,8 @@ from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import AnyArray
 from fastcontact.mesh import elements
 from fastcontact.mesh.files.blocks import VERTEX, Block, build_mesh, check_known, merged, without_duplicates
 from fastcontact.mesh.files.meshio_process import CELL_PREFIX, POINT_PREFIX, TAGS
@@ -72,10 +72,10 @@ def _blocks(found: Mapping[str, Any], order: Orders) -> list[Block]:
     return [_block(found, index, kind, nodes, order) for index, (kind, _, nodes) in enumerate(found["cells"])]
 
 
-def _block(found: Mapping[str, Any], index: int, kind: str, nodes: NDArray[Any], order: Orders) -> Block:
+def _block(found: Mapping[str, Any], index: int, kind: str, nodes: AnyArray, order: Orders) -> Block:
     kind = VERTEX if kind == VERTEX else elements.BY_MESHIO[kind].name
     dim = 0 if kind == VERTEX else elements.get(kind).dim
-    groups: dict[str, NDArray[Any]] = {}
+    groups: dict[str, AnyArray] = {}
     for key, parts in found["cell_data"].items():
         if key in TAGS:
             _add(groups, _tagged(parts[index], dim, found["field_data"]))
@@ -88,12 +88,12 @@ def _block(found: Mapping[str, Any], index: int, kind: str, nodes: NDArray[Any],
     return Block(kind, nodes, {name: rows for name, rows in groups.items() if len(rows)})
 
 
-def _add(groups: dict[str, NDArray[Any]], more: Mapping[str, NDArray[Any]]) -> None:
+def _add(groups: dict[str, AnyArray], more: Mapping[str, AnyArray]) -> None:
     for name, rows in more.items():
         groups[name] = np.union1d(groups[name], rows) if name in groups else rows
 
 
-def _tagged(tags: NDArray[Any], dim: int, field_data: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
+def _tagged(tags: AnyArray, dim: int, field_data: Mapping[str, Any]) -> dict[str, AnyArray]:
     """Return the members of each tag, by its name for this dimension or else by a name made of the tag."""
     if tags.ndim != 1 or tags.dtype.kind not in "iu":
         return {}
@@ -105,8 +105,8 @@ def _tagged(tags: NDArray[Any], dim: int, field_data: Mapping[str, Any]) -> dict
     }
 
 
-def _point_groups(found: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
-    groups: dict[str, NDArray[Any]] = {}
+def _point_groups(found: Mapping[str, Any]) -> dict[str, AnyArray]:
+    groups: dict[str, AnyArray] = {}
     for key, data in found["point_data"].items():
         if key in TAGS:
             _add(groups, _tagged(data, 0, {}))

@@ -8,7 +8,6 @@ import io
 import logging
 import tempfile
 import threading
-import warnings
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -16,9 +15,9 @@ from urllib.parse import quote
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fastcontact.errors import FastcontactWarning, FileError, MeshError, unknown
+from fastcontact.arrays import AnyArray, Numbers
+from fastcontact.errors import FileError, MeshError, unknown, warn
 from fastcontact.mesh import elements
 from fastcontact.mesh.files import abaqus, gmsh_versions, hdf5
 from fastcontact.mesh.files.blocks import VERTEX
@@ -105,7 +104,7 @@ def _read_with_field(path: Path, field: str) -> dict[str, Any]:
     return found
 
 
-def read_point_data(path: Path, field: str) -> tuple[NDArray[Any], NDArray[Any]]:
+def read_point_data(path: Path, field: str) -> tuple[AnyArray, AnyArray]:
     """Return the numbers (n_points, ...) [unit of the field] of a field, and its points (n_points, 2 or 3) [length].
 
     FileError if meshio cannot read the file, or it has no such field.
@@ -118,7 +117,7 @@ def read_point_data(path: Path, field: str) -> tuple[NDArray[Any], NDArray[Any]]
     return found["field"], found["points"]
 
 
-def read_cell_data(path: Path, field: str) -> tuple[NDArray[Any], NDArray[Any]]:
+def read_cell_data(path: Path, field: str) -> tuple[AnyArray, AnyArray]:
     """Return the numbers (n_cells, ...) [unit of the field] of a field at cells, and their middles (n_cells, dim) [length].
 
     FileError if meshio cannot read the file, or it has no such field.
@@ -233,19 +232,15 @@ def _parts(mesh: Mesh, file_format: str) -> dict[str, Any]:
         return {**parts, "point_sets": dict(mesh.point_groups)}
     lost = len(mesh.cell_groups) + len(mesh.point_groups)
     if lost:
-        _warn(f"{file_format} files have no named groups: {lost} groups are left out; {KEEPS_ALL}")
+        warn(f"{file_format} files have no named groups: {lost} groups are left out; {KEEPS_ALL}")
     return parts
 
 
-def _meshio_cells(mesh: Mesh, order: Orders) -> list[tuple[str, NDArray[Any]]]:
+def _meshio_cells(mesh: Mesh, order: Orders) -> list[tuple[str, AnyArray]]:
     return [
         (elements.get(name).meshio, block[:, np.argsort(order[name])] if name in order else np.array(block))
         for name, block in mesh.cells.items()
     ]
-
-
-def _warn(message: str) -> None:
-    warnings.warn(message, FastcontactWarning, stacklevel=2)
 
 
 def _with_arrays(parts: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
@@ -258,7 +253,7 @@ def _with_arrays(parts: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
     return {**parts, "cell_data": cell_data, "point_data": point_data}
 
 
-def _flags(members: NDArray[Any], count: int) -> NDArray[np.int32]:
+def _flags(members: AnyArray, count: int) -> Numbers:
     flags = np.zeros(count, np.int32)
     flags[members] = 1
     return flags
@@ -268,7 +263,7 @@ def _with_tags(parts: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
     """Return the parts with a physical tag for each cell, and a vertex cell for each point in a group."""
     dims = np.concatenate([np.full(len(block), elements.get(name).dim) for name, block in mesh.cells.items()])
     tags = np.zeros(mesh.n_cells, np.int32)
-    field_data: dict[str, NDArray[Any]] = {}
+    field_data: dict[str, AnyArray] = {}
     # Small groups overwrite large ones, so that a group of everything does not hide all others.
     for name, members in sorted(mesh.cell_groups.items(), key=lambda item: -len(item[1])):
         if len(members):
@@ -278,7 +273,7 @@ def _with_tags(parts: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
     kept = {name: int((tags[mesh.cell_groups[name]] == tag).sum()) for name, (tag, _) in field_data.items()}
     cut = {name: len(rows) - kept[name] for name, rows in mesh.cell_groups.items() if len(rows) > kept.get(name, 0)}
     if cut:
-        _warn(
+        warn(
             f"Gmsh files of version 2.2 hold one group a cell: {sum(cut.values())} memberships of the groups "
             f"{', '.join(cut)} are left out; {KEEPS_ALL}"
         )
@@ -294,7 +289,7 @@ def _with_vertices(
     named = {name: members for name, members in point_groups.items() if len(members) and name not in field_data}
     twice = [name for name in point_groups if name in field_data]
     if twice:
-        _warn(
+        warn(
             f"{len(twice)} groups of points have the name of a group of cells ({', '.join(twice)}), which "
             f"Gmsh files cannot tell apart: they are left out; {KEEPS_ALL}"
         )

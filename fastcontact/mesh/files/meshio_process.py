@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import AnyArray
 from fastcontact.mesh.files.packing import packed, unpacked
 
 # Limits of the child, each a constant and a part for every byte of the file. meshio 5.3.5 takes up to 0.15 s and 9 MB for a
@@ -129,7 +129,7 @@ def plain_parts(found: Any) -> dict[str, Any]:
     }
 
 
-def _numbers(values: Any) -> NDArray[Any] | None:
+def _numbers(values: Any) -> AnyArray | None:
     """Return an array of numbers, or None where there is none, as for cells with different numbers of nodes."""
     try:
         array = np.asarray(values)

@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.arrays import AnyArray
+
 _ARRAY = "__array__"
 # Kinds of numbers that an array may hold: bool, signed and unsigned integers, floats.
 _KINDS = "biuf"
@@ -68,7 +70,7 @@ def _with_arrays(data: Any, raw: memoryview) -> Any:
     return data
 
 
-def _array(raw: memoryview, place: int, kind: str, shape: list[int]) -> NDArray[Any]:
+def _array(raw: memoryview, place: int, kind: str, shape: list[int]) -> AnyArray:
     dtype = np.dtype(kind)
     if dtype.kind not in _KINDS:
         raise ValueError(f"an array of {kind} is none of ours")

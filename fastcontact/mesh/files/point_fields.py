@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.errors import FileError, MeshError, unknown
 from fastcontact.mesh.files import med, meshio_files
 from fastcontact.mesh.files.hdf5 import check_size, opened, values
 from fastcontact.mesh.files.paths import PathLike, existing_file
 from fastcontact.mesh.mesh import Mesh
 
-Array = NDArray[np.float64]
 MED_SUFFIXES = (".med", ".rmed", ".mmed")
 VTKHDF_SUFFIXES = (".vtkhdf", ".hdf")
 # How far points of a file may lie from those of a mesh, relative to its size, and count as the same.
@@ -59,7 +58,7 @@ def read_point_field(path: PathLike, name: str) -> PointField:
     return result
 
 
-def _one(path: PathLike, name: str, field: NDArray[Any]) -> Array:
+def _one(path: PathLike, name: str, field: AnyArray) -> Array:
     """Return a field (n_instants, n_points, ...) with one component as (n_instants, n_points)."""
     count = int(np.prod(field.shape[2:], dtype=np.int64))
     if field.ndim > 3 or count != 1:
@@ -95,7 +94,7 @@ def _vtkhdf(path: Path, name: str) -> PointField:
         )
 
 
-def at_points_of(field: PointField, mesh: Mesh, wanted: NDArray[np.intp], what: str) -> Array:
+def at_points_of(field: PointField, mesh: Mesh, wanted: Indices, what: str) -> Array:
     """Return the values (n_instants, n_points) of a field at the `wanted` (k,) points of a mesh, elsewhere NaN.
 
     A file with the points of the mesh, in its order, gives the value of each point itself, any other one that of the point
@@ -117,7 +116,7 @@ def at_points_of(field: PointField, mesh: Mesh, wanted: NDArray[np.intp], what: 
     return found
 
 
-def _rows(field: PointField, mesh: Mesh, wanted: NDArray[np.intp], what: str) -> NDArray[np.intp]:
+def _rows(field: PointField, mesh: Mesh, wanted: Indices, what: str) -> Indices:
     """Return the rows (k,) of a field for the wanted points."""
     from scipy.spatial import cKDTree
 

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.mesh.generate._check import affordable
 from fastcontact.mesh.mesh import Mesh
-
-Array = NDArray[np.float64]
 
 SIDES = ("BOTTOM", "RIGHT", "TOP", "LEFT")
 
@@ -59,7 +57,7 @@ def structured(grid: Array, solid: str, sides: Mapping[str, str], triangles: boo
     return Mesh(grid.reshape(-1, 2), {name: block, "line2": np.concatenate(lines)}, groups)
 
 
-def _cut(quads: NDArray[np.intp]) -> NDArray[np.intp]:
+def _cut(quads: Indices) -> Indices:
     """Triangles (2 n m, 3) of quadrangles (n, m, 4), their diagonals alternating like a chessboard's."""
     i, j = np.indices(quads.shape[:2])
     rising = quads[..., [[0, 1, 2], [0, 2, 3]]]

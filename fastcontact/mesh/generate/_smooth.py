@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Numbers = NDArray[np.intp]
-Mask = NDArray[np.bool_]
+from fastcontact.arrays import Array, Indices, Mask
+
 Size = Callable[[Array], Array]
 
 _KEPT = 4  # steps with one triangulation
@@ -22,7 +20,7 @@ _GOOD = np.sin(np.radians(50.0))  # a star whose smallest angle is larger is lef
 _TOO_LONG = 0.5, 2.0  # penalty of an edge too long, and per relative excess, in sines of an angle
 
 
-def delaunay(points: Array) -> Numbers:
+def delaunay(points: Array) -> Indices:
     """Return counter-clockwise triangles (n_triangles, 3) of the convex hull of `points` (n, 2) [length], without flat ones.
 
     Nodes in line on the hull give triangles of zero area by rounding; they are dropped.
@@ -39,7 +37,7 @@ def delaunay(points: Array) -> Numbers:
     return triangles[~flat]
 
 
-def edges_of(triangles: Numbers) -> Numbers:
+def edges_of(triangles: Indices) -> Indices:
     """Return the edges (n_edges, 2) of `triangles` (n_triangles, 3), each once, smaller point number first."""
     ends = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     ends.sort(axis=1)
@@ -48,7 +46,7 @@ def edges_of(triangles: Numbers) -> Numbers:
     return np.column_stack([keys // n, keys % n])
 
 
-def stars_of(triangles: Numbers, n_points: int) -> Numbers:
+def stars_of(triangles: Indices, n_points: int) -> Indices:
     """Return the edges (n_points, degree, 2) of `triangles` (n_triangles, 3) opposite to each point, padded with -1."""
     centre = triangles.ravel()
     opposite = np.stack([np.roll(triangles, -1, axis=1), np.roll(triangles, -2, axis=1)], axis=2).reshape(-1, 2)
@@ -81,7 +79,7 @@ def relax(points: Array, movable: Mask, size: Size, steps: int) -> Array:
     return points
 
 
-def _push(points: Array, edges: Numbers, wanted: Array) -> Array:
+def _push(points: Array, edges: Indices, wanted: Array) -> Array:
     """Sum (n, 2) of the bar forces at the points; a bar longer than its rest length does not pull."""
     bars = points[edges[:, 0]] - points[edges[:, 1]]
     length = np.sqrt((bars * bars).sum(axis=1))
@@ -116,7 +114,7 @@ def polish(points: Array, movable: Mask, limit: Size, sweeps: int) -> Array:
     return points
 
 
-def _sweep(points: Array, movable: Mask, edges: Numbers, stars: Numbers, limit: Array, radius: float) -> bool:
+def _sweep(points: Array, movable: Mask, edges: Indices, stars: Indices, limit: Array, radius: float) -> bool:
     """Try to move every bad point once, worst first, in place; return whether any moved."""
     worth = np.full(len(points), np.inf)
     worth[movable] = _star_quality(points[movable, None], points, stars[movable], limit[movable])[:, 0]
@@ -134,7 +132,7 @@ def _sweep(points: Array, movable: Mask, edges: Numbers, stars: Numbers, limit: 
     return moved
 
 
-def _try_moves(points: Array, chosen: Numbers, stars: Numbers, limit: Array, radius: float) -> bool:
+def _try_moves(points: Array, chosen: Indices, stars: Indices, limit: Array, radius: float) -> bool:
     """Move each chosen point to its best trial place if that is better, in place; return whether any moved."""
     here = points[chosen]
     trials = here[:, None] + radius * limit[chosen, None, None] * _TRIALS
@@ -145,7 +143,7 @@ def _try_moves(points: Array, chosen: Numbers, stars: Numbers, limit: Array, rad
     return bool(best.any())
 
 
-def _star_quality(places: Array, points: Array, stars: Numbers, limit: Array) -> Array:
+def _star_quality(places: Array, points: Array, stars: Indices, limit: Array) -> Array:
     """Quality (m, n_places) of the worst triangle around each point, were it at `places` (m, n_places, 2)."""
     a, b = points[stars[:, None, :, 0]], points[stars[:, None, :, 1]]
     u, v, w = a - places[:, :, None], b - places[:, :, None], b - a

@@ -7,11 +7,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.mesh.generate._check import segments
 
-Array = NDArray[np.float64]
 Curve = Callable[[Array], Array]
 
 

@@ -8,16 +8,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Indices
 from fastcontact.errors import MeshError
 from fastcontact.mesh.generate._check import affordable
 from fastcontact.mesh.generate._smooth import delaunay, edges_of, polish, relax
 from fastcontact.mesh.generate._spacing import Spacing
 from fastcontact.mesh.mesh import Mesh
-
-Array = NDArray[np.float64]
-Numbers = NDArray[np.intp]
 
 # Inner points stand closer than the longest edge allowed, since no triangulation has all its edges equal: fractions of it to
 # try one after the other, and the smallest angle [degrees] with which an attempt, or a better one before, is accepted.
@@ -45,7 +42,7 @@ def filled(solid: str, sides: Sequence[tuple[str, Array]], spacing: Spacing) -> 
     return Mesh(points, {"tri3": triangles, "line2": lines}, groups)
 
 
-def triangulated(outline: Array, spacing: Spacing) -> tuple[Array, Numbers]:
+def triangulated(outline: Array, spacing: Spacing) -> tuple[Array, Indices]:
     """Return points (n_points, 2) [length] and triangles (n_triangles, 3), counter-clockwise, that fill a convex polygon.
 
     The corners of the `outline` (n, 2) [length], counter-clockwise, become the first n points, and no other point lies
@@ -66,7 +63,7 @@ def triangulated(outline: Array, spacing: Spacing) -> tuple[Array, Numbers]:
     )
 
 
-def smallest_angle(points: Array, triangles: Numbers) -> float:
+def smallest_angle(points: Array, triangles: Indices) -> float:
     """Return the smallest angle [degrees] of `triangles` (n_triangles, 3) on `points` (n, 2) [length]."""
     ahead = points[np.roll(triangles, -1, axis=1)] - points[triangles]
     behind = points[np.roll(triangles, 1, axis=1)] - points[triangles]
@@ -110,7 +107,7 @@ def _middles_of_long_edges(points: Array, n_fixed: int, spacing: Spacing) -> Arr
     return middles[long & (ratio >= worst[edges].max(axis=1))]
 
 
-def _checked(triangles: Numbers, n_points: int, n_outline: int) -> Numbers:
+def _checked(triangles: Indices, n_points: int, n_outline: int) -> Indices:
     """Return the triangles if they fill the polygon: Euler's formula counts 2 n_points - 2 - n_outline of them."""
     expected = 2 * n_points - 2 - n_outline
     if len(triangles) != expected:

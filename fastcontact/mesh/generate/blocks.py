@@ -6,8 +6,8 @@ import math
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.errors import MeshError
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.generate._blocks import SIDES, rectangular, structured
@@ -18,8 +18,6 @@ from fastcontact.mesh.generate.half_spheres import quarter_disc
 from fastcontact.mesh.generate.quadratic import in_element
 from fastcontact.mesh.generate.transform import renamed, union, with_points_at
 from fastcontact.mesh.mesh import Mesh
-
-Array = NDArray[np.float64]
 
 
 @typed(MeshError)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.argument_types import typed
@@ -113,7 +114,7 @@ def _sides(
     return {kind: np.concatenate(parts) for kind, parts in facets.items()}, sides
 
 
-def on_lines(element: str, lines: Sequence[NDArray[np.float64]], name: str = "BLOCK") -> Mesh:
+def on_lines(element: str, lines: Sequence[Array], name: str = "BLOCK") -> Mesh:
     """Return a block, or a box in three dimensions, with the groups of `block` or `box`.
 
     Parameters

@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.companion_groups import OPPOSITE
 from fastcontact.mesh.mesh import Mesh
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int32]
 Facet = frozenset[int]
 
 
@@ -64,7 +62,7 @@ def cut(mesh: Mesh, group: str, normal: Sequence[float] | None = None) -> Mesh:
     return _opened(mesh, group, section, facets, beyond, new)
 
 
-def _direction(mesh: Mesh, group: str, points: Indices, normal: Sequence[float] | None) -> Array:
+def _direction(mesh: Mesh, group: str, points: Numbers, normal: Sequence[float] | None) -> Array:
     """Return the unit vector (dim,) across a section."""
     if normal is None:
         places = mesh.points[points] - mesh.points[points].mean(axis=0)
@@ -77,7 +75,7 @@ def _direction(mesh: Mesh, group: str, points: Indices, normal: Sequence[float] 
     return np.asarray(vector / length)
 
 
-def _sides(mesh: Mesh, touched: NDArray[np.bool_]) -> Iterator[tuple[str, int, Facet]]:
+def _sides(mesh: Mesh, touched: Mask) -> Iterator[tuple[str, int, Facet]]:
     """Yield the facets of all solids that have touched points: element, row and nodes."""
     for name, block in mesh.solids.items():
         rows = np.flatnonzero(touched[block].any(axis=1))
@@ -87,7 +85,7 @@ def _sides(mesh: Mesh, touched: NDArray[np.bool_]) -> Iterator[tuple[str, int, F
 
 
 def _cells_beyond(
-    mesh: Mesh, group: str, section: set[Facet], points: Indices, direction: Array
+    mesh: Mesh, group: str, section: set[Facet], points: Numbers, direction: Array
 ) -> dict[str, list[int]]:
     """Return by element the solids at a section that lie beyond it, where `direction` points."""
     touched = np.zeros(mesh.n_points, bool)
@@ -118,7 +116,7 @@ def _cells_beyond(
 
 
 def _sides_of_parts(
-    mesh: Mesh, group: str, between: dict[Facet, list[int]], part: Indices, middle: Array, direction: Array
+    mesh: Mesh, group: str, between: dict[Facet, list[int]], part: Numbers, middle: Array, direction: Array
 ) -> dict[int, bool]:
     """Return by part of the cells at a section whether it lies beyond it; MeshError if one lies on both sides."""
     side: dict[int, bool] = {}
@@ -135,7 +133,7 @@ def _sides_of_parts(
 
 
 def _opened(
-    mesh: Mesh, group: str, section: set[Facet], facets: dict[str, Indices], beyond: dict[str, list[int]], new: Indices
+    mesh: Mesh, group: str, section: set[Facet], facets: dict[str, Numbers], beyond: dict[str, list[int]], new: Numbers
 ) -> Mesh:
     """Return the mesh with the `new` nodes (n_points,), -1 where there are none, in the cells beyond."""
     cells = {name: np.array(block) for name, block in mesh.cells.items()}
@@ -164,7 +162,7 @@ def _opened(
     return Mesh(np.concatenate([mesh.points, mesh.points[old]]), cells, groups, point_groups)
 
 
-def _with_nodes(cells: dict[str, Indices], name: str, rows: NDArray[np.intp], new: Indices) -> list[Facet]:
+def _with_nodes(cells: dict[str, Numbers], name: str, rows: Indices, new: Numbers) -> list[Facet]:
     """Give some cells of an element the new nodes, in place; return their facets as they were, none of facets themselves."""
     if not len(rows):
         return []

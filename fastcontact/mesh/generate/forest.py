@@ -9,21 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import AnyArray, Mask
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.generate.quadratic import Curve, centres, edge_keys, edges_of, edges_on, ends_of
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
-
-Array = NDArray[np.float64]
-Indices = NDArray[Any]
-Mask = NDArray[np.bool_]
 
 CORNERS = {"line2": 2, "tri3": 3, "quad4": 4}
 # Children of a cell by its corners 0.., then the middles of its edges, then (quadrangles) its centre.
@@ -44,8 +39,8 @@ GREEN: dict[tuple[str, int], dict[str, list[list[int]]]] = {
 class _Leaves:
     """Leaves of one kind: corners (n, k), and the cell of the first mesh that each descends from."""
 
-    corners: Indices
-    root: Indices
+    corners: AnyArray
+    root: AnyArray
 
 
 class Forest:
@@ -106,14 +101,14 @@ class Forest:
             marks = {name: self._too_coarse(name) for name in self.solids}
         self._halve_lines()
 
-    def _middles(self, keys: Indices) -> Indices:
+    def _middles(self, keys: AnyArray) -> AnyArray:
         """Points in the middle of edges, -1 where an edge is not divided."""
         if not len(self._divided):
             return np.full(keys.shape, -1)
         place = np.minimum(np.searchsorted(self._divided, keys), len(self._divided) - 1)
         return np.where(self._divided[place] == keys, self._middle[place], -1)
 
-    def _divide(self, keys: Indices) -> None:
+    def _divide(self, keys: AnyArray) -> None:
         """Put a point in the middle of edges that have none yet."""
         new = np.setdiff1d(keys, self._divided)
         if not len(new):
@@ -176,14 +171,14 @@ class Forest:
                 return
             self._quarter("line2", mask)
 
-    def mesh(self) -> tuple[Mesh, Indices]:
+    def mesh(self) -> tuple[Mesh, AnyArray]:
         """Return the mesh of all leaves, and the leaf (n,) of each of its solid cells, in the order of `Mesh.solids`.
 
         Groups of cells hold the descendants of their cells; a new point joins the groups that hold both ends of its edge.
         """
-        blocks: dict[str, list[Indices]] = {}
-        roots: dict[str, list[Indices]] = {}
-        owners: dict[str, list[Indices]] = {}
+        blocks: dict[str, list[AnyArray]] = {}
+        roots: dict[str, list[AnyArray]] = {}
+        owners: dict[str, list[AnyArray]] = {}
         first = 0
         for name, leaves in self._leaves.items():
             for kind, cells, source in self._fitted(name, leaves.corners):
@@ -198,7 +193,7 @@ class Forest:
         check_cells(mesh)
         return mesh, np.concatenate([np.concatenate(owners[kind]) for kind in mesh.solids])
 
-    def _fitted(self, name: str, corners: Indices) -> list[tuple[str, Indices, Indices]]:
+    def _fitted(self, name: str, corners: AnyArray) -> list[tuple[str, AnyArray, AnyArray]]:
         """Return kinds, cells and their leaves: whole, or divided (green) where their edges are."""
         if name == "line2":
             return [(name, corners, np.arange(len(corners)))]

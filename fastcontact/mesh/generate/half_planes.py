@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.argument_types import typed
@@ -13,8 +13,6 @@ from fastcontact.mesh.generate._spacing import Spacing, graded, growing
 from fastcontact.mesh.generate.box import SOLIDS, on_lines
 from fastcontact.mesh.generate.transform import mirrored, renamed, union, with_cells_inside, with_points_at
 from fastcontact.mesh.mesh import Mesh
-
-Array = NDArray[np.float64]
 
 _NAMES_2D = {"LEFT": "SYMMETRY_X", "RIGHT": "SIDE", "TOP": "TOP", "BOTTOM": "BOTTOM"}
 _NAMES_3D = {

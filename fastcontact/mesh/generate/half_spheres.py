@@ -6,8 +6,8 @@ import math
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.errors import MeshError
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.generate._blocks import structured, transfinite
@@ -17,8 +17,6 @@ from fastcontact.mesh.generate._triangulate import filled
 from fastcontact.mesh.generate.quadratic import Circle, in_element
 from fastcontact.mesh.generate.transform import merge_points, mirrored, union, with_points_at
 from fastcontact.mesh.mesh import Mesh
-
-Array = NDArray[np.float64]
 
 # Names of the upper body's groups by those of the lower one; A1A2 is the axis of both.
 _UPPER = {"SPHBAS": "SPHHAU", "A1B1": "A2B2", "CONT1": "CONT2", "D1B1": "D2B2"}

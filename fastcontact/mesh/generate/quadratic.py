@@ -5,21 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
 from fastcontact.mesh.topology import outer_facets
-
-Array = NDArray[np.float64]
-Indices = NDArray[Any]
-Mask = NDArray[np.bool_]
 
 # Nodes this near to a curve, relative to their edge, lie on it.
 ON_CURVE = 1e-6
@@ -131,28 +127,28 @@ def _quadratic_names(mesh: Mesh, centre_nodes: bool) -> dict[str, str]:
     return names
 
 
-def edge_keys(ends: Indices) -> Indices:
+def edge_keys(ends: AnyArray) -> AnyArray:
     """Return one number for each edge (...), the same from either end, by its `ends` (..., 2) of int."""
     return (ends.min(axis=-1).astype(np.int64) << 32) | ends.max(axis=-1)
 
 
-def ends_of(keys: Indices) -> Indices:
+def ends_of(keys: AnyArray) -> AnyArray:
     """Return the point numbers (n, 2) at the ends of the edges with the `keys` (n,) of int."""
     return np.column_stack([keys >> 32, keys & 0xFFFFFFFF])
 
 
-def edges_of(name: str, cells: Indices) -> Indices:
+def edges_of(name: str, cells: AnyArray) -> AnyArray:
     """Return the keys (n_cells, n_edges) of the edges of `cells` (n_cells, n_nodes) of element `name`."""
     return edge_keys(cells[:, elements.get(name).edges])
 
 
-def _edges(cells: Mapping[str, Indices]) -> Indices:
+def _edges(cells: Mapping[str, AnyArray]) -> AnyArray:
     """Sorted keys of the edges of all cells, each once."""
     keys = [edges_of(name, block).ravel() for name, block in cells.items()]
     return np.unique(np.concatenate(keys)) if keys else np.empty(0, np.int64)
 
 
-def edges_on(mesh: Mesh, curve: Curve) -> Indices:
+def edges_on(mesh: Mesh, curve: Curve) -> AnyArray:
     """Return the keys (n,) of the edges of the curve's facets that have both ends on it; MeshError if there is none."""
     edges = _edges(facets_of(mesh, curve))
     on = all_on(mesh, curve, ends_of(edges))
@@ -162,12 +158,12 @@ def edges_on(mesh: Mesh, curve: Curve) -> Indices:
     return edges[on]
 
 
-def facets_of(mesh: Mesh, curve: Curve) -> Mapping[str, Indices]:
+def facets_of(mesh: Mesh, curve: Curve) -> Mapping[str, AnyArray]:
     """Return the facets (n, n_nodes) of the curve's group, by facet element."""
     return outer_facets(mesh) if curve.group is None else mesh.cells_of(curve.group, dim=mesh.dim - 1)
 
 
-def all_on(mesh: Mesh, curve: Curve, nodes: Indices) -> Mask:
+def all_on(mesh: Mesh, curve: Curve, nodes: AnyArray) -> Mask:
     """Return whether all nodes of each facet or edge (n,) lie on the curve; `nodes` (n, n_nodes), its ends first."""
     places = mesh.points[nodes]
     length = np.linalg.norm(places[:, 1] - places[:, 0], axis=1)

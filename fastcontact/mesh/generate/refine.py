@@ -5,20 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.arrays import AnyArray, Array
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.generate.quadratic import ON_CURVE, Circle, Curve, all_on, facets_of
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
-
-Array = NDArray[np.float64]
-Indices = NDArray[Any]
 
 # Corners of the children in the reference cell, each child turned like its parent.
 _CHILDREN = {
@@ -49,9 +46,9 @@ class _Pattern:
     """
 
     shape: Array
-    children: Indices
-    on_edge: Indices
-    along: Indices
+    children: AnyArray
+    on_edge: AnyArray
+    along: AnyArray
 
 
 @cache
@@ -113,7 +110,7 @@ def refined(mesh: Mesh, curves: Iterable[Curve] = ()) -> Mesh:
     return result
 
 
-def _numbered(mesh: Mesh) -> tuple[Indices, dict[str, Indices], dict[str, Indices]]:
+def _numbered(mesh: Mesh) -> tuple[AnyArray, dict[str, AnyArray], dict[str, AnyArray]]:
     """Number the new points: first those on edges, once for all cells that share them, then those inside cells.
 
     Return the sorted keys of the points on edges; by element the new points of its cells, (n, 3) rows of cell, lattice point
@@ -132,7 +129,7 @@ def _numbered(mesh: Mesh) -> tuple[Indices, dict[str, Indices], dict[str, Indice
     lengths = [len(code) for code in codes]
     flat = np.concatenate(codes) if codes else np.empty(0, np.int64)
     keys, first, rank = np.unique(flat, return_index=True, return_inverse=True)
-    where: dict[str, list[Indices]] = {name: [] for name in mesh.cells}
+    where: dict[str, list[AnyArray]] = {name: [] for name in mesh.cells}
     starts = np.concatenate([[0], np.cumsum(lengths)]).astype(int)
     for (name, point), start, end in zip(sources, starts[:-1], starts[1:], strict=True):
         numbers[name][:, point] = mesh.n_points + rank[start:end]
@@ -150,13 +147,13 @@ def _numbered(mesh: Mesh) -> tuple[Indices, dict[str, Indices], dict[str, Indice
     return keys, {n: np.concatenate([np.empty((0, 3), np.int64), *rows]) for n, rows in where.items()}, numbers
 
 
-def _keys(a: Indices, b: Indices, quarters: int, n_points: int) -> Indices:
+def _keys(a: AnyArray, b: AnyArray, quarters: int, n_points: int) -> AnyArray:
     """One number for a point on the edge from a to b, the same from either end."""
     from_least = np.where(a < b, quarters, 4 - quarters)
     return (np.minimum(a, b) * n_points + np.maximum(a, b)) * 4 + from_least
 
 
-def _places(mesh: Mesh, name: str, rows: Indices) -> Array:
+def _places(mesh: Mesh, name: str, rows: AnyArray) -> Array:
     """Coordinates (n, 2) of new points, by the shape functions of their parents."""
     corners = mesh.points[mesh.cells[name][rows[:, 0]]]
     return np.einsum("in,ind->id", _pattern(name).shape[rows[:, 1]], corners)
@@ -169,7 +166,7 @@ def _edge_nodes(name: str) -> list[list[int]]:
     return [[*edge, *middle[k]] for k, edge in enumerate(element.edges)]
 
 
-def _facets_on(mesh: Mesh, curve: Curve) -> list[Indices]:
+def _facets_on(mesh: Mesh, curve: Curve) -> list[AnyArray]:
     """Facets of the curve's group, block by block, all of whose nodes lie on the curve."""
     found = [block[all_on(mesh, curve, block)] for block in facets_of(mesh, curve).values()]
     if not sum(map(len, found)):
@@ -178,20 +175,20 @@ def _facets_on(mesh: Mesh, curve: Curve) -> list[Indices]:
     return found
 
 
-def _on_curve(mesh: Mesh, curve: Curve, keys: Indices) -> Indices:
+def _on_curve(mesh: Mesh, curve: Curve, keys: AnyArray) -> AnyArray:
     """Numbers of the new points on the facets that lie on the curve."""
     ends = np.concatenate([block[:, :2] for block in _facets_on(mesh, curve)]).astype(np.int64)
     wanted = np.unique(np.concatenate([_keys(ends[:, 0], ends[:, 1], q, mesh.n_points) for q in (1, 2, 3)]))
     return mesh.n_points + np.flatnonzero(np.isin(keys, wanted))
 
 
-def _cell_groups(mesh: Mesh) -> dict[str, Indices]:
+def _cell_groups(mesh: Mesh) -> dict[str, AnyArray]:
     """Children of each group's cells: those of one cell follow one another."""
     pieces, start = {}, 0
     for name, first in mesh.offsets.items():
         pieces[name] = (first, start, len(_pattern(name).children))
         start += pieces[name][2] * len(mesh.cells[name])
-    groups: dict[str, Indices] = {}
+    groups: dict[str, AnyArray] = {}
     for group, members in mesh.cell_groups.items():
         rows = mesh.split(members)
         parts = [pieces[n][1] + (r[:, None] * pieces[n][2] + np.arange(pieces[n][2])).ravel() for n, r in rows.items()]
@@ -199,8 +196,8 @@ def _cell_groups(mesh: Mesh) -> dict[str, Indices]:
     return groups
 
 
-def _point_groups(mesh: Mesh, where: dict[str, Indices]) -> dict[str, Indices]:
-    groups: dict[str, Indices] = {}
+def _point_groups(mesh: Mesh, where: dict[str, AnyArray]) -> dict[str, AnyArray]:
+    groups: dict[str, AnyArray] = {}
     for group, members in mesh.point_groups.items():
         inside = np.zeros(mesh.n_points, bool)
         inside[members] = True
@@ -229,7 +226,7 @@ def linearised(mesh: Mesh) -> Mesh:
     for block in cells.values():
         used[block] = True
     number = np.cumsum(used) - 1
-    merged: dict[str, Indices] = {}
+    merged: dict[str, AnyArray] = {}
     order: list[NDArray[np.int64]] = []
     for linear in dict.fromkeys(elements.get(name).linear for name in cells):
         parts = [name for name in cells if elements.get(name).linear == linear]
@@ -262,7 +259,7 @@ def circles(mesh: Mesh) -> list[Circle]:
     return found
 
 
-def _circle(mesh: Mesh, group: str, blocks: list[Indices]) -> Circle | None:
+def _circle(mesh: Mesh, group: str, blocks: list[AnyArray]) -> Circle | None:
     points = mesh.points[np.unique(np.concatenate([block.ravel() for block in blocks]))]
     if len(points) < 4:
         return None

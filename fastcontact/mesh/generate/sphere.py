@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.errors import MeshError
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.generate._check import count, each, one_of, positive
@@ -17,7 +17,6 @@ from fastcontact.mesh.generate.transform import merge_points, renamed, union, wi
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
 
-Array = NDArray[np.float64]
 Map = Callable[[Array, Array, Array], Array]
 
 # Wedges of different blocks would not match, and the apex of a pyramid in a thin curved cell would stand outside it.

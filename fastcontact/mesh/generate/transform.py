@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.generate._check import number, one_of
 from fastcontact.mesh.mesh import Mesh
 
-Array = NDArray[np.float64]
-Indices = NDArray[Any]
-Groups = dict[str, Indices]
+Groups = dict[str, AnyArray]
 Names = Mapping[str, str | None] | Callable[[str], str | None]
 
 _AXES = ("x", "y", "z")
@@ -36,7 +34,7 @@ def renamed(mesh: Mesh, names: Names) -> Mesh:
         name are united.
     """
 
-    def groups(old: Mapping[str, Indices]) -> Groups:
+    def groups(old: Mapping[str, AnyArray]) -> Groups:
         new: Groups = {}
         for name, members in old.items():
             target = names(name) if callable(names) else names.get(name, name)
@@ -128,20 +126,20 @@ def union(*meshes: Mesh) -> Mesh:
 
 def _joined(parts: Iterable[Groups]) -> Groups:
     """Return the arrays of the same name, one after the other."""
-    found: dict[str, list[Indices]] = {}
+    found: dict[str, list[AnyArray]] = {}
     for part in parts:
         for name, values in part.items():
             found.setdefault(name, []).append(values)
     return {name: np.concatenate(arrays) for name, arrays in found.items()}
 
 
-def _starts(cells: Mapping[str, Indices]) -> dict[str, int]:
+def _starts(cells: Mapping[str, AnyArray]) -> dict[str, int]:
     """Number of the first cell of each element."""
     lengths = [len(block) for block in cells.values()]
     return dict(zip(cells, np.cumsum([0, *lengths[:-1]]).tolist(), strict=True))
 
 
-def _renumbering(mesh: Mesh, starts: dict[str, int]) -> Indices:
+def _renumbering(mesh: Mesh, starts: dict[str, int]) -> AnyArray:
     """New number of each cell of `mesh`; moves `starts` on, past its cells."""
     numbers = np.empty(mesh.n_cells, np.int64)
     for name, start in mesh.offsets.items():
@@ -197,7 +195,7 @@ def with_points_at(mesh: Mesh, places: Mapping[str, Sequence[float]]) -> Mesh:
     return mesh.with_groups(points=nearest)
 
 
-def with_cells_inside(mesh: Mesh, name: str, group: str, inside: Callable[[Array], NDArray[np.bool_]]) -> Mesh:
+def with_cells_inside(mesh: Mesh, name: str, group: str, inside: Callable[[Array], Mask]) -> Mesh:
     """Return the mesh with a cell group `name`: the cells of `group` whose nodes are all inside.
 
     `inside` (n,) maps points (n, dim) [length] to booleans.

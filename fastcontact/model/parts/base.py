@@ -1,15 +1,14 @@
-"""What every part of a model builds on: the mesh, the kinematics, and lists of what was added."""
+"""Base of all parts of a model: mesh, kinematics, and lists of added items."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 
+from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.elasticity.initial_states import InitialState
 from fastcontact.elasticity.loads import Load, Value
 from fastcontact.elasticity.materials import KINEMATICS, Material
@@ -26,8 +25,6 @@ from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.periodicity import Seam
 from fastcontact.model.pretension import Pretension
 from fastcontact.model.ramp import Table
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -117,12 +114,12 @@ class ModelBase:
         found = self.mesh.split(np.unique(np.concatenate([self.mesh.cell_groups[name] for name in groups])))
         return Cells(self.mesh, {name: found[name] for name in self.mesh.solids if name in found})
 
-    def _points_of_cells(self, groups: Sequence[str] | None) -> NDArray[np.intp]:
+    def _points_of_cells(self, groups: Sequence[str] | None) -> Indices:
         """Return the points of the solid cells of groups, or of all."""
         cells = self._cells_of(groups)
         return np.unique(np.concatenate([self.mesh.cells[name][rows].ravel() for name, rows in cells.rows.items()]))
 
-    def _nodes(self, place: str | int) -> NDArray[Any]:
+    def _nodes(self, place: str | int) -> AnyArray:
         if isinstance(place, str):
             return self.mesh.points_of(place)
         if place != int(place) or not 0 <= place < self.mesh.n_points:
@@ -150,7 +147,7 @@ class ModelBase:
             )
         return np.asarray(vector / length)
 
-    def _related(self) -> NDArray[np.bool_]:
+    def _related(self) -> Mask:
         """Return which points (n_points,) relations and springs hold."""
         related = np.zeros(self.mesh.n_points, bool)
         related[self.holding_rows().indices // self.mesh.dim] = True

@@ -1,4 +1,4 @@
-"""What connects parts of a model: relations, couplings, periods, springs, pretension sections."""
+"""Connections of a model: multi-point constraints, couplings, periodicity, springs, pretension sections."""
 
 from __future__ import annotations
 

@@ -11,8 +11,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Mask
 from fastcontact.contact.default_formulation import against_obstacle, default_formulation
 from fastcontact.contact.formulations import FORMULATIONS, Formulation
 from fastcontact.contact.found_contacts import FoundContacts, find_contacts, nothing_found
@@ -25,7 +25,7 @@ from fastcontact.contact.surface import Surface, surface
 from fastcontact.elasticity.loads import Value, axes_of, check_number
 from fastcontact.errors import ContactError, ModelError, unknown
 from fastcontact.mesh.argument_types import check_fields, typed
-from fastcontact.model.contact_pair import AGAINST_OBSTACLES, ContactPair, Driving, FluidPressure, method
+from fastcontact.model.contact_pair import ContactPair, Driving, FluidPressure, method
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
 from fastcontact.model.obstacle_rotation import rotation_of
 from fastcontact.model.pair_options import SHARED_OPTIONS, pair_options
@@ -226,7 +226,8 @@ class ModelContact(ModelConnections):
             History of motion and force, and of a rotation without one of its own.
         formulation : str, optional
             ``"node_to_segment"`` (then: node against obstacle), by default on linear triangles and, in space, on
-            facets whose nodes all carry pressure (tri3, quad4, quad9), or ``"continuous"``, by default on all others.
+            facets whose nodes all carry pressure (tri3, quad4, quad9); ``"mortar"`` with one weighted gap a node, by default
+            in space on the other, quadratic facets where there is friction; or ``"continuous"``, by default on all others.
         **options
             Fields of the formulation.
         """
@@ -240,15 +241,18 @@ class ModelContact(ModelConnections):
         history = table_of(ramp, f"the ramp of the motion of obstacle '{name}'")
         options = {option: value for option, value in options.items() if value is not None}
         if formulation is None:
-            formulation, reason = against_obstacle(self.mesh.dim, *self._facet_kinds(secondary), options)
+            kinds = self._facet_kinds(secondary)
+            formulation, options, reason = against_obstacle(self.mesh.dim, *kinds, options)
             log.info("contact '%s': %s, since %s", name, method(formulation, options), reason)
+        if formulation == "mortar":
+            options.setdefault("multipliers", "dual")
         driving = self._driving(name, moves, force)
         turned = (None, None) if rotation is None else rotation_of(name, rotation, self.kinematics)
         self._add_pair(
             ContactPair(name, secondary, "", formulation, options, obstacle, displacement, history, driving, *turned)
         )
 
-    def _source(self, pair: ContactPair, side: Surface, options: PairOptions) -> NDArray[np.bool_] | None:
+    def _source(self, pair: ContactPair, side: Surface, options: PairOptions) -> Mask | None:
         """Return the nodes (n_points,) that the fluid in a pair comes from, None where there is none."""
         if pair.fluid is None:
             return None
@@ -335,11 +339,12 @@ class ModelContact(ModelConnections):
         )
         primary: Surface | RigidSide
         if pair.obstacle is not None:
-            if pair.formulation not in AGAINST_OBSTACLES:
+            if not kind.against_obstacles:
                 raise ContactError(
-                    unknown("contact formulation for a rigid obstacle", pair.formulation, AGAINST_OBSTACLES)
+                    f"contact '{pair.name}': mortar in the plane needs multipliers='dual' at an obstacle"
                 )
             primary = RigidSide(pair.obstacle, np.array(pair.motion), pair.rotation)
+            own.setdefault("surface_smoothing", False)
         else:
             primary = surface(self.mesh, pair.primary)
             check_sides(self.mesh, pair.name, secondary, primary, options.excluded)

@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.elasticity.initial_states import StressOffset, initial_state
 from fastcontact.elasticity.loads import Value
 from fastcontact.elasticity.material_axes import Axes
@@ -24,8 +24,6 @@ from fastcontact.mesh.files.paths import PathLike
 from fastcontact.model.parts.base import group_names
 from fastcontact.model.parts.loads import ModelLoads
 from fastcontact.model.ramp import History, Table, table_of
-
-Array = NDArray[np.float64]
 
 
 class ModelInitialStates(ModelLoads):

@@ -7,9 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
+from fastcontact.arrays import Array
 from fastcontact.elasticity.following_pressure import FollowingPressure
 from fastcontact.elasticity.inertia_loads import Centrifugal, Densities, Gravity, InertiaLoad
 from fastcontact.elasticity.loads import (
@@ -32,8 +30,6 @@ from fastcontact.model.parts.base import group_names
 from fastcontact.model.parts.materials import ModelMaterials
 from fastcontact.model.ramp import History, Table, table_of
 from fastcontact.model.spread_forces import SpreadForce, spread_of
-
-Array = NDArray[np.float64]
 
 
 class ModelLoads(ModelMaterials):

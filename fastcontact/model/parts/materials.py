@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Mask, Numbers
 from fastcontact.elasticity.material_field import MaterialField, material_field
 from fastcontact.elasticity.materials import Material
 from fastcontact.elasticity.nonlinear_bodies import NonlinearBodies, check_law, field_names, nonlinear_bodies
@@ -15,8 +15,6 @@ from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.errors import ModelError
 from fastcontact.mesh.argument_types import typed
 from fastcontact.model.parts.base import ModelBase
-
-Array = NDArray[np.float64]
 
 
 class ModelMaterials(ModelBase):
@@ -45,7 +43,7 @@ class ModelMaterials(ModelBase):
             named = nonlinear[0] if nonlinear else f"strain='{self.strain}'"
             raise ModelError(f"{what} there for linear elasticity alone, not with {named}")
 
-    def material_numbers(self) -> tuple[Array, dict[str, NDArray[np.int32]]]:
+    def material_numbers(self) -> tuple[Array, dict[str, Numbers]]:
         """Return moduli (n_moduli, 4, 4), in 3D (n_moduli, 6, 6) [pressure], and by element every solid cell's number there.
 
         The first are those of the materials; materials that vary have further ones, for the middle of each cell.
@@ -59,7 +57,7 @@ class ModelMaterials(ModelBase):
             self.mesh, self.kinematics, [material for material, _ in self.materials], self.material_of_cells()
         )
 
-    def material_of_cells(self) -> dict[str, NDArray[np.int32]]:
+    def material_of_cells(self) -> dict[str, Numbers]:
         """Return by element every solid cell's material (n_cells,)."""
         if not self.materials:
             raise ModelError("no material: call add_material(LinearElastic(E=..., nu=...)) for the solid cells")
@@ -76,11 +74,11 @@ class ModelMaterials(ModelBase):
         self._check_all_have_material(numbers)
         return numbers
 
-    def averaged_materials(self) -> NDArray[np.bool_]:
+    def averaged_materials(self) -> Mask:
         """Return which moduli (n_moduli,) have a mean dilatation; none in plane stress, where none locks."""
         return self.material_field().averaged
 
-    def _check_material(self, index: int, group: str | None, given: NDArray[np.int32]) -> None:
+    def _check_material(self, index: int, group: str | None, given: Numbers) -> None:
         """Refuse a material for cells that have another one already, which was not given to all cells."""
         new = self.materials[index][0]
         for number in np.unique(given[given >= 0]):
@@ -92,7 +90,7 @@ class ModelMaterials(ModelBase):
                     "one for all other cells comes first, without groups"
                 )
 
-    def _check_all_have_material(self, numbers: dict[str, NDArray[np.int32]]) -> None:
+    def _check_all_have_material(self, numbers: dict[str, Numbers]) -> None:
         without = {name: np.flatnonzero(values < 0) for name, values in numbers.items()}
         total = sum(map(len, without.values()))
         if not total:

@@ -9,8 +9,8 @@ import logging
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.elasticity.loads import Value, axes_of, check_value, evaluated
 from fastcontact.elasticity.material_axes import Axes, checked_axes, frames
 from fastcontact.elasticity.relations import Relation
@@ -22,7 +22,6 @@ from fastcontact.model.parts.contact import ModelContact
 from fastcontact.model.ramp import History, Table, table_of
 from fastcontact.model.relation_rows import NORMAL, along, normals_of
 
-Array = NDArray[np.float64]
 log = logging.getLogger("fastcontact")
 # Vectors or a function as those of materials; in the plane the first vector alone will do.
 SupportAxes = Axes | Sequence[float]
@@ -115,12 +114,12 @@ class ModelSupports(ModelContact):
             check_value(support.name, value)
             self.supports.append(support)
 
-    def prescribed(self) -> tuple[NDArray[np.bool_], Array]:
+    def prescribed(self) -> tuple[Mask, Array]:
         """Return (fixed, values), both (n_points, dim): supported components, and their displacement at ramp value 1."""
         fixed, by_ramp = self.prescribed_by_ramp()
         return fixed, sum(by_ramp.values(), np.zeros(self.mesh.points.shape))
 
-    def prescribed_by_ramp(self) -> tuple[NDArray[np.bool_], dict[Table | None, Array]]:
+    def prescribed_by_ramp(self) -> tuple[Mask, dict[Table | None, Array]]:
         """Return supported components (n_points, dim), and by history their displacement at multiplier 1 [length]."""
         fixed = np.zeros(self.mesh.points.shape, bool)
         by_ramp: dict[Table | None, Array] = {}
@@ -144,7 +143,7 @@ class ModelSupports(ModelContact):
         self._hold_axis(fixed, by_ramp)
         return fixed, by_ramp
 
-    def _hold_axis(self, fixed: NDArray[np.bool_], by_ramp: Mapping[Table | None, Array]) -> None:
+    def _hold_axis(self, fixed: Mask, by_ramp: Mapping[Table | None, Array]) -> None:
         """Add the symmetry at the axis of an axisymmetric model to the supports, and refuse those that contradict it."""
         axis = self.axis_nodes
         for values in by_ramp.values():
@@ -158,7 +157,7 @@ class ModelSupports(ModelContact):
         fixed[axis, 0] = True
 
     @property
-    def axis_nodes(self) -> NDArray[np.intp]:
+    def axis_nodes(self) -> Indices:
         """Nodes (k,) on the axis of an axisymmetric model, where x is held at zero without any support; none in others."""
         return axis_nodes(self.mesh) if self.kinematics == "axisymmetric" else np.empty(0, np.intp)
 

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.files.paths import checked_target, replacing
@@ -24,7 +24,6 @@ from fastcontact.results.plot.shape import deformed_shape, scaled
 from fastcontact.results.plot.solid import show_box
 from fastcontact.results.step import StepResult
 
-Array = NDArray[np.float64]
 # Suffixes of moving pictures; all but the first are written by the program ffmpeg.
 SUFFIXES = (".gif", ".mp4", ".mkv", ".webm")
 # Dots an inch: a moving picture holds many pictures.

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.arrays import AnyArray, Array
 from fastcontact.elasticity.recovery import von_mises
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.argument_types import typed
@@ -19,7 +20,6 @@ from fastcontact.results.units import labelled
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 # How deep the picture goes, in contact radii.
 DEEP = 4.0
 COMPONENTS = {"along the axis": 1, "across the axis": 0}
@@ -135,7 +135,7 @@ def _turned(stress: Array, direction: Array) -> Array:
     return np.column_stack([xx, yy, stress[:, 2], xy])
 
 
-def _sides(mesh: Mesh, nodes: NDArray[Any], pole: Array, direction: Array) -> Array:
+def _sides(mesh: Mesh, nodes: AnyArray, pole: Array, direction: Array) -> Array:
     total = np.zeros(mesh.n_points)
     for block in mesh.solids.values():
         np.add.at(total, block, ((mesh.points[block].mean(axis=1) - pole) @ direction)[:, None])

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.errors import FastcontactError, unknown
 from fastcontact.mesh.argument_types import typed
@@ -22,8 +22,6 @@ from fastcontact.results.units import labelled, valued
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 # The part of the surface that is drawn reaches so far beyond the closed one, in its own half widths.
 MARGIN = 0.35
 # Least length of the mean of the facets' normals for a surface to be drawn as it is seen along it.
@@ -164,7 +162,7 @@ def _arrows(ax: Any, flat: Array, vectors: Array, size: Array) -> None:
     ax.quiver(*flat[here].T, *vectors[here].T, color="white", width=0.004, pivot="tail")
 
 
-def _limit(ax: Any, flat: Array, closed: NDArray[np.bool_]) -> float:
+def _limit(ax: Any, flat: Array, closed: Mask) -> float:
     """Show the closed part with a margin around it, or everything if nothing is closed.
 
     Return how high the picture is beside that of a square, 0.55 to 1 [-].

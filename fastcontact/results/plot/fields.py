@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Numbers
 from fastcontact.elasticity.recovery import von_mises, von_mises_signed
 from fastcontact.errors import FastcontactError, unknown
 from fastcontact.mesh.mesh import Mesh
@@ -15,8 +15,6 @@ from fastcontact.results.layout import contact_slip
 from fastcontact.results.separated import separated
 from fastcontact.results.step import StepResult
 from fastcontact.results.tables import AXES, STRESS_COMPONENTS
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +36,7 @@ class Field:
     """
 
     mesh: Mesh
-    node: NDArray[np.int32]
+    node: Numbers
     values: Array
     caption: str
     quantity: str

@@ -1,12 +1,12 @@
-"""What triangles hide from the eye, in a parallel projection."""
+"""Hidden-surface removal for triangles in parallel projection."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from fastcontact.arrays import Array, Mask
+
 # A place closer behind a triangle than this part of the whole size lies on it.
 ON_IT = 1e-4
 

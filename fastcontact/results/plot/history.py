@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analytic.pressure_curve import NAMES
+from fastcontact.arrays import Array
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.argument_types import typed
 from fastcontact.results.plot._axes import UNKNOWN, Panels, Units, contacts_of, new_axes, new_panels
@@ -18,7 +18,6 @@ from fastcontact.results.units import labelled, units_of_results
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 # So many numbers of closed nodes stand beside each other above the zones.
 MOST_COUNTS = 20
 STATES = {"open": "0.85", "closed": "C0", "sticking": "C0", "sliding": "C1"}

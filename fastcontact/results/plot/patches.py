@@ -6,13 +6,11 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import AnyArray, Array
 from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.mesh import elements
 
-Array = NDArray[np.float64]
-Indices = NDArray[Any]
 # Into so many parts each side of a cell is cut, to show how places and a field vary in it.
 CUTS = 4
 # With more cells than this they are too small for that to be seen.
@@ -20,7 +18,7 @@ FEW = 5000
 
 
 def fill(
-    ax: Any, blocks: Mapping[str, Indices], place: Array, values: Array, colours: str, ends: tuple[float, float]
+    ax: Any, blocks: Mapping[str, AnyArray], place: Array, values: Array, colours: str, ends: tuple[float, float]
 ) -> Any:
     """Fill cells by their shape functions; return what carries the colours.
 
@@ -65,7 +63,7 @@ def outlines(name: str, corners: Array) -> Array:
     return np.concatenate([np.einsum("ps,nsd->npd", line, corners[:, list(side)]) for side in kind.facets], axis=1)
 
 
-def _lattice(name: str) -> tuple[Array, Indices]:
+def _lattice(name: str) -> tuple[Array, AnyArray]:
     """Return reference coordinates (n, 2) all over a cell, and the triangles (m, 3) between them."""
     corner = elements.get(name).n_corners == 3
     last = CUTS if corner else 2 * CUTS

@@ -7,9 +7,9 @@ from dataclasses import is_dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analytic.pressure_curve import PressureCurve, pressure_curve
+from fastcontact.arrays import Array
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.argument_types import typed
 from fastcontact.results.plot._axes import UNKNOWN, Units, new_axes
@@ -18,8 +18,6 @@ from fastcontact.results.units import labelled, valued
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-Array = NDArray[np.float64]
 
 
 @typed(FastcontactError)

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array
 from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh import elements
@@ -33,7 +33,6 @@ from fastcontact.results.units import labelled, valued
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 # By how much of the size of the body a plane that only touches it is moved inside.
 INSIDE = 1e-7
 # The corners of a tetrahedron in an order in which those on one side come first, by which of the four lie there.

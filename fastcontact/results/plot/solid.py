@@ -5,16 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets
 from fastcontact.results.plot.fields import Field
 from fastcontact.results.plot.hiding import Screen
-
-Array = NDArray[np.float64]
 
 # Cells or facets beyond which edges would only blacken the picture.
 MOST_EDGES = 5000
@@ -103,7 +101,7 @@ def towards(view: tuple[float, float]) -> Array:
     return np.array([np.cos(height) * np.cos(direction), np.cos(height) * np.sin(direction), np.sin(height)])
 
 
-def _facing(shown: Field, place: Array, eye: Array) -> list[tuple[str, Array, Array, NDArray[np.intp]]]:
+def _facing(shown: Field, place: Array, eye: Array) -> list[tuple[str, Array, Array, Indices]]:
     """Return of each kind of facet, for those that face the eye: name, corners, values of the field, flat triangles."""
     cut = len(shown.node) != shown.node.max(initial=-1) + 1
     found = []
@@ -147,7 +145,7 @@ def _seen_strokes(strokes: Array, screen: Screen) -> Array:
     return np.concatenate([strokes[whole], parts[partly][~hidden[partly]]])
 
 
-def _without_cuts(mesh: Mesh, node: NDArray[np.int32]) -> dict[str, NDArray[np.int32]]:
+def _without_cuts(mesh: Mesh, node: Numbers) -> dict[str, Numbers]:
     """Return the outer facets but for those along cuts inside, where two facets have the same nodes."""
     found = {}
     for name, facets in outer_facets(mesh).items():

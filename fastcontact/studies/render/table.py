@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from fastcontact.arrays import AnyArray
 
 Rows = list[list[str]]
 
@@ -32,30 +33,13 @@ def percent(value: float | None, uncertainty: float | None = None) -> str:
     return f"{100 * value:+.{4 if uncertainty is not None and 0 < uncertainty < 1e-5 else 3}f} %"
 
 
-def with_error_bar(value: float, bar: float) -> str:
-    """Return a value with its error bar, both rounded to the two leading digits of the latter.
-
-    Examples
-    --------
-    >>> with_error_bar(2908.1012, 28.7)
-    '2908 +- 29'
-    """
-    if not (math.isfinite(bar) and bar > 0):
-        return number(value, 8)
-    digits = 1 - math.floor(math.log10(bar))
-    if abs(digits) > 12:
-        return f"{number(value, 8)} +- {number(bar, 2)}"
-    places = max(digits, 0)
-    return f"{round(value, digits):.{places}f} +- {round(bar, digits):.{places}f}"
-
-
 def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
     """Return rows of texts as lines, columns right-aligned, the first row a header."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return ["  " + "  ".join(text.rjust(width) for text, width in zip(row, widths, strict=True)) for row in rows]
 
 
-def structured(columns: Mapping[str, Sequence[Any]]) -> NDArray[Any]:
+def structured(columns: Mapping[str, Sequence[Any]]) -> AnyArray:
     """Return columns of equal length (n_rows,) as a structured array (n_rows,) with a field each, in their units."""
     arrays = {name: np.array(values) for name, values in columns.items()}
     length = len(next(iter(arrays.values())))

@@ -125,6 +125,6 @@ def test_the_surplus_is_a_stiffness(name, kinematics):
 def test_the_comparison_leaves_nothing_behind_in_the_solver(linear_solver):
     problem = prepare(clamped("quad4", 0.499, "plain"), fc.linear_ramp(1), fc.Criteria(), linear_solver=linear_solver)
     state, _ = load_step(problem, problem.initial_state(), 1, 1.0)
-    before = repr(problem.solver.memory())
+    before = repr(problem.solver.snapshot())
     assert locking_warning(problem, state.u)
-    assert repr(problem.solver.memory()) == before
+    assert repr(problem.solver.snapshot()) == before

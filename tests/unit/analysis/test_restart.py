@@ -12,6 +12,8 @@ from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.state import State
 from fastcontact.mesh.generate import block, box, renamed, union
 
+pytestmark = pytest.mark.pairwise
+
 FRICTIONLESS, FRICTION = 1e-12, 1e-10
 UP_AND_DOWN = fc.Ramp((1.0, 2.0, 3.0, 4.0, 5.0), ((0.0, 0.0), (3.0, 1.0), (5.0, 0.3)))
 
@@ -330,9 +332,9 @@ def test_a_strengthened_multigrid_cycle_is_remembered():
     analysis.step(1, 0.5)
     analysis.solver._strengthen(4)
     analysis.solver.hierarchy.raise_bounds(1.3)
-    memory = analysis.solver.memory()
+    memory = analysis.solver.snapshot()
     other = Stepping(model, "amg", 1e-10, Criteria(), ramp)
-    other.solver.remember(memory)
+    other.solver.put_back(memory)
     assert other.solver.precision == "double"
     assert other.solver.hierarchy.bounds == analysis.solver.hierarchy.bounds
     f = np.random.default_rng(0).normal(size=other.solver.hierarchy.n)

@@ -53,9 +53,3 @@ def test_nothing_is_computed_before_it_is_asked_for_and_nothing_is_kept(model, m
     assert computed == [1, 2]
     gc.collect()
     assert [reference() for reference in kept] == [None, None]
-
-
-def test_a_wrong_model_is_told_at_the_call(model):
-    wrong = fc.Model(model.mesh, "axisymmetric")
-    with pytest.raises(fc.ModelError, match="material"):
-        fc.solve_steps(wrong)

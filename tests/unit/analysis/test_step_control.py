@@ -188,12 +188,6 @@ def test_steps_that_converge_are_not_cut():
     assert "substeps" not in step.iterations
 
 
-@pytest.mark.parametrize("halvings", [-1, 1.5])
-def test_the_number_of_halvings_is_checked(halvings):
-    with pytest.raises(fc.ModelError, match="max_halvings"):
-        Criteria(max_halvings=halvings)
-
-
 def test_a_step_that_fails_says_which_one_it_is():
     criteria = Criteria(max_active_set_iterations=1, max_halvings=0)
     message = (

@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 from fastcontact.analytic import hertz_line
 from fastcontact.errors import ModelError
 
+pytestmark = pytest.mark.pairwise
+
 REFERENCE = json.loads((Path(__file__).parents[3] / "data/reference/hertz_line.json").read_text())
 
 

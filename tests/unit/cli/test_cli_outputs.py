@@ -19,6 +19,8 @@ from fastcontact.cli import main
 from fastcontact.cli._main import parser
 from fastcontact.errors import printable
 
+pytestmark = pytest.mark.pairwise
+
 mpl.use("Agg")
 
 

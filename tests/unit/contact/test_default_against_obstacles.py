@@ -38,7 +38,10 @@ def test_the_choice_follows_the_cells(element, expected):
     model.add_obstacle("wall", secondary="SIDE", obstacle=wall)
     other = fc.obstacles.HalfSpace((0.0,) * (mesh.dim - 1) + (5.0,), (0.0,) * (mesh.dim - 1) + (-1.0,))
     model.add_obstacle("field", secondary="SIDE", obstacle=other, integration="simpson")
-    assert [pair.formulation for pair in model.contact] == [expected, "continuous"]
+    another = fc.obstacles.HalfSpace((0.0,) * (mesh.dim - 1) + (6.0,), (0.0,) * (mesh.dim - 1) + (-1.0,))
+    model.add_obstacle("rubbing", secondary="SIDE", obstacle=another, friction=0.2)
+    rubbing = "mortar" if mesh.dim == 3 and expected == "continuous" else expected
+    assert [pair.formulation for pair in model.contact] == [expected, "continuous", rubbing]
 
 
 def test_triangles_under_a_ball_have_no_oscillating_pressure():
@@ -52,6 +55,7 @@ def test_triangles_under_a_ball_have_no_oscillating_pressure():
 def test_a_dense_matrix_too_large_to_be_of_use_is_refused(monkeypatch):
     monkeypatch.setattr(multiplier_field, "MOST_POINTS", 20)
     with pytest.raises(
-        fc.ContactError, match=r"closes \d+ integration points at once.*use formulation='node_to_segment'"
+        fc.ContactError,
+        match=r"closes \d+ integration points at once.*use formulation='mortar' with multipliers='dual'",
     ):
         fc.solve(pressed("hex20"), fc.linear_ramp(1), linear_solver="direct")

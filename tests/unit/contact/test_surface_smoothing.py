@@ -4,6 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import fastcontact as fc
 from fastcontact.contact.configuration import Configuration
@@ -55,6 +56,16 @@ def test_cylinders_and_spheres_are_met(element, divisions, tolerance, double):
     assert np.abs(smooth.at(facets, xi) - exact).max() < tolerance * np.abs(exact).max()
     principal = np.sort(np.linalg.eigvalsh(smooth.curvature), axis=1)
     assert principal == pytest.approx(np.tile([0.5 if double else 0.0, 0.5], (len(facets), 1)), abs=1e-3)
+
+
+@pytest.mark.parametrize("element", ["hex8", "tet4", "tet10"])
+def test_what_a_strip_of_single_facets_leaves_open_does_not_depend_on_rounding(element):
+    mesh = bent(element, (6, 1, 1), 2.0, double=True, shift=0.2)
+    side = surface(mesh, "ZMAX")
+    Q = Rotation.from_rotvec([0.3, -1.1, 0.7]).as_matrix()
+    smooth, turned = smooth_side(side, mesh.points), smooth_side(side, mesh.points @ Q.T)
+    assert np.abs(turned.heights - smooth.heights).max() < 1e-9 * np.abs(smooth.heights).max()
+    assert np.abs(turned.curvature - smooth.curvature).max() < 1e-9 * np.abs(smooth.curvature).max()
 
 
 def test_flats_stay_flat_beside_fillets_and_up_to_corners():

@@ -11,6 +11,8 @@ import fastcontact as fc
 from fastcontact.elasticity.material_axes import PAIRS
 from fastcontact.elasticity.stiffness import of_special_form, stiffness
 
+pytestmark = pytest.mark.pairwise
+
 KINEMATICS = ("plane_strain", "plane_stress", "axisymmetric", "3d")
 WOOD = {"E": (10_800.0, 700.0, 430.0), "nu": (0.45, 0.51, 0.54), "G": (620.0, 580.0, 26.0)}
 TILTED = [(1.0, 2.0, 0.5), (-2.0, 1.0, 0.0)]

@@ -10,6 +10,8 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.generate.box import box
 from fastcontact.mesh.topology import corner_volumes, oriented, outer_facets
 
+pytestmark = pytest.mark.pairwise
+
 SOLIDS = [e.name for e in elements.ELEMENTS.values() if e.dim == 3]
 QUADRATIC = [name for name in SOLIDS if elements.get(name).order == 2]
 E, NU = 210.0, 0.3

@@ -15,6 +15,8 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.topology import outer_facets
 from fastcontact.model.fingerprint import fingerprint
 
+pytestmark = pytest.mark.pairwise
+
 SOLIDS = [e.name for e in elements.ELEMENTS.values() if e.dim > 1]
 CASES = [
     (name, kinematics)

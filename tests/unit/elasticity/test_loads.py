@@ -12,6 +12,8 @@ from fastcontact.elasticity.relations import eliminate
 from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.topology import outer_facets
 
+pytestmark = pytest.mark.pairwise
+
 PLANE = ("tri3", "tri6", "quad4", "quad8", "quad9")
 SOLID = ("tet4", "tet10", "hex8", "hex20", "hex27", "wedge6", "wedge15", "wedge18", "pyramid5", "pyramid13")
 
@@ -304,13 +306,6 @@ def test_a_prescribed_function_is_checked_too(model):
     model.prescribe("TOP", y=lambda x: x)
     with pytest.raises(fc.ModelError, match=r"displacement y prescribed on 'TOP'.*shape \(4, 2\)"):
         model.check()
-
-
-def test_a_radial_total_force_is_refused():
-    model = model_on(block("quad4"), "axisymmetric")
-    with pytest.raises(fc.ModelError, match=r"radial forces cancel"):
-        model.add_force("RIGHT", x=1.0)
-    model.add_force("TOP_LEFT", x=1.0)  # a ring is loaded all around
 
 
 def test_a_pressure_inside_the_solid_is_refused():

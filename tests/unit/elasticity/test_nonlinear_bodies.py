@@ -8,6 +8,8 @@ from fastcontact.elasticity.nonlinear_bodies import NonlinearBodies
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.mesh import elements
 
+pytestmark = pytest.mark.pairwise
+
 PLASTIC = fc.ElasticPlastic(
     E=100.0, nu=0.3, yield_stress=0.3, hardening=[(0.0, 0.3), (0.01, 0.5), (0.1, 2.0)], kinematic=4.0
 )

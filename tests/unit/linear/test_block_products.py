@@ -6,6 +6,8 @@ import pytest
 from fastcontact._jit.decorators import kernel
 from fastcontact.linear.multigrid import block_products
 
+pytestmark = pytest.mark.pairwise
+
 SIZES = [(1, 1), (1, 3), (2, 2), (2, 3), (3, 2), (3, 3), (3, 6), (6, 3), (6, 6), (4, 5), (2, 7)]
 
 

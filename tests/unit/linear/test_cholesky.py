@@ -13,6 +13,8 @@ from fastcontact.linear.cholesky import (
 )
 from fastcontact.linear.cholesky import factorisation_kernels as kernels
 
+pytestmark = pytest.mark.pairwise
+
 EXACT = np.array([4]), np.array([0.0, 0.0])
 JOINED = np.array([4, 16]), np.array([1.0, 0.6, 0.3])
 

@@ -15,6 +15,8 @@ from fastcontact.errors import ModelError
 from fastcontact.linear import choice as linear
 from fastcontact.linear.krylov.iterations import KEPT, ConjugateResiduals
 
+pytestmark = pytest.mark.pairwise
+
 
 @pytest.fixture(scope="module")
 def problem(forma04):

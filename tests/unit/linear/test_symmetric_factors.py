@@ -157,7 +157,7 @@ def test_loads_that_others_combine_to_cost_nothing():
         np.testing.assert_allclose(A @ known.solution(load, solve), load, atol=1e-14)
     assert len(solved) == 2
     other = KnownLoads()
-    other.remember(known.memory(), 8, solve)
+    other.put_back(known.snapshot(), 8, solve)
     solved.clear()
     np.testing.assert_array_equal(other.solution(f + g, solve), known.solution(f + g, solve))
     assert not solved
@@ -167,7 +167,7 @@ def test_only_a_few_loads_are_kept():
     known, rng = KnownLoads(), np.random.default_rng(6)
     for _ in range(7):
         known.solution(rng.normal(size=20), lambda f: f)
-    assert len(known.memory()) == 4
+    assert len(known.snapshot()) == 4
 
 
 def test_a_ramp_costs_one_factorisation_and_a_solution_a_step(forma04):

@@ -7,6 +7,8 @@ from scipy.spatial import ConvexHull
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
 
+pytestmark = pytest.mark.pairwise
+
 ALL = list(elements.ELEMENTS.values())
 SOLID = [e for e in ALL if e.facet_elements]
 

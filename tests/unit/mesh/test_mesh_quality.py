@@ -145,26 +145,3 @@ def test_jacobians_and_edges_against_plain_numpy(name):
     np.testing.assert_allclose(measure, det @ weights, rtol=0, atol=1e-13 * np.abs(det).max())
     ends = points[cells][:, np.array(element.edges)]
     np.testing.assert_allclose(longest, np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2).max(axis=1), rtol=1e-14)
-
-
-def test_checking_costs_less_than_assembling():
-    """CPU seconds in one run: the check was 2.5 assemblies of hexahedra once."""
-    from time import process_time
-
-    from fastcontact.elasticity.materials import LinearElastic
-    from fastcontact.elasticity.stiffness import stiffness
-
-    mesh = box((1.0, 1.0, 1.0), (18, 18, 18), "hex8")
-    moduli = LinearElastic(E=1.0, nu=0.3).moduli("3d")[None]
-    material = {"hex8": np.zeros(len(mesh.cells["hex8"]), np.int32)}
-
-    def cost(work):
-        work()
-        seconds = []
-        for _ in range(5):
-            start = process_time()
-            work()
-            seconds.append(process_time() - start)
-        return min(seconds)
-
-    assert cost(lambda: check_cells(mesh)) < 0.6 * cost(lambda: stiffness(mesh, "3d", moduli, material))

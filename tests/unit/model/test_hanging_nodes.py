@@ -10,6 +10,8 @@ from fastcontact.mesh import generate
 from fastcontact.mesh.generate import block, box
 from fastcontact.model.hanging_nodes import hanging_nodes, hanging_nodes_warning
 
+pytestmark = pytest.mark.pairwise
+
 
 def joined(*meshes):
     renamed = [

@@ -106,13 +106,6 @@ def test_a_relation_that_moves_the_axis_is_refused():
         model.check()
 
 
-def test_a_radial_force_on_the_axis_is_refused():
-    with pytest.raises(fc.ModelError, match=r"'TOP_LEFT' has a radial component x at 1 points on the axis"):
-        cylinder().add_force("TOP_LEFT", x=1.0)
-    cylinder().add_force("TOP_LEFT", y=1.0)
-    cylinder(inner=0.1).add_force("TOP_LEFT", x=1.0)
-
-
 def test_a_radial_traction_on_the_axis_goes_into_it():
     """Facets that reach the axis carry the traction; at r = 0 nothing moves."""
     model = cylinder()

@@ -7,13 +7,13 @@ import os
 import struct
 import subprocess
 import sys
-import time
 import zlib
 from types import SimpleNamespace
 
 import h5py
 import numpy as np
 import pytest
+from hostile_texts import DECKS, TEXTS
 from test_result_files import MESH, step_result, write
 
 import fastcontact as fc
@@ -60,14 +60,12 @@ def test_a_heap_whose_end_hdf5_would_not_find(results, size):
     assert struct.unpack_from("<Q", data, at + 8)[0] > 3584
     struct.pack_into("<Q", data, at + 8, size)
     results.write_bytes(data)
-    started = time.process_time()
     with fc.open_results(results) as found:
         assert len(found) == 2
     with fc.ResultWriter(results, MESH, resume=True) as out:
         out.write(step_result(2))
     with fc.open_results(results) as found:
         assert len(list(found)) == 3
-    assert time.process_time() - started < 2
 
 
 @pytest.mark.parametrize("size", [0, 1, 2**40, 2**64 - 1])
@@ -76,10 +74,8 @@ def test_a_text_of_another_size_is_refused_at_once(results, size):
     for at in objects(data, data.find(HEAP))[:-1]:
         struct.pack_into("<Q", data, at + 8, size)
     results.write_bytes(data)
-    started = time.process_time()
     with pytest.raises(FileError, match=r"its texts are damaged at byte|Expecting|Extra data"):
         fc.open_results(results)
-    assert time.process_time() - started < 2
 
 
 @pytest.mark.parametrize("place", [0, 40, 2**62, 2**64 - 1, "of no number"])
@@ -382,22 +378,12 @@ def test_a_field_of_too_many_instants(tmp_path):
         fc.read_med_field(path, "DEPL")
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("*NODE\n1, " + "12," * 30_000, r"line 2, \*NODE: the line has more than 65536 characters"),
-        ("*NODE" + ",a=12" * 30_000, r"line 1, \*NODE: the line has more than 65536 characters"),
-        ("*NODE,\n" + ",\n" * 300_000, r"line 1, \*NODE: the line has more than 65536 characters"),
-        ("12," * 30_000, r"line 1, \*: the line has more than 65536 characters"),
-    ],
-)
-def test_lines_of_decks_end_somewhere(tmp_path, text, said):
+@pytest.mark.parametrize("said", DECKS)
+def test_lines_of_decks_end_somewhere(tmp_path, said):
     path = tmp_path / "deck.inp"
-    path.write_text(text)
-    started = time.process_time()
-    with pytest.raises(fc.CaseError, match=said):
+    path.write_text(DECKS[said])
+    with pytest.raises(fc.CaseError, match=f"{said}.*the line has more than 65536 characters"):
         fc.read_deck(path)
-    assert time.process_time() - started < 2
 
 
 def test_comments_of_decks_may_have_any_length(tmp_path):
@@ -407,31 +393,16 @@ def test_comments_of_decks_may_have_any_length(tmp_path):
         fc.read_deck(path)
 
 
-# Texts for which a careless search, or the parser, takes a time that grows with the square of their length.
-SLOW = {
-    "word": "a" * 300_000,
-    "blanks": "a" + " " * 300_000 + ".",
-    "parts": "a." * 40_000 + "a = 1",
-    "quoted parts": "'a'." * 40_000 + "a = 1",
-    "quotes": "\"'" * 150_000,
-    "table": "[" + "a." * 40_000 + "a]",
-    "almost": ("a." * 49 + "a b ") * 3000,
-    "deep": "a = " + "[" * 100_000,
-}
-
-
-@pytest.mark.parametrize("kind", SLOW)
-def test_texts_of_cases_are_parsed_in_bounded_time(tmp_path, results, kind):
+@pytest.mark.parametrize("kind", TEXTS)
+def test_texts_of_cases_are_no_toml(tmp_path, results, kind):
     path = tmp_path / "case.toml"
-    path.write_text(SLOW[kind])
-    started = time.process_time()
+    path.write_text(TEXTS[kind])
     with pytest.raises(fc.CaseError, match=r"is not valid TOML: "):
         read_case(path)
     with fc.open_results(results) as found:
-        found.case_text = SLOW[kind]
+        found.case_text = TEXTS[kind]
         assert case_data(found)["title"] == ""
         assert found._units() == {}
-    assert time.process_time() - started < 5
 
 
 def test_a_case_text_in_results_that_is_too_large_is_not_parsed(results):

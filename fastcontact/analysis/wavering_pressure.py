@@ -1,0 +1,38 @@
+"""A warning about nodal pressures that go up and down from node to node, as on triangles that are much deeper than wide."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from fastcontact.contact.formulations import Formulation
+from fastcontact.results.step import ContactResult
+
+# Median difference of a nodal pressure from the mean of its neighbours, over the mean pressure, above which pressures waver.
+# On rings of tri3 cells 4.6 times as deep as wide it is 0.30, and pressures are off by 0.16 to 0.27; on wider ones 0.16 (0.09
+# to 0.13), on quadrangles 0.002; under punches of hex8 and tet4, whose pressures are singular at the edges, 0.10 to 0.12.
+WAVERING = 0.2
+# Nodes that a median says something about.
+MANY = 10
+
+
+def wavering(pair: Formulation, contact: ContactResult) -> Iterator[str]:
+    """Yield a warning where pressures of nodes whose neighbours are all closed waver by much of their mean."""
+    beside = pair.secondary.beside
+    # A node is among its own neighbours here: so many less one are the others.
+    others = np.asarray(beside.sum(axis=1)).ravel() - 1.0
+    inside = contact.active & (beside @ ~contact.active == 0) & (others > 0)
+    if inside.sum() < MANY:
+        return
+    own = contact.pressure[inside]
+    apart = own - ((beside @ contact.pressure)[inside] - own) / others[inside]
+    size, mean = float(np.median(np.abs(apart))), float(own.mean())
+    if not size > WAVERING * mean > 0.0:
+        return
+    yield (
+        f"contact '{contact.name}': nodal pressures waver from node to node, by {0.5 * size:.3g} up and down about a mean of "
+        f"{mean:.3g}: trust means over neighbouring nodes, or take quadrangles or hexahedra along "
+        f"'{pair.secondary.group}', or triangles or tetrahedra there about as deep as wide"
+        f"{'' if pair.name == 'mortar' else ', or formulation mortar'}"
+    )

@@ -1,0 +1,106 @@
+"""The same step from the same state gives the same bits and counts, after any other step and in another problem."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from fastcontact.analysis import restart
+from fastcontact.analysis.load_step import load_step
+from fastcontact.analysis.problem import prepare
+
+pytestmark = pytest.mark.filterwarnings("ignore::fastcontact.errors.FastcontactWarning")
+RAMP = fc.linear_ramp(4)
+ELASTIC = fc.LinearElastic(E=20_000.0, nu=0.3)
+PLASTIC = fc.ElasticPlastic(E=20_000.0, nu=0.3, yield_stress=400.0, hardening=[(0.0, 400.0), (0.1, 600.0)])
+
+
+def spheres(material=ELASTIC, strain="small", **options):
+    model = fc.Model(fc.generate.half_spheres(size=8.0), kinematics="axisymmetric", strain=strain)
+    model.add_material(material)
+    model.fix("A1A2", "x")
+    model.prescribe("A2B2", y=-2.0)
+    model.prescribe("A1B1", y=+2.0)
+    model.add_contact("hertz", secondary="CONT1", primary="CONT2", **options)
+    return model
+
+
+def lying_block(**options):
+    """Return a block that a pressure presses on another one, held by contact alone along y."""
+    model = fc.Model(fc.generate.block_on_block("quad4"), kinematics="plane_strain")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model.fix("LOWER_BOTTOM", "xy")
+    model.fix("UPPER_LEFT", "x")
+    model.add_pressure("UPPER_TOP", 5.0)
+    model.add_contact("seam", secondary="CONT_UPPER", primary="CONT_LOWER", **options)
+    return model
+
+
+def sphere_on_block(element="hex8", **options):
+    model = fc.Model(fc.generate.sphere_on_block(element, size=25.0, contact_size=4.0), kinematics="3d")
+    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+    model.fix("SYMMETRY_X", "x")
+    model.fix("SYMMETRY_Z", "z")
+    model.fix("BLOCK_BOTTOM", "y")
+    model.prescribe("SPHERE_TOP", y=-1.0)
+    model.add_contact("hertz", secondary="CONT_SPHERE", primary="CONT_BLOCK", **options)
+    return model
+
+
+CASES = {
+    "mortar": spheres,
+    "mortar, friction": lambda: spheres(friction=0.3),
+    "node_to_segment, friction": lambda: spheres(formulation="node_to_segment", friction=0.2),
+    "continuous": lambda: spheres(formulation="continuous"),
+    "plastic, friction": lambda: spheres(PLASTIC, friction=0.1),
+    "finite strain": lambda: spheres(fc.NeoHookean(E=20_000.0, nu=0.3), "finite"),
+    "held by contact": lying_block,
+    "held by contact, friction": lambda: lying_block(friction=0.3),
+    "space, friction": lambda: sphere_on_block(friction=0.2),
+    "space, continuous": lambda: sphere_on_block(formulation="continuous"),
+    "space, standard multipliers": lambda: sphere_on_block("tet10", formulation="mortar", multipliers="standard"),
+}
+
+
+@pytest.mark.parametrize("linear_solver", ["direct", "amg", "pyamg"])
+@pytest.mark.parametrize("case", CASES)
+def test_the_same_step_from_the_same_state_gives_the_same_bits_and_counts(case, linear_solver):
+    if linear_solver == "pyamg" and "space" in case:
+        pytest.skip("slow, and all that it keeps is columns and a tolerance")
+    model = CASES[case]()
+    problem = prepare(model, RAMP, fc.Criteria(), linear_solver=linear_solver)
+    states, results = [problem.initial_state()], []
+    for index in (1, 2, 3):
+        state, result = load_step(problem, states[-1], index, RAMP.instants[index - 1])
+        states.append(state)
+        results.append(result)
+    for index in (2, 1, 3, 2):
+        assert_same(load_step(problem, states[index - 1], index, RAMP.instants[index - 1])[1], results[index - 1])
+    other = prepare(model, RAMP, fc.Criteria(), linear_solver=linear_solver)
+    saved = replace(results[0], restart=restart.taken(problem, states[1], {}))
+    state = restart.put_back(other, saved, frozenset(name for name, pair in saved.contact.items() if pair.active.any()))
+    assert_same(load_step(other, state, 2, RAMP.instants[1])[1], results[1])
+
+
+def assert_same(result, expected):
+    np.testing.assert_array_equal(result.displacement, expected.displacement)
+    for name, pair in expected.contact.items():
+        np.testing.assert_array_equal(result.contact[name].pressure, pair.pressure)
+    counts = {key: value for key, value in expected.iterations.items() if key != "seconds"}
+    assert {key: result.iterations[key] for key in counts} == counts
+
+
+def test_multigrid_that_was_given_up_is_taken_up_again():
+    problem = prepare(spheres(), RAMP, fc.Criteria(), linear_solver="amg")
+    state, _ = load_step(problem, problem.initial_state(), 1, 0.25)
+    _, expected = load_step(problem, state, 2, 0.5)
+    factors = problem.solver._factorise("for want of patience")
+    later, _ = load_step(problem, replace(state, solver=problem.solver.snapshot()), 2, 0.5)
+    assert problem.solver.instead is factors
+    assert_same(load_step(problem, state, 2, 0.5)[1], expected)
+    assert problem.solver.instead is None
+    assert not problem.solver.gave_up
+    assert problem.solver.tolerance == 1e-10
+    load_step(problem, later, 3, 0.75)
+    assert problem.solver.instead is factors
