@@ -45,10 +45,11 @@ def contact_result(
     points = pair.secondary.points
     coordinates = pair.points[points]
     multiplier, active = solution.multiplier[rows], solution.active[rows]
+    active = active if part.wetted is None else active & ~part.wetted.rows
     gap, normal = pair.nodal_gap(at, displacement=displacement)
-    found = _closed(pair, part, multiplier, active, gap, at)
+    found = _closed(pair, part, multiplier, active[: len(part.normal_forces(multiplier))], gap, at)
     closed = found.nodes
-    if part.tied is not None:  # as the bodies lay at rest
+    if pair.options.tied:  # as the bodies lay at rest
         normal = pair.nodal_gap(replace(at, displacement=np.zeros_like(at.displacement)))[1]
     along = _along_the_surface(part, solution, rows, normal, found)
     forces = _forces(pair, part, multiplier, along)
@@ -75,8 +76,14 @@ def contact_result(
         tangent=middle.tangent,
         primary_points=forces.primary_points,
         primary_force_vectors=forces.primary,
+        fluid_pressure=None if pair.options.source is None else _fluid(part, len(points)),
         **_obstacle(pair, at, coordinates + at.displacement[points], forces.secondary),
     )
+
+
+def _fluid(part: Constraints, count: int) -> Array:
+    """Return the pressure of fluid at the nodes (count,) [pressure]."""
+    return np.zeros(count) if part.wetted is None else part.wetted.pressure
 
 
 def _obstacle(pair: Formulation, at: Configuration, deformed: Array, forces: Array) -> dict[str, Any]:
@@ -128,7 +135,7 @@ def _along_the_surface(
 ) -> _AlongTheSurface:
     """Return the tangential results of a pair; empty without friction or tie."""
     multiplier, everywhere = solution.multiplier[rows], np.ones(len(normal), bool)
-    if part.tied is not None:
+    if part.tied is not None and part.tied.directions:
         _, tangential = part.tied.forces(multiplier)
         shear = _nodal_shear(part, part.tied.directions, tangential, normal)
         return _AlongTheSurface(np.where(found.nodes[:, None], shear, 0.0), everywhere)
@@ -169,7 +176,7 @@ def _closed(
 ) -> _Closed:
     """Return the closed nodes of a pair, and their pressures: those whose integral is the force."""
     assert part.nodal is not None
-    forces, excluded = part.normal_forces(multiplier), pair.options.excluded_nodes(pair.secondary)
+    forces, excluded = part.normal_forces(part.contact_forces(multiplier)), pair.options.excluded_nodes(pair.secondary)
     over_side, shares = part.nodal.over_whole_side(forces), part.nodal.shares(forces)
     closed = _closed_nodes(pair, part, active, gap, over_side, at) & ~excluded
     closed, pressure = _carried(pair, part, closed, over_side, shares)
@@ -180,7 +187,7 @@ def _closed(
 def nodal_pressure(pair: Formulation, part: Constraints, multiplier: Array, closed: Mask) -> Array:
     """Return the reported nodal pressures (n_nodes,) for multipliers (m,) [force] and `closed` nodes [pressure]."""
     assert part.nodal is not None
-    forces = part.normal_forces(multiplier)
+    forces = part.normal_forces(part.contact_forces(multiplier))
     return _carried(pair, part, closed, part.nodal.over_whole_side(forces), part.nodal.shares(forces))[1]
 
 
@@ -199,7 +206,8 @@ def _closed_nodes(
         covered = part.nodal.covered
         # Nodes that stand out beyond the other side face nothing themselves, but parts of their facets may.
         return np.isfinite(gap) if isinstance(covered, float) else np.isfinite(gap) | (covered > 0.0)
-    closed = part.nodal.closed_nodes(active, gap, pressure)
+    # Tension holds a layer as pressure closes a gap.
+    closed = part.nodal.closed_nodes(active, gap, pressure if pair.options.cohesion is None else np.abs(pressure))
     for_good = pair.never_opening(pair.points[pair.secondary.points], at)
     return closed if for_good is None else closed | (for_good & np.isfinite(gap))
 

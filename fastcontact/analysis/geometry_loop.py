@@ -19,7 +19,7 @@ from fastcontact.analysis.scatter import Scatter, Watch
 from fastcontact.analysis.shared_nodes import SharedNodes
 from fastcontact.analysis.solution import Accuracy, Solution
 from fastcontact.analysis.tolerances import PATIENT_UPDATES, Tolerances
-from fastcontact.arrays import Array, Mask
+from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.errors import ConvergenceError
 
@@ -150,7 +150,7 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
         elif scatter := watch.seen(part, settled.force, moved.change, moved.size, tolerances.noise(moved.size)):
             _log_scatter(scatter, problem.criteria.geometry)
             return replace(settled, scatter=scatter)
-        mixed = mixing.next(moved.before, part, solution, tolerances.inexact)
+        mixed = mixing.next(moved.before, part, solution, tolerances.inexact, constraints)
         iterate.u = iterate.u if mixed is None else step.dofs.put(iterate.u, mixed)
         tolerances.tighten(moved.relative, solution.residual)
         if plan.extrapolate and update == PATIENT_UPDATES:
@@ -239,16 +239,19 @@ class _Mixing:
 
     def __init__(self, accelerated: Anderson) -> None:
         self._accelerated = accelerated
-        self._known: Mask | None = None
+        self._known: AnyArray | None = None
 
     def restart(self) -> None:
         """Forget the geometries so far."""
         self._accelerated.restart()
 
-    def next(self, before: Array, part: Array, solution: Solution, inexact: bool) -> Array | None:
+    def next(
+        self, before: Array, part: Array, solution: Solution, inexact: bool, constraints: StackedConstraints
+    ) -> Array | None:
         """Return the active displacements (k,) to pair at next; None for those of the solution [length]."""
-        same = self._known is not None and np.array_equal(self._known, solution.active)
-        self._known = solution.active if solution.settled else None
+        state = constraints.state(solution.active)
+        same = self._known is not None and np.array_equal(self._known, state)
+        self._known = state if solution.settled else None
         if inexact or not same:
             self._accelerated.restart()
         # An inexact solution stands still where it is not right yet.

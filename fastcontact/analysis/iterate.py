@@ -74,7 +74,7 @@ def pair_surfaces(problem: Problem, state: State, load: StepLoad, iterate: Itera
     positions, parts = problem.force_driven.positions(u), {}
     still = np.zeros(problem.model.mesh.dim)
     for name, pair in problem.pairs.items():
-        at = problem.configuration(name, state, load, paired_at, u)
+        at = replace(problem.configuration(name, state, load, paired_at, u), pressure=iterate.pressure.get(name))
         turns = isinstance(pair.primary, RigidSide) and pair.primary.rotation is not None
         moved = at.obstacle - at.obstacle_start if turns else None
         part = pair.constraints(replace(at, rounded=True) if iterate.rounded else at)

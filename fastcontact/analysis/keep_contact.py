@@ -15,6 +15,8 @@ from fastcontact.analysis.state import State
 from fastcontact.analysis.wear import Worn
 from fastcontact.analysis.work import contact_work
 from fastcontact.arrays import Array, Mask
+from fastcontact.contact.cohesion import Bond
+from fastcontact.contact.cohesive_layer import Layer
 from fastcontact.results.step import ContactResult
 
 
@@ -36,6 +38,7 @@ def keep_contact(problem: Problem, start: State, load: StepLoad, settled: Settle
         last_change=settled.last_change, first_contact=first_contacts(problem, start, load, end.u),
         extrapolation=start.extrapolation.converged(end.u, gaps_and_forces(settled.constraints, settled.solution)),
         never_opening=never_opening(problem, start, settled), traction=tractions(problem, settled),
+        bonds=bonds(settled, end.u),
     )  # fmt: skip
 
 
@@ -59,13 +62,16 @@ def keep_path(
             before = start.worn.get(name, Worn.nothing(len(contact.points)))
             worn[name] = before.after(pair, at, contact, pair.options.wear)
             told[name] = replace(told[name], wear=worn[name].depth)
-        if not (pair.options.tied or pair.options.gap_only):
+        if name in end.bonds:
+            told[name] = replace(told[name], damage=end.bonds[name].at(contact.coordinates)[1])
+        elif not (pair.options.tied or pair.options.gap_only):
             given = part, settled.solution, rows, at, contact, start.forces.get(name)
             forces[name], found = contact_work(pair, *given)
             told[name] = replace(told[name], dissipation=found[0])
             works += found
-    stored = sum(own.stored for own in forces.values())
-    work = None if start.work is None else start.work.after(energy, stored, works.tolist())
+    stored = sum(own.stored for own in forces.values()) + sum(own.stored for own in end.bonds.values())
+    released = sum(own.released for own in end.bonds.values())
+    work = None if start.work is None else start.work.after(energy, stored, works.tolist(), released)
     return replace(end, worn=worn, slipped=slipped, forces=forces, work=work), told
 
 
@@ -106,3 +112,9 @@ def tractions(problem: Problem, settled: SettledContact) -> dict[str, tuple[Arra
             forces = np.einsum("nk,ndk->nd", solution.tangential[rows], np.stack(part.directions, axis=2))
             found[name] = part.positions, forces / part.areas[:, None]
     return found
+
+
+def bonds(settled: SettledContact, u: Array) -> dict[str, Bond]:
+    """Return by contact pair what cohesive layers are like at displacements u (n_dofs,) [length]."""
+    parts = settled.constraints.parts.items()
+    return {name: part.tied.after(part, u) for name, part in parts if isinstance(part.tied, Layer)}

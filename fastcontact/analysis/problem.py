@@ -66,6 +66,8 @@ class StepLoad:
         What pressures that follow the surface are multiplied with.
     friction_factors : dict of str to float
         By contact pair, what its coefficient of friction is multiplied with, where it changes.
+    fluids : dict of str to float
+        By contact pair, the pressure of the fluid at its source [pressure].
     """
 
     lift: Array
@@ -75,6 +77,7 @@ class StepLoad:
     angles: Mapping[str, float] = field(default_factory=dict)
     following: tuple[float, ...] = ()
     friction_factors: Mapping[str, float] = field(default_factory=dict)
+    fluids: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +169,11 @@ class Problem:
                 frictions[pair.name] = multiplier(pair.friction_ramp, self.ramp, instant)
         force = combined(self.forces, self.ramp, instant, self.shape).ravel()
         following = tuple(multiplier(table, self.ramp, instant) for _, table in self.following)
-        return StepLoad(lift, force, obstacles, clearances, angles, following, frictions)
+        fluids = {
+            pair.name: pair.fluid.pressure * multiplier(pair.fluid.ramp, self.ramp, instant)
+            for pair in self.model.contact if pair.fluid is not None
+        }  # fmt: skip
+        return StepLoad(lift, force, obstacles, clearances, angles, following, frictions, fluids)
 
     def factors(self, histories: Iterable[Temperature | InitialState], instant: float) -> list[float]:
         """Return the load factors of temperatures or initial states at an instant of the ramp [-]."""
@@ -207,6 +214,8 @@ class Problem:
             load.angles.get(name, 0.0),
             state.angles.get(name, 0.0),
             self._worn(name, state),
+            state.bonds.get(name),
+            load.fluids.get(name, 0.0),
             friction_factor=load.friction_factors.get(name, 1.0),
         )
 
@@ -286,10 +295,11 @@ def prepare(
     held = HeldMotions.of(supported, stacked_rows(model.relations, model.n_dofs))
     pairs = {pair.name: model.bind(pair, held) for pair in model.contact}
     for name, pair in pairs.items():
-        if criteria.keep_pairing and isinstance(pair.options.penalty, OverclosureLaw):
+        table = isinstance(pair.options.penalty, OverclosureLaw)
+        if criteria.keep_pairing and (table or pair.options.cohesion is not None or pair.options.source is not None):
             raise ContactError(
-                f"the penalty of contact '{name}' is a table, which updates of the geometry follow: leave "
-                "keep_pairing out"
+                f"contact '{name}' has a table of penalties, a cohesive layer, adhesion, or a fluid, which updates of the "
+                "geometry follow: leave keep_pairing out"
             )
     solver = choice.make(
         linear_solver, dim=mesh.dim, n_dofs=model.n_dofs, precision=linear_precision,

@@ -239,7 +239,7 @@ def _lost(pair: Formulation, contact: ContactResult, touched: bool, loaded: bool
     name, reach, facing = contact.name, pair.options.search_distance, contact.gap[np.isfinite(contact.gap)]
     least = float(facing.min(initial=np.inf))
     gap = f"the smallest gap is {least:.4g}" if len(facing) else "no node faces the other side"
-    if contact.active.any():
+    if contact.active.any() or contact.damage is not None or contact.fluid_pressure is not None:  # these tell it
         return
     if reach is not None and least < -reach:
         yield (

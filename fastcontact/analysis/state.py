@@ -14,6 +14,7 @@ from fastcontact.analysis.unsupported_bodies import RigidPosition
 from fastcontact.analysis.wear import Worn
 from fastcontact.analysis.work import ContactForces, Work
 from fastcontact.arrays import Array, Mask
+from fastcontact.contact.cohesion import Bond
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +47,8 @@ class State:
         there [pressure].
     first_contact : dict of str to (ndarray (dim,), ndarray (dim,))
         By contact pair in space, where the bodies met first [length] and the normal there [-].
+    bonds : dict of str to Bond
+        By contact pair with a cohesive layer, what that is like.
     locked : dict of str to float or ndarray (m,)
         By locked pretension section, its shortening from when it was locked [length]; by temporary relation, the values that
         it began with.
@@ -88,6 +91,7 @@ class State:
     never_opening: Mapping[str, tuple[Array, Mask]] = field(default_factory=dict)
     first_contact: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
     traction: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
+    bonds: Mapping[str, Bond] = field(default_factory=dict)
     locked: Mapping[str, Any] = field(default_factory=dict)
     extrapolation: Extrapolation = field(default_factory=Extrapolation)
     largest_force: float = 0.0
@@ -121,6 +125,7 @@ class State:
             "obstacles": self.u[n_dofs:].copy(),
             "touched": sorted(self.touched),
             "locked": dict(self.locked),
+            "bonds": {name: vars(own) for name, own in self.bonds.items()},
             "work": None if self.work is None else dataclasses.asdict(self.work),
             "forces": {name: vars(own) for name, own in self.forces.items()},
             "history": dict(self.history),
@@ -180,6 +185,7 @@ class State:
             first_contact={name: (both[0], both[1]) for name, both in found["first_contact"].items()},
             traction={name: (both[0], both[1]) for name, both in found["traction"].items()},
             locked=dict(kept.get("locked", {})),
+            bonds={name: Bond(**own) for name, own in kept.get("bonds", {}).items()},
             work=Work(**kept["work"]) if kept.get("work") else None,
             forces={name: ContactForces(**own) for name, own in kept.get("forces", {}).items()},
             extrapolation=Extrapolation.from_dict(kept["extrapolation"], u)

@@ -94,7 +94,9 @@ class Work:
     friction, touching, imbalance : float
         `touching` is the part of friction at constraints that closed in their step.
     stored : float
-        Energy of penalties.
+        Energy of penalties, and of cohesive layers and adhesion.
+    released : float
+        What breaking cohesive layers has taken.
     largest : float
         The largest of these energies and works so far.
     plastic : float
@@ -108,17 +110,18 @@ class Work:
     stored: float = 0.0
     largest: float = 0.0
     plastic: float = 0.0
+    released: float = 0.0
 
     @property
     def external(self) -> float:
         """Work of loads, supports and obstacles."""
-        return self.strain_energy + self.plastic + self.friction + self.imbalance + self.stored
+        return self.strain_energy + self.plastic + self.friction + self.imbalance + self.stored + self.released
 
-    def after(self, energy: tuple[float, float], stored: float, works: Sequence[float]) -> Work:
+    def after(self, energy: tuple[float, float], stored: float, works: Sequence[float], released: float = 0.0) -> Work:
         """Return the work after a step more, from its elastic energy, plastic work and the works of `contact_work`."""
         friction, touching, imbalance = works
         more = self.friction + friction, self.touching + touching, self.imbalance + imbalance
-        found = Work(energy[0], *more, stored, plastic=energy[1])
+        found = Work(energy[0], *more, stored, plastic=energy[1], released=released)
         terms = (self.largest, *energy, found.friction, abs(found.external))
         return replace(found, largest=max(terms))
 
@@ -127,7 +130,8 @@ class Work:
         return {
             "strain_energy": self.strain_energy, "plastic_work": self.plastic,
             "external_work": self.external, "friction_work": self.friction,
-            "friction_while_touching": self.touching, "penalty_energy": self.stored, "imbalance": self.imbalance,
+            "friction_while_touching": self.touching, "penalty_energy": self.stored,
+            "energy_released": self.released, "imbalance": self.imbalance,
         }  # fmt: skip
 
 
@@ -151,7 +155,7 @@ def contact_work(
     before : ContactForces, optional
         At its beginning; None before the first step.
     """
-    normal, tangents = solution.multiplier[rows], np.zeros((len(part), 0))
+    normal, tangents = part.contact_forces(solution.multiplier[rows]), np.zeros((len(part), 0))
     slip, directions = tangents, np.zeros((len(part), 0, contact.coordinates.shape[1]))
     if isinstance(solution, FrictionalEquilibrium) and part.tangents:
         tangents, slip, directions = solution.tangential[rows], solution.slip[rows], np.stack(part.directions, axis=1)

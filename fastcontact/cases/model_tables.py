@@ -7,7 +7,7 @@ import inspect
 import types
 import typing
 from collections import abc
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from reprlib import repr
 from typing import Any
@@ -147,6 +147,8 @@ _ADD: dict[str, Callable[..., None]] = {
     "spring": Model.add_spring,
     "pretension": Model.add_pretension,
 }
+# What names contact pairs, which are there before.
+_ADD_TO_CONTACT: dict[str, Callable[..., None]] = {"fluid_pressure": Model.add_fluid_pressure}
 
 
 def _keys(*adding: Callable[..., None], **further: Any) -> tuple[dict[str, Any], list[str]]:
@@ -185,7 +187,11 @@ def _toml_types(annotation: Any) -> tuple[type, ...]:
 
 # By kind of table: the types of the values of its keys, and the keys that are needed.
 LISTS: dict[str, tuple[dict[str, Any], Sequence[str]]] = {
-    **{kind: _keys(add) for kind, add in _ADD.items() if kind not in ("material", "temperature", "coupling")},
+    **{
+        kind: _keys(add)
+        for kind, add in {**_ADD, **_ADD_TO_CONTACT}.items()
+        if kind not in ("material", "temperature", "coupling")
+    },
     "coupling": _keys(_add_coupling, place=list),
     "material": (
         {
@@ -214,7 +220,17 @@ def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Mo
         reference_temperature=float(data.get("reference_temperature", 0.0)),
     )
     model.units = dict(data.get("units", {}))
-    for kind, add in _ADD.items():
+    _add_lists(model, data, folder, _ADD)
+    _add_contacts(model, data)
+    for name, entry in data.get("obstacle", {}).items():
+        _add_obstacle(model, name, entry, folder)
+    _add_lists(model, data, folder, _ADD_TO_CONTACT)
+    return model
+
+
+def _add_lists(model: Model, data: dict[str, Any], folder: Path, adding: Mapping[str, Callable[..., None]]) -> None:
+    """Add what the lists of tables of some kinds tell."""
+    for kind, add in adding.items():
         known, needed = LISTS[kind]
         for i, entry in enumerate(tables(kind, data.get(kind, []))):
             where = f"{kind}[{i}]"
@@ -225,12 +241,8 @@ def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Mo
                 if key not in entry:
                     raise CaseError(f"{where} needs '{key}'")
             with at(where):
-                given = _from_files(where, entry, mesh, folder) if kind == "material" else entry
+                given = _from_files(where, entry, model.mesh, folder) if kind == "material" else entry
                 add(model, **_arguments(where, _found(folder, _placed(where, given))))
-    _add_contacts(model, data)
-    for name, entry in data.get("obstacle", {}).items():
-        _add_obstacle(model, name, entry, folder)
-    return model
 
 
 def _add_contacts(model: Model, data: dict[str, Any]) -> None:

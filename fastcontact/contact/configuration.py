@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fastcontact.arrays import Array, Mask
+from fastcontact.contact.cohesion import Bond
 from fastcontact.contact.obstacles.rigid_side import Stance
 
 
@@ -34,6 +35,12 @@ class Configuration:
         By which a rigid obstacle has turned, likewise [radian].
     worn : ndarray (n_points,), optional
         Depth worn off at the secondary nodes before the load step [length]; None for nothing.
+    bond : Bond, optional
+        The cohesive layer at the end of the load step before; None where there is none, or none yet.
+    fluid_pressure : float
+        Of the fluid at its source [pressure].
+    pressure : ndarray (n_nodes,), optional
+        What the last pairing has found at the secondary nodes, fluid included [pressure]; None before.
     rounded : bool
         Whether facet normals turn at rounded edges, see `pairing.pair`.
     friction_factor : float
@@ -50,6 +57,9 @@ class Configuration:
     angle: float = 0.0
     angle_start: float = 0.0
     worn: Array | None = None
+    bond: Bond | None = None
+    fluid_pressure: float = 0.0
+    pressure: Array | None = None
     rounded: bool = False
     friction_factor: float = 1.0
 

@@ -66,6 +66,13 @@ class NodalField(Protocol):
         """
         return self.over_whole_side(force) * self.nodal_areas
 
+    def weighted_gaps(self, gaps: Array) -> tuple[Array, Indices]:
+        """Return gaps at the nodes (n_nodes,), of those (m,) of constraints, and the nearest node of each of these (m,).
+
+        Infinite where nothing is faced [length].
+        """
+        return gaps, np.arange(len(gaps))
+
     def closed_nodes(self, active: Mask, gap: Array, pressure: Array) -> Mask:
         """Return the nodes in contact (n_nodes,) for active constraints (m,), nodal gaps [length], pressures [pressure].
 
@@ -79,6 +86,20 @@ class NodalField(Protocol):
         None where constraints are the same in every pairing: then the last set is better.
         """
         return None
+
+
+class Wetted(Protocol):
+    """Where fluid has come; see `fluid_pressure.Wetted`."""
+
+    @property
+    def rows(self) -> Mask:
+        """Constraints (m,)."""
+        ...
+
+    @property
+    def pressure(self) -> Array:
+        """Of the fluid at the secondary nodes (n_nodes,) [pressure]."""
+        ...
 
 
 class Tied(Protocol):
@@ -130,6 +151,10 @@ class Constraints:
         Constraints that supports and obstacles move past the other side by themselves; None stands for none.
     law : OverclosureLaw, optional
         Of which `gap0` and `softness` are a line.
+    branches : ndarray of int, optional
+        On which line of its law each place of a cohesive layer is.
+    wetted : Wetted, optional
+        Where fluid has come between the sides.
     areas : ndarray (m,), optional
         Area that each constraint stands for [area]; infinite where it does nothing.
     nodes : ndarray of int (m,), optional
@@ -137,7 +162,7 @@ class Constraints:
     nodal : NodalField, optional
         What normal forces mean at the secondary nodes.
     tied : Tied, optional
-        Where the constraints are the equations of a tied pair.
+        Where the constraints are the equations of a tied pair, or of a cohesive layer.
     """
 
     B: csr_array
@@ -159,6 +184,8 @@ class Constraints:
     tied: Tied | None = None
     driven: Mask | None = None
     law: OverclosureLaw | None = None
+    branches: AnyArray | None = None
+    wetted: Wetted | None = None
 
     def __len__(self) -> int:
         return len(self.gap0)
@@ -213,6 +240,10 @@ class Constraints:
         """Return the normal forces (m,) at the constraints of the formulation [force]."""
         return multiplier if self.tied is None else self.tied.forces(multiplier)[0]
 
+    def contact_forces(self, multiplier: Array) -> Array:
+        """Return multipliers (m,) without those of fluid [force]."""
+        return multiplier if self.wetted is None else np.where(self.wetted.rows, 0.0, multiplier)
+
     def pressure(self, multiplier: Array) -> Array:
         """Return nodal pressures (n_nodes,) per reference area from the multipliers (m,) [pressure]."""
         assert self.nodal is not None
@@ -221,6 +252,8 @@ class Constraints:
     def initially_active(self, u: Array, pressure: Array) -> Mask | None:
         """Return the set (m,) to start from; see `NodalField`. `u` (n_dofs,) are displacements [length]."""
         assert self.nodal is not None
+        if self.tied is not None and self.equality is not None:
+            return self.equality | (self.gap0 + self.B @ u < 0.0)
         return self.nodal.initially_active(self.gap0 + self.B @ u, pressure)
 
 
@@ -235,6 +268,11 @@ class StackedConstraints(Constraints):
     """
 
     parts: Mapping[str, Constraints] = field(default_factory=dict)
+
+    def state(self, active: Mask) -> AnyArray:
+        """Return the set `active` (m,) with the `branches` of all pairs: what is smooth as long as they are the same."""
+        found = (part.branches for part in self.parts.values() if part.branches is not None)
+        return np.concatenate([active.astype(np.int8), *found])
 
     def rows(self) -> dict[str, slice]:
         """Return the rows of each pair, by its name."""

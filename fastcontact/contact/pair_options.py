@@ -9,6 +9,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array, diags_array, eye_array
 
 from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.contact.cohesion import CohesiveLaw
 from fastcontact.contact.conductance import Conductance
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.contact.pairing import Candidates, Pairing, normals
@@ -51,6 +52,10 @@ class PairOptions:
         Of heat that crosses the contact; None: none does.
     friction_heat : float
         What part of the work of friction becomes heat [-].
+    cohesion : CohesiveLaw, optional
+        Of tension between the sides; None: there is none.
+    source : ndarray of bool (n_points,), optional
+        Nodes that fluid comes from; None: there is none.
     same_place : ndarray of int (n_points,), optional
         For each node, the one whose multiplier it has, too, where the model repeats itself; None where it does not.
     """
@@ -67,6 +72,8 @@ class PairOptions:
     wear: float | None = None
     conductance: Conductance | None = None
     friction_heat: float = 0.0
+    cohesion: CohesiveLaw | None = None
+    source: Mask | None = None
     same_place: Indices | None = None
 
     @property

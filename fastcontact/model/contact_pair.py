@@ -16,6 +16,15 @@ Driving = tuple[float | None, ...]
 
 
 @dataclass(frozen=True)
+class FluidPressure:
+    """Fluid of a `pressure` at multiplier 1 [pressure] from the group `source`, with a history of its own or None."""
+
+    pressure: float
+    source: str
+    ramp: Table | None = None
+
+
+@dataclass(frozen=True)
 class ContactPair:
     """Two groups of facets that may touch, or one and a rigid obstacle, with a formulation and its options.
 
@@ -35,6 +44,7 @@ class ContactPair:
     force: Driving = ()
     rotation: Rotation | None = None
     rotation_ramp: Table | None = None
+    fluid: FluidPressure | None = None
 
     @property
     def method(self) -> str:

@@ -146,6 +146,8 @@ def _take_object(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: A
         fields = [field for field in fields if field.name != "incompatible_modes"]
     if isinstance(value, ContactPair) and value.rotation is None:  # likewise
         fields = [field for field in fields if not field.name.startswith("rotation")]
+    if isinstance(value, ContactPair) and value.fluid is None:
+        fields = [field for field in fields if field.name != "fluid"]
     if isinstance(value, LinearElastic):  # what the choice comes to, and nothing where it is plain, as in older files
         fields = [field for field in fields if field.name != "volumetric"]
         add(b"mean dilatation" if value.averaged else b"")

@@ -99,6 +99,7 @@ class Model(ModelSupports):
             named += [(f"the motion of obstacle '{p.name}'", p.ramp) for p in self.contact]
             named += [(f"the clearance of contact '{p.name}'", p.clearance_ramp) for p in self.contact]
             named += [(f"the friction of contact '{p.name}'", p.friction_ramp) for p in self.contact]
+            named += [(f"the fluid in contact '{p.name}'", p.fluid.ramp) for p in self.contact if p.fluid is not None]
             named += [(f"the rotation of obstacle '{p.name}'", p.rotation_ramp) for p in self.contact]
             check_ramps(named, ramp.instants)
             check_turns(self.contact, ramp)

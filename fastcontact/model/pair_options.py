@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact.arrays import Array, Mask
+from fastcontact.contact.cohesion import CohesiveLaw, cohesive_law
 from fastcontact.contact.conductance import Conductance
 from fastcontact.contact.overclosure import OverclosureLaw
-from fastcontact.contact.pair_options import KINDS, Array, Field, Mask, PairOptions
+from fastcontact.contact.pair_options import KINDS, Field, PairOptions
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity.loads import check_number, check_value, evaluated
 from fastcontact.errors import ContactError, unknown
@@ -19,8 +21,8 @@ from fastcontact.model.ramp import Table, table_of
 
 # Options that every contact pair takes, beside those of its formulation.
 SHARED_OPTIONS = (
-    "clearance", "clearance_primary", "clearance_ramp", "conductance", "excluded", "friction_heat", "friction_ramp",
-    "frictionless", "frictionless_along", "kind", "penalty", "search_distance", "tangential_penalty", "wear",
+    "adhesion", "clearance", "clearance_primary", "clearance_ramp", "cohesion", "conductance", "excluded", "friction_heat",
+    "friction_ramp", "frictionless", "frictionless_along", "kind", "penalty", "search_distance", "tangential_penalty", "wear",
 )  # fmt: skip
 
 
@@ -59,7 +61,51 @@ def pair_options(
         wear=_positive(name, "wear", options, "none"),
         conductance=Conductance(name, options["conductance"]) if "conductance" in options else None,
         friction_heat=_friction_heat(name, options),
+        cohesion=_cohesion(name, options),
     )
+
+
+# Of a cohesive layer and of adhesion: the numbers that must be given, and those that may be.
+LAWS = {
+    "cohesion": (("strength", "energy"), ("stiffness", "shear_strength", "shear_energy", "exponent")),
+    "adhesion": (("strength", "work"), ("stiffness",)),
+}
+
+
+def _cohesion(name: str, options: Mapping[str, Any]) -> CohesiveLaw | None:
+    """Return the law of what holds the sides together, None where nothing does."""
+    chosen = [option for option in LAWS if option in options]
+    if not chosen:
+        return None
+    beside = ("adhesion", "friction", "penalty", "tangential_penalty", "wear")
+    excess = [option for option in beside if option in options and option != chosen[0]]
+    if excess or options.get("kind", "unilateral") != "unilateral":
+        other = (excess or ["kind"])[0]
+        raise ContactError(f"contact '{name}' has {chosen[0]}, which knows no {other}: leave out one of both")
+    option, given = chosen[0], options[chosen[0]]
+    needed, allowed = LAWS[option]
+    if not isinstance(given, Mapping) or not set(needed) <= set(given):
+        raise ContactError(
+            f"the {option} of contact '{name}' must give its {' and its '.join(needed)}, each by its name"
+        )
+    for key, value in given.items():
+        if key not in needed + allowed:
+            raise ContactError(unknown(f"number of the {option} of contact '{name}'", str(key), needed + allowed))
+        check_number(f"the {key} in the {option} of contact '{name}'", value)
+        if not value > 0:
+            raise ContactError(f"the {key} {value} in the {option} of contact '{name}' must be positive")
+    law = cohesive_law(
+        *(float(given[key]) for key in needed),
+        reversible=option == "adhesion",
+        **{key: float(value) for key, value in given.items() if key in allowed},
+    )
+    for strength, energy in ((law.strength, law.energy), (law.shear_strength, law.shear_energy)):
+        if not strength**2 < 2.0 * energy * law.stiffness:
+            raise ContactError(
+                f"the {option} of contact '{name}' would break before its traction falls: its stiffness "
+                f"{law.stiffness:g} must be above {strength**2 / (2.0 * energy):g}, strength^2 / (2 energy)"
+            )
+    return law
 
 
 def _kind(name: str, options: Mapping[str, Any], against_obstacle: bool) -> str:

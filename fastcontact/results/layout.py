@@ -62,7 +62,7 @@ POINT_FIELDS = {
 # Further ones of models that conduct heat.
 HEAT_FIELDS = {"temperature": 1, "heat_reaction": 1}
 # Columns of contact tables that only some pairs have.
-OPTIONAL_COLUMNS = ("wear", "heat_flux")
+OPTIONAL_COLUMNS = ("wear", "heat_flux", "damage", "fluid_pressure")
 
 # Cell data of models in which materials meet: the nodal stress on each cell's own side, averaged over its nodes.
 CELL_STRESS = "stress_in_cell"

@@ -103,6 +103,10 @@ class ContactResult:
     heat_flux : ndarray (m,), optional
         Heat that crosses from the secondary to the primary side by reference area, with the option ``conductance``; its
         integral over the side is the heat [power / area]. None without.
+    damage : ndarray (m,), optional
+        Of the cohesive layer with the option ``cohesion``, 0 as new, 1 broken [-]. None without.
+    fluid_pressure : ndarray (m,), optional
+        Of fluid that has come to the nodes [pressure]. None where `Model.add_fluid_pressure` names no source.
     slip, slip_total : ndarray (m, dim)
         Relative tangential displacement of closed nodes over what they face, in this step and the sum of all steps so far;
         zero at nodes that friction holds, and for the step at open ones [length]. NaN in files from before it was told.
@@ -137,6 +141,8 @@ class ContactResult:
     obstacle_angle: float | None = None
     torque: float | None = None
     wear: Array | None = None
+    damage: Array | None = None
+    fluid_pressure: Array | None = None
     slip: Array = None  # type: ignore[assignment]
     slip_total: Array = None  # type: ignore[assignment]
     heat_flux: Array | None = None
@@ -330,7 +336,8 @@ class StepResult:
 
         ``strain_energy``, of springs of the model, too, and of temperatures as if they were forces; ``plastic_work``;
         ``external_work``, of loads, supports and obstacles; ``friction_work``; ``friction_while_touching``, what of it nodes
-        do in the step in which they close, which is too large in long steps; ``penalty_energy``, of springs at contacts;
+        do in the step in which they close, which is too large in long steps; ``penalty_energy``, of springs at contacts
+        and of layers that are stretched; ``energy_released``, what breaking these has taken, as their law has it;
         ``imbalance``, the external work less all others. Empty in files from before it was told, and behind steps of these.
         """
         return dict(self.iterations.get("work", {}))

@@ -254,10 +254,11 @@ def header_size(mesh: Mesh) -> int:
 def step_size(mesh: Mesh, step: StepResult) -> int:
     """Return an upper bound for what a step takes in the file, but for its restart state [bytes]."""
     fields = 8 * (sum(layout.POINT_FIELDS.values()) * mesh.n_points + sum(map(np.size, step.cell_fields.values())))
-    row = layout.contact_row(mesh.dim, layout.OPTIONAL_COLUMNS).itemsize
     faced = layout.primary_row(mesh.dim).itemsize
     contact = sum(
-        (len(pair.points) + 2 * ROWS) * row + (len(pair.primary_points) + 2 * ROWS) * faced + BYTES
+        (len(pair.points) + 2 * ROWS) * layout.contact_row(mesh.dim, layout.further_columns(pair)).itemsize
+        + (len(pair.primary_points) + 2 * ROWS) * faced
+        + BYTES
         for pair in step.contact.values()
     )
     if step.material_stress is not None:

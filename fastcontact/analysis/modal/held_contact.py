@@ -19,6 +19,7 @@ from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.formulations._pressure_field import PressureField
 from fastcontact.contact.held_motions import HeldMotions
 from fastcontact.contact.tied import TiedPair, moments_of
+from fastcontact.errors import ModelError
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
 
@@ -56,6 +57,8 @@ def held_contact(model: Model, step: StepResult | None, held: HeldMotions, hold_
         bound, contact = model.bind(pair, held), None if step is None else step.contact[pair.name]
         if bound.options.gap_only:
             continue
+        if bound.options.cohesion is not None:
+            raise ModelError(f"modes know no cohesion or adhesion: tie contact '{pair.name}', or leave it out")
         at = _configuration(model, step, contact)
         position = at.obstacle if contact is not None else np.zeros(model.mesh.dim)
         part = model.force_driven.constraints(pair.name, bound.constraints(at), position)

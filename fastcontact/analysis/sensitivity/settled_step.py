@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact.analysis import restart
 from fastcontact.analysis.convergence_messages import named_nodes, nearest_nodes
@@ -19,8 +18,6 @@ from fastcontact.errors import ModelError
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp
 from fastcontact.results.step import StepResult
-
-Array = NDArray[np.float64]
 
 
 def settled_step(
@@ -53,12 +50,19 @@ def settled_step(
 
 def _check_path(model: Model, step: StepResult, criteria: Criteria) -> None:
     for pair in model.contact:
-        for option, what in (("friction", "friction"), ("wear", "wear")):
+        for option, what in (
+            ("friction", "friction"),
+            ("wear", "wear"),
+            ("cohesion", "a cohesive layer"),
+            ("adhesion", "adhesion"),
+        ):
             if pair.options.get(option):
                 raise ModelError(
                     f"contact '{pair.name}' has {what}: its results depend on all load steps, and sensitivities are those of "
                     f"one. Take differences of two solutions, or leave out {option}"
                 )
+        if pair.fluid is not None:
+            raise ModelError(f"contact '{pair.name}' has a fluid, whose place sensitivities do not know: leave it out")
         if pair.options.get("kind") == "bilateral_once_closed":
             raise ModelError(
                 f"contact '{pair.name}' never opens what was closed in earlier load steps: sensitivities are those of one "

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact.arrays import AnyArray, Array, Mask
+from fastcontact.contact.cohesive_layer import bonded
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Compliance, Constraints
 from fastcontact.contact.held_motions import TOGETHER, HeldMotions, alike, spanned, without
@@ -123,6 +124,12 @@ class Formulation(ABC):
         return Smoothing.of(self.secondary, self.primary, self.points)
 
     @property
+    def slides(self) -> bool:
+        """Whether what the sides do along each other counts."""
+        cohesion = self.options.cohesion
+        return bool(self.friction) or self.options.tied or not (cohesion is None or cohesion.reversible)
+
+    @property
     def eliminable(self) -> bool:
         """Whether iterative solvers can eliminate closed constraints; penalties, which are springs, do not prevent it."""
         return True
@@ -159,7 +166,9 @@ class Formulation(ABC):
         """
         if self.tied is not None:
             return self.tied.constraints()
-        part = self._softened(self.unilateral(at), at)
+        part = self.unilateral(at)
+        if self.options.cohesion is None:
+            part = self._softened(part, at)
         if part.friction is not None and at.friction_factor != 1.0:
             part = replace(part, friction=at.friction_factor * part.friction)
         if self.options.gap_only:
@@ -168,7 +177,14 @@ class Formulation(ABC):
             # Also as the step begins: what this iterate lets through by itself is not out of reach.
             away = np.minimum(np.abs(part.gaps(at.displacement)), np.abs(part.gaps(at.start)))
             part = part.without(away > self.options.search_distance)
-        return replace(part, equality=self.never_opening(part.positions, at))
+        if self.options.cohesion is not None:
+            return bonded(self.options.cohesion, part, at, _at_places(self._gaps_as_they_lie, part.positions))
+        part = replace(part, equality=self.never_opening(part.positions, at))
+        if self.options.source is None:
+            return part
+        from fastcontact.contact.fluid_pressure import wetted
+
+        return wetted(part, at, self.secondary, self.options.source[self.secondary.points], self.points)
 
     def _softened(self, part: Constraints, at: Configuration) -> Constraints:
         """Return constraints with the compliance of normal and tangential penalties, if any."""
@@ -189,6 +205,12 @@ class Formulation(ABC):
             before = _at_places(at.traction, part.positions)
             elastic = np.stack([-give * np.einsum("md,md->m", t, before) for t in part.directions])
         return replace(part, tangential_softness=give / areas, elastic_slip=elastic)
+
+    @cached_property
+    def _gaps_as_they_lie(self) -> tuple[Array, Array]:
+        """Places (m, dim) of constraints on the bodies before any load, and their gaps (m,) [length]."""
+        part = self.unilateral(Configuration.undeformed(self.points))
+        return part.positions, part.gap0
 
     @cached_property
     def tied(self) -> TiedPair | None:
@@ -241,7 +263,7 @@ class Formulation(ABC):
         B, gap0 = gap_rows(candidates, pairing, self.primary, self.points)
         gap0 += self.added_gap(candidates, pairing, at) - self.overlap_of_smooth(candidates, pairing, at)
         positions = candidates.positions(self.points)
-        if not (self.friction or self.options.tied):
+        if not self.slides:
             return Constraints(B, gap0, positions, compliance)
         directions, rubbing = self.options.rubbing(tangents(pairing.normal), candidates)
         along, drift = self.slips(candidates, pairing, rubbing, at)

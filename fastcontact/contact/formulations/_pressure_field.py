@@ -113,6 +113,19 @@ class PressureField(NodalField):
         """Return the field times the areas that take part."""
         return self.pressure(force) * self.covered_areas
 
+    def weighted_gaps(self, gaps: Array) -> tuple[Array, Indices]:
+        """Return means of gaps with the shape functions of the nodes: where points are closed they are zero, gaps may not be.
+
+        Corners of quadratic faces without area have none, and no points are theirs.
+        """
+        usable, n = np.isfinite(gaps), len(self.nodal_areas)
+        weight = np.where(usable, self.projection.areas, 0.0)[:, None] * self.shape
+        total = np.bincount(self.around.ravel(), weight.ravel(), n)
+        sums = np.bincount(self.around.ravel(), (weight * np.where(usable, gaps, 0.0)[:, None]).ravel(), n)
+        own = total > NO_SHARE * total.max(initial=0.0)
+        near = np.where(own[self.around], self.shape, -np.inf).argmax(axis=1)
+        return np.divide(sums, total, out=np.full(n, np.inf), where=own), self.around[np.arange(len(gaps)), near]
+
     def closed_nodes(self, active: Mask, gap: Array, pressure: Array) -> Mask:
         """Return the nodes with a pressure that an active point is nearest to; at least one of its facet, if any has one.
 

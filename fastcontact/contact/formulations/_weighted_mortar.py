@@ -150,7 +150,7 @@ class WeightedMortar(Formulation):
             gap0 += own @ at.worn / weight
         points, nodes = self.secondary.points, self.secondary.points.astype(np.intp)
         part = Constraints(B, gap0, self.points[points], areas=weight, nodes=nodes, nodal=self._nodal(weight))
-        if not (self.friction or self.options.tied):
+        if not self.slides:
             return part
         candidates = Candidates(points[:, None], np.ones((len(part), 1)))
         held = self.without_slip(at)

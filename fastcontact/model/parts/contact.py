@@ -12,18 +12,20 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact.arrays import Mask
 from fastcontact.contact.default_formulation import against_obstacle, default_formulation
 from fastcontact.contact.formulations import FORMULATIONS, Formulation
 from fastcontact.contact.found_contacts import FoundContacts, find_contacts, nothing_found
 from fastcontact.contact.held_motions import HeldMotions
 from fastcontact.contact.obstacles import MeshedSurface, Obstacle
 from fastcontact.contact.obstacles.rigid_side import RigidSide
+from fastcontact.contact.pair_options import PairOptions
 from fastcontact.contact.side_checks import check_obstacle, check_sides
 from fastcontact.contact.surface import Surface, surface
 from fastcontact.elasticity.loads import Value, axes_of, check_number
 from fastcontact.errors import ContactError, ModelError, unknown
 from fastcontact.mesh.argument_types import check_fields, typed
-from fastcontact.model.contact_pair import ContactPair, Driving, method
+from fastcontact.model.contact_pair import ContactPair, Driving, FluidPressure, method
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
 from fastcontact.model.obstacle_rotation import rotation_of
 from fastcontact.model.pair_options import SHARED_OPTIONS, pair_options
@@ -80,6 +82,13 @@ class ModelContact(ModelConnections):
               (overclosure, pressure) that ascend from no pressure [length, pressure]; results tell the penetration. It does
               not soften friction; ``tangential_penalty`` does: shear by slip of what sticks, a number or a function of the
               secondary position [pressure / length].
+            - ``cohesion``: a layer between the sides that stretches up to its ``strength`` [pressure] and then breaks, which
+              takes its ``energy`` by area [pressure length]: a mapping of these, and of ``shear_strength``, ``shear_energy``
+              (by default as in opening), ``stiffness`` (by default the strength is reached at a hundredth of the opening at
+              break) [pressure / length], and ``exponent``, that of Benzeggagh and Kenane between the modes (2) [-]. It is
+              without stress as the sides lie, also across gaps, and gives way by its stiffness where it is pressed. Damage
+              is in the results. ``adhesion``: attraction without memory, a mapping of ``work``, of adhesion by area,
+              ``strength`` and ``stiffness``, likewise; along the sides it has no resistance.
             - ``slip``: ``"symmetric"`` (default): closing a gap along the mean of both sides' normals is no slip;
               ``"primary"``: all relative motion along the tangents to the primary side is, as in code_aster.
             - ``wear``: Archard's coefficient by hardness: ``coefficient * pressure * slip`` is worn off the secondary side in
@@ -155,6 +164,38 @@ class ModelContact(ModelConnections):
         return FoundContacts(self.mesh, tuple(added))
 
     @typed(ModelError)
+    def add_fluid_pressure(self, contact: str, pressure: float, *, source: str, ramp: History = None) -> None:
+        """Let fluid press the sides of a contact pair apart wherever they are open and connected with its source.
+
+        It enters where the sides have a gap, or press on each other by no more than the fluid, and comes on from facet to
+        facet. There it acts on both sides along the normal of the contact: ``fluid_pressure`` of the results, whose
+        ``pressure`` is what the sides press on each other elsewhere. What fluid does to other surfaces are loads, see
+        `add_pressure`.
+
+        Parameters
+        ----------
+        contact : str
+            Name of a pair, or of an obstacle.
+        pressure : float
+            At multiplier 1 [pressure].
+        source : str
+            A group with nodes of the secondary side, from which the fluid comes: its edge, or all of it.
+        ramp : Ramp or iterable of (float, float), optional
+            A history of its own.
+        """
+        check_number(f"the fluid pressure in contact '{contact}'", pressure)
+        if pressure < 0.0:
+            raise ModelError(f"the fluid pressure {pressure} in contact '{contact}' must not be negative")
+        names = [pair.name for pair in self.contact]
+        if contact not in names:
+            raise ModelError(unknown("contact", contact, names))
+        fluid = FluidPressure(float(pressure), source, table_of(ramp, f"the ramp of the fluid in contact '{contact}'"))
+        place = names.index(contact)
+        changed = dataclasses.replace(self.contact[place], fluid=fluid)
+        self.bind(changed)
+        self.contact[place] = changed
+
+    @typed(ModelError)
     def add_obstacle(
         self,
         name: str,
@@ -215,6 +256,29 @@ class ModelContact(ModelConnections):
         self._add_pair(
             ContactPair(name, secondary, "", formulation, options, obstacle, displacement, history, driving, *turned)
         )
+
+    def _source(self, pair: ContactPair, side: Surface, options: PairOptions) -> Mask | None:
+        """Return the nodes (n_points,) that the fluid in a pair comes from, None where there is none."""
+        if pair.fluid is None:
+            return None
+        mask = np.zeros(self.mesh.n_points, bool)
+        mask[self.mesh.points_of(pair.fluid.source)] = True
+        if not mask[side.points].any():
+            raise ContactError(
+                f"the source '{pair.fluid.source}' of the fluid in contact '{pair.name}' has no nodes of the secondary side "
+                f"'{side.group}': name a group that has"
+            )
+        if options.kind != "unilateral" or options.cohesion is not None:
+            raise ContactError(
+                f"contact '{pair.name}' is {'glued' if options.cohesion else options.kind}, which lets no fluid in: name "
+                "another pair"
+            )
+        if pair.formulation == "continuous" and side.order > 1 and self.mesh.dim == 3:
+            raise ContactError(
+                f"contact '{pair.name}' is continuous on quadratic faces, whose nodal pressures waver too much to tell where "
+                "fluid comes in: use formulation 'mortar', or linear elements"
+            )
+        return mask
 
     def _facet_kinds(self, group: str) -> tuple[list[str], bool]:
         """Return the kinds of facets of a group, and whether linear triangles or tetrahedra alone have them."""
@@ -293,5 +357,7 @@ class ModelContact(ModelConnections):
         axisymmetric = self.kinematics == "axisymmetric"
         # Tangential fields that turn from one end to the other are not one field of components.
         seams = [seam for seam in self.seams if seam.turn is None or not pair.options.get("friction")]
-        options = dataclasses.replace(options, same_place=same_place(seams, self.mesh.n_points))
+        options = dataclasses.replace(
+            options, same_place=same_place(seams, self.mesh.n_points), source=self._source(pair, secondary, options)
+        )
         return kind(secondary, primary, self.mesh.points, axisymmetric, modulus, options=options, held=held, **own)

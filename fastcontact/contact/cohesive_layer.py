@@ -1,0 +1,116 @@
+"""A cohesive layer between the sides of a contact pair: equations that give way by lines of its law.
+
+In each pairing the traction is a line: through zero where the layer has not been stretched as far before, and level where it
+falls. Matrices so stay positive definite, and pairings approach every state that is stable under prescribed displacements.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import csr_array, vstack
+
+from fastcontact.arrays import Array
+from fastcontact.contact.cohesion import Bond, CohesiveLaw
+from fastcontact.contact.configuration import Configuration
+from fastcontact.contact.constraints import Constraints
+
+# Slope of the line where the traction falls, by the stiffness of the layer: with less a beam glued by nodes does not settle.
+LEVEL = 1e-2
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """The rows of a cohesive layer: of m openings, then of m slidings along each tangent; see `constraints.Tied`.
+
+    Attributes
+    ----------
+    law : CohesiveLaw
+    directions : tuple of ndarray (m, dim)
+        The tangents [-].
+    areas : ndarray (m,)
+        [area]
+    before : Bond
+        At the beginning of the load step.
+    damage : ndarray (m,)
+        There [-].
+    separation, rest : ndarray (1 + k, m)
+        Opening and slidings at which the law is linearised, and those at which its lines have no traction [length].
+    """
+
+    law: CohesiveLaw
+    directions: tuple[Array, ...]
+    areas: Array
+    before: Bond
+    damage: Array
+    separation: Array
+    rest: Array
+
+    def forces(self, multiplier: Array) -> tuple[Array, Array]:
+        """Return normal (m,) and tangential (m, k) forces [force]."""
+        normal, *along = multiplier.reshape(-1, len(self.damage))
+        return normal, np.stack(along, axis=1) if along else np.zeros((len(normal), 0))
+
+    def after(self, part: Constraints, u: Array) -> Bond:
+        """Return the layer at the end of a step with displacements u (n_dofs,) [length]."""
+        end = (part.gap0 + part.B @ u).reshape(self.rest.shape) + self.rest
+        opening, *slides = np.where(
+            self.damage < 1.0, end, self.separation
+        )  # what is broken has no rows along the sides
+        sliding = sum((s[:, None] * t for s, t in zip(slides, self.directions)), np.zeros_like(self.before.sliding))
+        size, law = np.linalg.norm(sliding, axis=1), self.law
+        areas = np.where(np.isfinite(self.areas), self.areas, 0.0)
+        whole = np.where(self.damage < 1.0, 1.0 - self.damage, 0.0)
+        stretched = np.where(opening < 0.0, 1.0, whole) * opening**2 + whole * size**2
+        grown = law.released(opening, size, self.damage) - law.released(opening, size, self.before.damage)
+        released = self.before.released + float(areas @ grown)
+        return Bond(
+            self.before.positions, sliding, self.damage, released, 0.5 * law.stiffness * float(areas @ stretched)
+        )
+
+
+def bonded(law: CohesiveLaw, part: Constraints, at: Configuration, lying: Array) -> Constraints:
+    """Return constraints `part`, with tangents, as a cohesive layer: equations that give way by lines of its law.
+
+    `lying` (m,) are the gaps of the bodies as they lie [length]: cohesive layers have no traction there, adhesion acts across
+    them. What is broken may close again, and gives way by the full stiffness then.
+    """
+    assert part.areas is not None
+    m, u, start = len(part), at.displacement.ravel(), at.start.ravel()
+    none = np.zeros(m)
+    before = at.bond
+    if before is None:
+        begun = law.damage(lying, none, none) if law.reversible else none
+        before = Bond(part.positions, np.zeros_like(part.positions), begun)
+    lying = none if law.reversible else lying
+    sliding, damage = before.at(part.positions)
+    before = Bond(part.positions, sliding, damage, before.released)
+    drifts = np.zeros((len(part.tangents), m)) if part.drift is None else part.drift
+    known = zip(part.tangents, part.directions, drifts, strict=True)
+    along = [drift + np.einsum("md,md->m", t, sliding) - T @ start for T, t, drift in known]
+    slides = [rest + T @ u for T, rest in zip(part.tangents, along, strict=True)]
+    opening = part.gaps(at.displacement) - lying
+    damage = law.damage(opening, np.sqrt(sum((s**2 for s in slides), none)), damage)
+    if at.bond is not None and np.array_equal(
+        u, start
+    ):  # an obstacle has moved, and the body follows in this pairing only
+        damage = np.minimum(damage, before.damage)
+    whole, now = damage < 1.0, np.stack([opening, *slides])
+    secant = np.tile(np.where(whole, 1.0 - damage, 1.0), (len(now), 1))
+    secant[0, opening < 0.0] = 1.0
+    falls = whole & (damage > (0.0 if law.reversible else before.damage)) & (secant > LEVEL)
+    slope = np.where(falls, LEVEL, secant)
+    layer = Layer(law, part.directions, part.areas, before, damage, now, now * (1.0 - secant / slope))
+    return replace(
+        part,
+        B=csr_array(vstack([part.B, *part.tangents], format="csr")),
+        gap0=np.concatenate([part.gap0 - np.where(whole, lying, 0.0), *along]) - layer.rest.ravel(),
+        equality=np.tile(whole, len(now)),
+        softness=1.0 / (slope * law.stiffness * part.areas).ravel(),
+        positions=np.tile(part.positions, (len(now), 1)),
+        areas=np.tile(part.areas, len(now)),
+        nodes=None if part.nodes is None else np.tile(part.nodes, len(now)),
+        compliance=None, tangents=(), directions=(), drift=None, friction=None, tied=layer,
+        branches=(falls + 2 * (opening < 0.0) + 4 * ~whole).ravel().astype(np.int8),
+    ).without(np.concatenate([none > 0.0, *[~whole] * len(along)]))  # fmt: skip

@@ -1,0 +1,80 @@
+"""Fluid that penetrates between the sides of a contact pair, wherever they are open and connected with its source.
+
+A node is open to the fluid if its gap is, or if what presses it together is no more than the fluid; such nodes of one facet
+are connected. There the force is that of the fluid, on both sides alike, in the place of that of contact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+
+from fastcontact.arrays import Array, Mask
+from fastcontact.contact.configuration import Configuration
+from fastcontact.contact.constraints import Constraints
+from fastcontact.contact.surface import Surface
+
+# A force that does not depend on the gap is a line of so small a slope: it vanishes at so many lengths of the side.
+FAR = 1e6
+# Gaps below this part of the length of the side are closed; pressures that differ by less of their size are the same.
+CLOSED, ALIKE = 1e-10, 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Wetted:
+    """Where the fluid has come.
+
+    Attributes
+    ----------
+    rows : ndarray of bool (m,)
+        Constraints.
+    pressure : ndarray (n_nodes,)
+        At the secondary nodes [pressure].
+    """
+
+    rows: Mask
+    pressure: Array
+
+
+def wetted(part: Constraints, at: Configuration, side: Surface, source: Mask, points: Array) -> Constraints:
+    """Return constraints `part` under the fluid pressure of a configuration.
+
+    The fluid comes from the nodes `source` (n_nodes,) of the secondary side; `points` (n_points, dim) are reference
+    coordinates [length]. Contact pressures are those of the last pairing; before the first one what is closed is tight.
+    """
+    if not at.fluid_pressure > 0.0:
+        return part
+    assert part.areas is not None
+    assert part.nodal is not None
+    size = float(np.linalg.norm(np.ptp(points[side.points], axis=0)))
+    gaps = part.gaps(at.displacement)
+    nodal, node = part.nodal.weighted_gaps(np.where(part.usable, gaps, np.inf))
+    loose = np.zeros(len(nodal), bool) if at.pressure is None else at.pressure <= (1.0 + ALIKE) * at.fluid_pressure
+    nodes = reached(side, source, (nodal > CLOSED * size) | (loose & (nodal > -CLOSED * size)))
+    rows = nodes[node] & part.usable
+    far = FAR * size
+    none = np.zeros(len(part))
+    return replace(
+        part,
+        gap0=np.where(rows, part.gap0 - gaps - far, part.gap0),
+        softness=np.where(
+            rows, far / (at.fluid_pressure * part.areas), none if part.softness is None else part.softness
+        ),
+        equality=rows if part.equality is None else part.equality | rows,
+        friction=None if part.friction is None else np.where(rows, 0.0, part.friction),
+        wetted=Wetted(rows, np.where(nodes, at.fluid_pressure, 0.0)),
+    )
+
+
+def reached(side: Surface, source: Mask, passable: Mask) -> Mask:
+    """Return which of the `passable` nodes (n_nodes,) facets of a side connect with those of the source."""
+    count, n = side.n_facets, len(passable)
+    nodes = np.concatenate([block.local.ravel() for block in side.blocks])
+    facet = np.repeat(np.arange(count), np.concatenate([np.full(len(b.local), b.local.shape[1]) for b in side.blocks]))
+    kept = passable[nodes]
+    graph = csr_array((np.ones(kept.sum()), (nodes[kept], n + facet[kept])), shape=(n + count, n + count))
+    part = connected_components(graph, directed=False)[1][:n]
+    return passable & np.isin(part, part[source & passable])

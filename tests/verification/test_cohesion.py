@@ -1,0 +1,174 @@
+"""Cohesive layers: the law traced exactly, mixed modes, a double cantilever beam, work, restarts, adhesion of a sphere."""
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+
+FORMULATIONS = (
+    {},
+    {"formulation": "mortar", "multipliers": "standard"},
+    {"formulation": "continuous"},
+    {"formulation": "node_to_segment"},
+)
+STRENGTH, ENERGY, STIFFNESS, E = 10.0, 0.5, 1000.0, 1000.0
+ONSET, END = STRENGTH / STIFFNESS, 2.0 * ENERGY / STRENGTH
+
+
+def glued(element="quad4", motion=None, E=E, **options):
+    """Return two blocks of 2 (by 2) by 1, glued; the top is moved, by 1 upwards, or by a motion over a wider lower block."""
+    make = fc.generate.box if element == "hex8" else fc.generate.block
+    bottom, top, axes = ("ZMIN", "ZMAX", "xyz") if element == "hex8" else ("BOTTOM", "TOP", "xy")
+    size, divisions = ((2.0, 2.0, 1.0), (2, 2, 1)) if element == "hex8" else ((2.0, 1.0), (3, 1))
+    origin = (0.0,) * (len(size) - 1)
+    lower = make(size, divisions, element, (*origin, 0.0), name="A")
+    if motion:
+        lower = make((4.0, 1.0), (6, 1), element, (-1.0, 0.0), name="A")
+    bodies = (lower, make(size, divisions, element, (*origin, 1.0), name="B"))
+    mesh = fc.generate.union(*(fc.generate.renamed(b, lambda g, n=n: f"{n} {g}") for b, n in zip(bodies, "AB")))
+    model = fc.Model(mesh, "3d" if element == "hex8" else "plane_strain")
+    model.add_material(fc.LinearElastic(E=E, nu=0.0))
+    model.fix(f"A {bottom}", axes)
+    model.prescribe(f"B {top}", **{**dict.fromkeys(axes, 0.0), **(motion or {axes[-1]: 1.0})})
+    law = {"strength": STRENGTH, "energy": ENERGY, "stiffness": STIFFNESS, **options.pop("law", {})}
+    model.add_contact("glue", secondary=f"B {bottom}", primary=f"A {top}", cohesion=law, **options)
+    return model
+
+
+PATH = fc.Ramp(
+    tuple(range(1, 8)), ((0, 0), (1, 0.02), (2, 0.04), (3, 0.08), (4, 0.04), (5, -0.02), (6, 0.09), (7, 0.14))
+)
+
+
+def exact(moved, damage):
+    """Return traction, opening and damage of a layer between two blocks in series with it: stiffness E / 2."""
+    K = 0.5 * E
+    stiffness = STIFFNESS if moved < 0.0 else (1.0 - damage) * STIFFNESS
+    opening = K * moved / (K + stiffness)
+    reached = END * ONSET / (END - damage * (END - ONSET))  # the largest opening so far
+    if opening > reached:
+        slope = STRENGTH / (END - ONSET)
+        opening = min((K * moved - slope * END) / (K - slope), moved)
+        opening = moved if opening >= END else opening
+        damage = min(END * (opening - ONSET) / (opening * (END - ONSET)), 1.0)
+        stiffness = (1.0 - damage) * STIFFNESS
+    return stiffness * opening, opening, damage
+
+
+@pytest.mark.parametrize("element", ["quad4", "quad8", "hex8"])
+@pytest.mark.parametrize("options", FORMULATIONS)
+def test_the_law_is_traced_exactly(options, element):
+    """Up, down along the secant, pressed, up again to the break: tractions, openings, damage and works to round-off."""
+    damage, area = 0.0, 4.0 if element == "hex8" else 2.0
+    for step, moved in zip(fc.solve(glued(element, **options), PATH), (0.02, 0.04, 0.08, 0.04, -0.02, 0.09, 0.14)):
+        traction, opening, damage = exact(moved, damage)
+        contact = step.contact["glue"]
+        assert abs(contact.force[-1] + area * traction) < 1e-9 * area * STRENGTH
+        assert np.abs(contact.gap - opening).max() < 1e-11
+        assert np.abs(contact.damage - damage).max() < 1e-9
+        assert np.abs(contact.pressure + traction).max() < 1e-8 * STRENGTH
+        taken = 0.5 * STRENGTH * END * (1.0 if damage == 1.0 else damage * ONSET / (END - damage * (END - ONSET)))
+        assert abs(step.work["energy_released"] - area * taken) < 1e-9
+        assert abs(step.work["penalty_energy"] - 0.5 * area * abs(traction * opening)) < 1e-9
+    assert damage == 1.0
+
+
+@pytest.mark.parametrize("angle", [0.0, 30.0, 60.0, 90.0])
+def test_mixed_modes_take_the_energy_of_benzeggagh_and_kenane(angle):
+    """Between stiff blocks: the largest traction and the energy at break, by the ratio of opening and sliding."""
+    c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    law = {"shear_strength": 16.0, "shear_energy": 1.2, "exponent": 1.5}
+    model = glued(motion={"x": s, "y": c}, E=1e9, law=law)
+    share = (s**2) ** 1.5
+    energy = ENERGY + (1.2 - ENERGY) * share
+    strength = np.sqrt(STRENGTH**2 + (16.0**2 - STRENGTH**2) * share)
+    onset, end = strength / STIFFNESS, 2.0 * energy / strength
+    at = np.array([0.5 * onset, onset, 0.5 * (onset + end), 0.99 * end, 1.1 * end])
+    steps = fc.solve(model, fc.Ramp((1, 2, 3, 4, 5), ((0, 0), *zip(range(1, 6), at))))
+    expected = np.where(at < onset, STIFFNESS * at, np.maximum(strength * (end - at) / (end - onset), 0.0))
+    for step, traction in zip(steps, expected):
+        force = step.contact["glue"].force
+        assert np.abs(force + 2.0 * traction * np.array([s, c])).max() < 1e-5 * strength
+    assert abs(steps[-1].work["energy_released"] / (2.0 * energy) - 1.0) < 1e-6  # the blocks give way by as much
+
+
+@pytest.mark.filterwarnings("ignore:.*in steps of|.*bends")
+@pytest.mark.parametrize("options", [{}, *(pytest.param(own, marks=pytest.mark.slow) for own in FORMULATIONS[1:])])
+def test_a_double_cantilever_beam_follows_beam_theory(options):
+    """P = sqrt(G E I) / l and d = 2 P l^3 / (3 E I), per width, once the crack runs (Williams, 1989); elastic before."""
+    n, h, a, E, G = 70, 1.5, 30.0, 120e3, 0.26
+    beams = [fc.generate.block((70.0, h), (n, 1), "quad8", (0.0, y), name=k) for k, y in (("UP", 0.0), ("LOW", -h))]
+    mesh = fc.generate.union(*(fc.generate.renamed(b, lambda g, k=k: f"{k} {g}") for b, k in zip(beams, ("UP", "LOW"))))
+    mesh = mesh.with_facet_group("GLUE", lambda x: (np.abs(x[:, 1]) < 1e-9) & (x[:, 0] > a - 1e-9), of="UP UP")
+    model = fc.Model(mesh, "plane_stress")
+    model.add_material(fc.LinearElastic(E=E, nu=0.0))
+    model.prescribe("UP TOP_LEFT", y=2.0)
+    model.prescribe("LOW BOTTOM_LEFT", y=-2.0)
+    for corner in ("UP BOTTOM_RIGHT", "LOW TOP_RIGHT"):
+        model.fix(corner, "xy")
+    model.add_contact("glue", secondary="GLUE", primary="LOW TOP", cohesion={"strength": 10.0, "energy": G}, **options)
+    steps = fc.solve(model, 5, criteria=fc.Criteria(max_geometry_updates=100))
+    pull = [step.reaction[mesh.points_of("UP TOP_LEFT"), 1].sum() for step in steps]
+    inertia, opened = h**3 / 12.0, 4.0
+    length = np.sqrt(1.5 * E * inertia * opened / np.sqrt(G * E * inertia))
+    assert abs(pull[-1] / (np.sqrt(G * E * inertia) / length) - 1.0) < 0.01
+    released = steps[-1].work["energy_released"]
+    contact = steps[-1].contact["glue"]
+    broken = contact.coordinates[contact.damage >= 1.0, 0].max() - a
+    assert G * broken < released < G * (broken + 12.0)  # the rest is in the zone of partial damage
+    external = np.trapezoid([0.0, *pull], np.linspace(0.0, opened, 6))
+    assert abs(steps[-1].work["external_work"] / external - 1.0) < 0.02
+
+
+def test_a_run_that_is_resumed_repeats_the_other_bit_for_bit(tmp_path):
+    model, file = glued(motion={"x": 0.6, "y": 1.0}), tmp_path / "glue.vtkhdf"
+    with fc.ResultWriter(file, model) as out:
+        whole = fc.solve(model, PATH, on_step=lambda step: out.write(step) if step.index < 4 else None)
+    again = fc.solve(model, PATH, resume=fc.open_results(file))
+    stored = fc.open_results(file)[2].contact["glue"].damage
+    assert np.array_equal(stored, whole[2].contact["glue"].damage)
+    for one, other in zip(whole[3:], again[3:], strict=True):
+        assert np.array_equal(one.displacement, other.displacement)
+        assert np.array_equal(one.contact["glue"].damage, other.contact["glue"].damage)
+        assert one.work == other.work
+
+
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
+def test_a_ball_is_pulled_off_with_the_force_of_johnson_kendall_and_roberts(formulation):
+    """3/2 pi w R to 3 % with Maugis's parameter 3, at an approach of -a^2 / (3 R); Proc. R. Soc. A 324, 1971, eq. 23."""
+    R, a = 1.0, 0.05
+    w = 8.0 * a**3 / (9.0 * np.pi)
+    strength = 3.0 / (4.5 * R / (np.pi * w)) ** (1.0 / 3.0)
+    mesh = fc.generate.graded_block("quad4", width=1.0, contact_radius=0.08, contact_size=1e-3)
+    model = fc.Model(mesh, "axisymmetric")
+    model.add_material(fc.LinearElastic(E=1.0, nu=0.0))
+    model.fix("BOTTOM", "xy")
+    model.add_obstacle(
+        "ball", secondary="TOP", obstacle=fc.obstacles.Sphere((0.0, R), R), motion={"y": a**2},
+        adhesion={"work": w, "strength": strength}, formulation=formulation,
+    )  # fmt: skip
+    ramp = fc.Ramp((1, 2, 3, 4, 5), ((0, 0), (1, -0.2), (2, 0.25), (3, 0.3), (4, 0.35), (5, 1.5)))
+    steps = fc.solve(model, ramp, criteria=fc.Criteria(max_geometry_updates=400))
+    pulls = [step.contact["ball"].force[1] for step in steps]
+    assert abs(max(pulls) / (1.5 * np.pi * w * R) - 1.0) < 0.03
+    assert pulls[-1] == 0.0
+
+
+def test_what_is_refused():
+    for options, culprit in (
+        ({"law": {"strength": -1.0}}, "must be positive"),
+        ({"law": {"stiffness": 50.0}}, "must be above 100"),
+        ({"law": {"toughness": 1.0}}, "toughness"),
+        ({"friction": 0.3}, "friction"),
+        ({"kind": "tied"}, "kind"),
+        ({"adhesion": {"work": 1.0, "strength": 1.0}}, "adhesion"),
+    ):
+        with pytest.raises(fc.ContactError, match=culprit):
+            glued(**options)
+    model = glued()
+    with pytest.raises(fc.ContactError, match="keep_pairing"):
+        fc.solve(model, 1, criteria=fc.Criteria(keep_pairing=True))
+    model.materials.clear()
+    model.add_material(fc.LinearElastic(E=1.0, nu=0.0, density=1.0))
+    with pytest.raises(fc.ModelError, match="cohesion"):
+        fc.modes(model, n=1)

@@ -1,0 +1,103 @@
+"""Fluid that penetrates a contact: a flat seal by statics, a front by pressure, pockets, friction, restarts."""
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+
+FORMULATIONS = (
+    {}, {"formulation": "mortar", "multipliers": "standard"}, {"formulation": "continuous"},
+    {"formulation": "node_to_segment"}, {"friction": 0.3}, {"formulation": "continuous", "friction": 0.3},
+)  # fmt: skip
+E = 1000.0
+# The top is pressed down in the first unit of time and held; then the pressure of the fluid is the time less one.
+HELD, FLUID = ((0, 0), (1, 1), (100, 1)), ((0, 0), (1, 0), (101, 100))
+
+
+def seal(element="quad4", push=-0.02, source="B BOTTOM_LEFT", **options):
+    """Return two blocks of 2 (by 1) by 1 that are pressed together to a pressure of E push / 2."""
+    if element == "hex8":
+        size, divisions, names = (2.0, 1.0, 1.0), (4, 2, 1), ("ZMIN", "ZMAX", "xyz")
+        bodies = [fc.generate.box(size, divisions, element, (0.0, 0.0, z), name="C") for z in (0.0, 1.0)]
+        source = "B XMIN"
+    else:
+        names = ("BOTTOM", "TOP", "xy")
+        bodies = [fc.generate.block((2.0, 1.0), (6, 2), element, (0.0, z), name="C") for z in (0.0, 1.0)]
+    mesh = fc.generate.union(*(fc.generate.renamed(b, lambda g, n=n: f"{n} {g}") for b, n in zip(bodies, "AB")))
+    model = fc.Model(mesh, "3d" if element == "hex8" else "plane_strain")
+    model.add_material(fc.LinearElastic(E=E, nu=0.0))
+    bottom, top, axes = names
+    model.fix(f"A {bottom}", axes)
+    model.prescribe(f"B {top}", **dict.fromkeys(axes[:-1], 0.0))
+    model.prescribe(f"B {top}", **{axes[-1]: push}, ramp=HELD)
+    model.add_contact("seal", secondary=f"B {bottom}", primary=f"A {top}", **options)
+    model.add_fluid_pressure("seal", 1.0, source=source, ramp=FLUID)
+    return model
+
+
+@pytest.mark.parametrize("element", ["quad4", "quad8", "hex8"])
+@pytest.mark.parametrize("options", FORMULATIONS)
+def test_a_flat_seal_opens_at_the_pressure_of_statics(options, element):
+    """Tight at 99.9 % of the contact pressure of 10, open at 100.1 %; then the gap is (p - 10) 2 / E."""
+    instants = (1.0, 5.0, 10.99, 11.01, 14.0)
+    for step in fc.solve(seal(element, **options), fc.Ramp(instants, ((0, 0), (30, 30)))):
+        contact, fluid = step.contact["seal"], step.load_factor - 1.0
+        if fluid < 10.0:
+            assert not contact.fluid_pressure.any()
+            assert np.abs(contact.pressure - 10.0).max() < 1e-6
+        else:
+            assert np.abs(contact.fluid_pressure - fluid).max() < 1e-12
+            assert not contact.pressure.any()
+            assert not contact.active.any()
+            assert np.abs(contact.gap - 2.0 * (fluid - 10.0) / E).max() < 1e-8
+        area = 1.0 * 2.0
+        assert abs(contact.force[-1] - area * max(fluid, 10.0)) < 1e-5
+        assert abs(step.work["imbalance"]) < 1e-6
+
+
+def test_the_front_stops_where_the_contact_presses_more():
+    """A push that grows from left to right, on a soft foundation of strips: fluid comes as far as it is stronger."""
+    model = seal(push=lambda x: -0.004 - 0.01 * x[:, 0])
+    step = fc.solve(model, fc.Ramp((1.0, 4.0, 7.0), ((0, 0), (30, 30))))
+    dry, reaches = step[0].contact["seal"], []
+    for later, fluid in zip(step[1:], (3.0, 6.0)):
+        contact = later.contact["seal"]
+        order = np.argsort(contact.coordinates[:, 0])
+        wet = contact.fluid_pressure[order] > 0.0
+        reaches.append(wet.sum())
+        assert (np.diff(wet.astype(int)) <= 0).all()  # one front
+        assert (contact.pressure[order][~wet] > fluid).all()
+        assert (contact.gap[order][wet] > 0.0).all()
+        assert (contact.active[order] == ~wet).all()
+    assert dry.active.all()
+    assert 0 < reaches[0] < reaches[1] < len(dry.points)
+
+
+def test_a_pocket_that_no_facet_connects_with_the_source_stays_dry():
+    """Open in the middle, closed on both sides of it: the fluid does not get there."""
+    model = seal(clearance=lambda x: np.where(np.abs(x[:, 0] - 1.0) < 0.1, 0.05, 0.0))
+    step = fc.solve(model, fc.Ramp((1.0, 6.0), ((0, 0), (30, 30))))[-1].contact["seal"]
+    middle = np.abs(step.coordinates[:, 0] - 1.0) < 0.1
+    assert (step.gap[middle] > 0.01).all()
+    assert not step.fluid_pressure.any()
+
+
+def test_a_run_that_is_resumed_repeats_the_other_bit_for_bit():
+    model, ramp = seal(push=lambda x: -0.004 - 0.01 * x[:, 0]), fc.Ramp((1.0, 4.0, 7.0), ((0, 0), (30, 30)))
+    states = []
+    whole = fc.solve(model, ramp, on_step=states.append)
+    again = fc.solve(model, ramp, resume=states[:2])
+    assert np.array_equal(whole[-1].displacement, again[-1].displacement)
+    assert np.array_equal(whole[-1].contact["seal"].fluid_pressure, again[-1].contact["seal"].fluid_pressure)
+
+
+def test_what_is_refused():
+    with pytest.raises(fc.ContactError, match="no nodes of the secondary side"):
+        seal(source="A BOTTOM_LEFT")
+    with pytest.raises(fc.ContactError, match="lets no fluid in"):
+        seal(kind="tied")
+    model = seal()
+    with pytest.raises(fc.ModelError, match="unknown contact"):
+        model.add_fluid_pressure("sael", 1.0, source="B BOTTOM_LEFT")
+    with pytest.raises(fc.ModelError, match="negative"):
+        model.add_fluid_pressure("seal", -1.0, source="B BOTTOM_LEFT")
