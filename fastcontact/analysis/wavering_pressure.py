@@ -21,9 +21,9 @@ MANY = 10
 def wavering(pair: Formulation, contact: ContactResult) -> Iterator[str]:
     """Yield a warning where pressures of nodes whose neighbours are all closed waver by much of their mean.
 
-    Sides that never part carry tension, too: their mean may be zero, or round-off, and says nothing.
+    Sides that never part, or stick together, carry tension, too: their mean may be zero, or round-off, and says nothing.
     """
-    if pair.options.always_closed:
+    if pair.options.always_closed or pair.options.cohesion is not None:
         return
     beside = pair.secondary.beside
     # A node is among its own neighbours here: so many less one are the others.

@@ -44,6 +44,12 @@ class TemporaryRelation(Relation):
 
     Parameters
     ----------
+    name, ramp
+        As in `Relation`.
+    rows : csr_array (m, n_dofs)
+        Coefficients [unit of the caller].
+    value : float or ndarray (m,)
+        At multiplier 1 of the ramp [length times the unit of the coefficients].
     begins, ends : float
         Ends of load steps [-].
     keeps : bool
