@@ -66,7 +66,7 @@ class TemporaryRelation(Relation):
         return self.begins <= begin < self.ends
 
     def after(self, reached: Array) -> list[Relation]:
-        """Return the relations from ``rows @ u`` `reached` (m,) where it begins [unit of the value]."""
+        """Return the relations from `reached` (m,) on, which ``rows @ u`` is where it begins [unit of the caller]."""
         if self.keeps:
             return [Relation(self.name, self.rows, reached, ((0.0, 1.0),))]
         value, table = np.broadcast_to(self.value, reached.shape), self.ramp or ()
