@@ -66,7 +66,7 @@ class TemporaryRelation(Relation):
         return self.begins <= begin < self.ends
 
     def after(self, reached: Array) -> list[Relation]:
-        """Return the relations from `reached` (m,) on, which ``rows @ u`` is where it begins [unit of the caller]."""
+        """Return the relations that follow on ``rows @ u``, `reached` (m,) [length] where it begins."""
         if self.keeps:
             return [Relation(self.name, self.rows, reached, ((0.0, 1.0),))]
         value, table = np.broadcast_to(self.value, reached.shape), self.ramp or ()
