@@ -231,7 +231,7 @@ def test_a_case_driven_by_loads_runs(write):
         ('component = "y"\n', "", r"couple\[0\] needs 'component'"),
         ('["A2", "y", 1.0]', '["A2", "y"]', r"'relation\[0\].terms' must be a list of"),
         ("[[pressure]]", "[[presure]]", r"unknown key 'presure': did you mean 'pressure'"),
-        ("[[couple]]", "[couple]", r"'couple' must be of type list"),
+        ("[[couple]]", "[couple]", r"write \[\[couple\]\] in place of \[couple\]"),
     ],
 )
 def test_mistakes_in_loads_name_the_key(write, old, new, message):
