@@ -30,7 +30,7 @@ CASES = [
     ("theory without kind", 'kind = "hertz_point"\n', "", r"'theory\.hertz' needs the key 'kind', one of "),
     ("radius in words", "R1 = 50.0", 'R1 = "fifty"', r"the value of 'theory\.hertz\.R1' must be a number, not 'fifty'"),
     ("motion of an obstacle is a number", "[probes]", '[obstacle.ball]\nsecondary = "CONT1"\nmotion = 3.0\nshape = { kind = "sphere", centre = [0.0, 0.0], R = 1.0 }\n[probes]', r"'obstacle\.ball\.motion' must be a table of keys, not 3\.0"),
-    ("radius of an obstacle is a list", "[probes]", '[obstacle.ball]\nsecondary = "CONT1"\nshape = { kind = "sphere", centre = [0.0, 0.0], R = [1.0] }\n[probes]', r"'obstacle\.ball\.shape': the argument R of Sphere must be a number, not the tuple \(1\.0,\)"),
+    ("radius of an obstacle is a list", "[probes]", '[obstacle.ball]\nsecondary = "CONT1"\nshape = { kind = "sphere", centre = [0.0, 0.0], R = [1.0] }\n[probes]', r"the value of 'obstacle\.ball\.shape\.R' must be a number, not the tuple \(1\.0,\)"),
     ("target of a check is zero", 'theory = "hertz"\ntolerance', 'theory = "hertz"\nof = "beyond"\ntolerance', r"unknown number of the theory in check\[0\]\.of 'beyond'"),
     ("unknown pair of a study", "[study]", '[study]\ncontact = "herz"', r"unknown contact pair in study\.contact 'herz': did you mean 'hertz'\?"),
     ("unknown formulation in options of a study", "[study.options.node_to_segment]", "[study.options.node_to_segmnt]", r"unknown formulation in study\.options 'node_to_segmnt': did you mean 'node_to_segment'\?"),

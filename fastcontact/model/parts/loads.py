@@ -201,6 +201,11 @@ class ModelLoads(ModelHeat):
             )
         if distribute is None:
             distribute = group in self.mesh.cell_groups and bool(self.mesh.cells_of(group, dim=self.mesh.dim - 1))
+        if distribute and any(callable(component) for component in (x, y, z)):
+            raise ModelError(
+                f"the total force on '{group}' must be a number: a function of position is the force on each node, with "
+                "distribute=False; or take add_traction"
+            )
         kind: type[TotalForce] | type[NodalForce] = TotalForce if distribute else NodalForce
         axes = axes_of(f"the force on '{group}'", {"x": x, "y": y, "z": z}, self.mesh.dim)
         self._add(kind(group, axes, table_of(ramp, f"the ramp of the force on '{group}'")))

@@ -271,7 +271,7 @@ def model():
         ("add_force", {"group": "NONE", "x": 1.0}, r"'NONE' is empty"),
         ("add_force", {"group": "TOPP", "x": 1.0}, r"'TOPP': did you mean"),
         ("add_force", {"group": "TOP_NODES", "x": 1.0, "distribute": True}, r"holds points only"),
-        ("add_force", {"group": "TOP", "x": lambda x: x[:, 0]}, r"argument x of .* must be a number"),
+        ("add_force", {"group": "TOP", "x": lambda x: x[:, 0]}, r"must be a number: a function of position is"),
         ("couple", {"group": "TOP_LEFT", "component": "y"}, r"holds 1 points"),
         ("couple", {"group": "TOP", "component": "z"}, r"component 'z'"),
         ("couple", {"group": "TOP", "component": ""}, r"no component"),
