@@ -35,6 +35,8 @@ ROOT = Path(__file__).resolve().parents[2]
 MOST = 3
 # Kernels compiled by a process before it gets help: a single new one is no reason to start others.
 ALONE = 4
+# Kinds of runs that this process has had help with: later runs of these find their kernels.
+_helped: set[str] = set()
 
 
 @cache
@@ -105,16 +107,17 @@ def expect(runs: Sequence[str]) -> None:
     Not in a process that works for another one, nor where threads are limited to one, kernels are not kept, or the
     interpreter is part of another program.
     """
-    helpers = min(numba.get_num_threads() - 1, MOST)
+    new, helpers = [run for run in runs if run not in _helped], min(numba.get_num_threads() - 1, MOST)
     python = Path(sys.executable or "").stem.startswith("python")
-    if helpers < 1 or multiprocessing.parent_process() is not None or not python or not kernel_files.kept:
+    if not new or helpers < 1 or multiprocessing.parent_process() is not None or not python or not kernel_files.kept:
         return
 
     def begin() -> None:
         if compiling.count > ALONE and begin in compiling.helpers:
             compiling.helpers.remove(begin)
+            _helped.update(new)
             with contextlib.suppress(OSError):  # the run compiles alone
-                start(runs, helpers)
+                start(new, helpers)
 
     compiling.helpers[:] = [begin]
     begin()

@@ -72,6 +72,7 @@ def started(monkeypatch):
     monkeypatch.setattr(compiling, "count", 0)
     monkeypatch.setattr(compiling, "helpers", [])
     monkeypatch.setattr(compiling, "listeners", [])
+    monkeypatch.setattr(ahead, "_helped", set())
     return found
 
 
@@ -89,6 +90,14 @@ def test_help_comes_at_once_where_many_were_compiled_before(started, monkeypatch
     monkeypatch.setattr(compiling, "count", ahead.ALONE + 1)
     ahead.expect(["3d"])
     assert started == [(["3d"], 1)]
+
+
+def test_help_comes_once_for_each_kind_of_runs(started, monkeypatch):
+    monkeypatch.setattr(compiling, "count", 100)
+    for _ in range(3):
+        ahead.expect(["2d"])
+    ahead.expect(["3d", "2d"])
+    assert started == [(["2d"], 1), (["3d"], 1)]
 
 
 @pytest.mark.parametrize("spoilt", ["one thread", "works for another", "not kept", "part of a program"])
