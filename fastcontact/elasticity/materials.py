@@ -234,6 +234,7 @@ class Material:
             )
         return np.asarray(strain[:, :size])
 
+    @typed(ModelError)
     def conductivity_at(self, points: Array, kinematics: str, constants: Any) -> Array:
         """Return the conductivity (n, dim, dim) [power / (length temperature)] at `points` (n, dim) [length].
 

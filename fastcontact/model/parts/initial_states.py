@@ -245,6 +245,7 @@ class ModelInitialStates(ModelLoads):
             by_ramp[own.ramp] = by_ramp.get(own.ramp, 0.0) + self._forces_of(field, field.offset(rise))
         return by_ramp
 
+    @typed(ModelError)
     def expansion_forces(self, field: MaterialField, rise: Array) -> Array:
         """Return the nodal forces (n_points, dim) [force] by which a rise of the temperature expands the cells.
 
