@@ -340,8 +340,13 @@ class Formulation(ABC):
             theirs[rows] = np.einsum("nk,nkde->nde", facing.shape, self.held.at(facing.nodes))
             moved[rows] -= np.einsum("nk,nkd->nd", facing.shape, (at.displacement - at.start)[facing.nodes])
             both = spanned(both @ theirs @ both, 0.5)
+        along = np.einsum("nde,ne->nd", both, pairing.normal)
         both = without(both, pairing.normal, np.sqrt(0.5))
-        moved -= np.einsum("nd,nd->n", moved, pairing.normal)[:, None] * pairing.normal
+        # Closing is no slip where the normal is held, too. Elsewhere it may lean, as at the edge of a plane of symmetry.
+        closing = np.where(
+            np.linalg.norm(along, axis=1) > np.sqrt(0.5), np.einsum("nd,nd->n", moved, pairing.normal), 0.0
+        )
+        moved -= closing[:, None] * pairing.normal
         both = without(both, moved, ALIKE * max(np.abs(at.displacement).max(), np.abs(at.start).max()))
         held = np.zeros((len(self.secondary.points), *both.shape[1:]))
         held[nodes] = both
