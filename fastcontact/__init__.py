@@ -30,7 +30,15 @@ _MODULES = {
     "topology": "mesh.topology",
 }
 _NAMES = {
-    "analysis.contact_answers": ("ContactAnswers", "contact_answers", "contact_history", "contact_moment", "wear"),
+    "analysis.contact_resultants": (
+        "ContactResultants",
+        "ContactResultants",
+        "contact_resultants",
+        "contact_history",
+        "contact_moment",
+        "contact_resultants",
+        "wear",
+    ),  # fmt: skip
     "analysis.criteria": ("Criteria",),
     "analysis.modes": ("Modes", "modes"),
     "analysis.run": ("solve", "solve_steps"),

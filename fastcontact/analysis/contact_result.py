@@ -94,7 +94,7 @@ def _obstacle(pair: Formulation, at: Configuration, deformed: Array, forces: Arr
     return {
         "obstacle_displacement": at.obstacle.copy(),
         "obstacle_angle": None if side.rotation is None else at.angle,
-        "torque": side.torque(deformed, forces, at.stance),
+        "torque": side.torque(deformed, forces, at.pose),
     }
 
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact.analysis.floating_bodies import FloatingBodies, RigidPosition
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
-from fastcontact.analysis.unsupported_bodies import RigidPosition, UnsupportedBodies
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.constraints import StackedConstraints
 
@@ -58,7 +58,7 @@ def active_set_cycles(problem: Problem, constraints: StackedConstraints, solutio
     )
 
 
-def no_contact_stops(bodies: UnsupportedBodies, work: Array) -> str:
+def no_contact_stops(bodies: FloatingBodies, work: Array) -> str:
     """Return the message for loads that pull bodies away; `work` (k,) is their resultant on each free motion [force]."""
     return (
         f"the loads pull bodies away, no contact stops them ({'; '.join(bodies.names)}; resultant up to "
@@ -66,7 +66,7 @@ def no_contact_stops(bodies: UnsupportedBodies, work: Array) -> str:
     )
 
 
-def friction_exceeded(bodies: UnsupportedBodies, work: Array, friction: tuple[float, float]) -> str:
+def friction_exceeded(bodies: FloatingBodies, work: Array, friction: tuple[float, float]) -> str:
     """Return the message for loads beyond the friction cone; `friction` are the coefficients needed and given."""
     needed, largest = friction
     return (
@@ -77,7 +77,7 @@ def friction_exceeded(bodies: UnsupportedBodies, work: Array, friction: tuple[fl
     )
 
 
-def not_balanced(bodies: UnsupportedBodies, found: RigidPosition, load: float, friction: bool) -> str:
+def not_balanced(bodies: FloatingBodies, found: RigidPosition, load: float, friction: bool) -> str:
     """Return the message for bodies whose springs still carry force under a load [force], with `friction` or without."""
     more = "Add a support or more friction, for which the loads may be too large," if friction else "Add a support,"
     return (

@@ -56,7 +56,7 @@ class Plan:
         """Return the plan that the criteria, the formulations and the linear solver of a problem ask for."""
         criteria = problem.criteria
         fixed = 0 if criteria.keep_pairing else criteria.geometry_updates
-        free = fixed is None and problem.unsupported_bodies is None
+        free = fixed is None and problem.floating_bodies is None
         return cls(
             until_settled=fixed is None,
             limit=criteria.max_geometry_updates if fixed is None else fixed,
@@ -117,7 +117,7 @@ def settle_geometry(
     except ConvergenceError as error:
         error.history = error.history or iterate.history
         raise
-    nodes = SharedNodes.of(settled.constraints, step.problem.model.seams)
+    nodes = SharedNodes.of(settled.constraints, step.problem.model.periodic_interfaces)
     if nodes is None:
         return settled
     return replace(settled, solution=nodes.shared(settled.solution, settled.constraints, settled.iterate.u))
@@ -173,8 +173,8 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
 def _solve_once(
     step: StepContext, constraints: StackedConstraints, iterate: Iterate, active: Mask, accuracy: Accuracy
 ) -> tuple[Solution, Array]:
-    """Solve the inequalities of a pairing, those of nodes in several pairs or at both ends of a seam once."""
-    nodes = SharedNodes.of(constraints, step.problem.model.seams)
+    """Solve the inequalities of a pairing, those of nodes in several pairs or at both ends of a period once."""
+    nodes = SharedNodes.of(constraints, step.problem.model.periodic_interfaces)
     if nodes is None:
         return solve_inequalities(step, constraints, iterate, active & constraints.usable, accuracy)
     once = nodes.once(constraints)

@@ -11,11 +11,11 @@ from fastcontact._jit.norms_kernels import largest
 from fastcontact.analysis import active_set
 from fastcontact.analysis.active_dofs import ActiveDofs, constraints_on_unknowns
 from fastcontact.analysis.convergence_messages import friction_exceeded, no_contact_stops, not_balanced
+from fastcontact.analysis.floating_bodies import FloatingBodies
 from fastcontact.analysis.iterate import Iterate
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import Accuracy, Solution
 from fastcontact.analysis.state import State
-from fastcontact.analysis.unsupported_bodies import UnsupportedBodies
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.constraints import Constraints, StackedConstraints
 from fastcontact.contact.obstacles.rigid_side import RigidSide
@@ -58,11 +58,11 @@ class StepContext:
         """Return which constraints (m,) supports and obstacles move past the other side in the step."""
         slips = np.stack([T @ self.prescribed_motion for T in constraints.tangents])
         scale = largest(self.prescribed_motion)
-        if constraints.drift is not None and isinstance(constraints, StackedConstraints):
+        if constraints.slip0 is not None and isinstance(constraints, StackedConstraints):
             for name, rows in constraints.rows().items():
                 if isinstance(self.problem.pairs[name].primary, RigidSide):
-                    slips[:, rows] += constraints.drift[:, rows]
-                    scale = max(scale, largest(constraints.drift[:, rows]))
+                    slips[:, rows] += constraints.slip0[:, rows]
+                    scale = max(scale, largest(constraints.slip0[:, rows]))
         return np.asarray((np.abs(slips) > ROUND_OFF * scale).any(axis=0))
 
 
@@ -76,7 +76,7 @@ def solve_inequalities(
     step : StepContext
     constraints : Constraints
     iterate : Iterate
-        Keeps the solution with friction, and the rigid position of unsupported bodies.
+        Keeps the solution with friction, and the rigid position of floating bodies.
     active : ndarray of bool (m,)
         Set to start from.
     accuracy : Accuracy
@@ -87,8 +87,8 @@ def solve_inequalities(
     part : ndarray (k,)
         The active displacements [length].
     """
-    if step.problem.unsupported_bodies is not None:
-        return _with_unsupported_bodies(step, step.problem.unsupported_bodies, constraints, iterate, active, accuracy)
+    if step.problem.floating_bodies is not None:
+        return _with_floating_bodies(step, step.problem.floating_bodies, constraints, iterate, active, accuracy)
     solution = _solve(step, constraints, iterate, active, accuracy, step.load.lift, iterate.u)
     return solution, step.dofs.displacement(solution.u, step.load.lift)
 
@@ -111,9 +111,9 @@ def _solve(
     return iterate.frictional
 
 
-def _with_unsupported_bodies(
+def _with_floating_bodies(
     step: StepContext,
-    bodies: UnsupportedBodies,
+    bodies: FloatingBodies,
     constraints: Constraints,
     iterate: Iterate,
     active: Mask,
@@ -148,7 +148,7 @@ def _with_unsupported_bodies(
     return found.state, problem.system.displacement(found.state.u, at)
 
 
-def _approach(step: StepContext, bodies: UnsupportedBodies, constraints: Constraints, u: Array) -> Array:
+def _approach(step: StepContext, bodies: FloatingBodies, constraints: Constraints, u: Array) -> Array:
     """Return how far (k,) rigid bodies move until the loads hold them in contact [length].
 
     Raises

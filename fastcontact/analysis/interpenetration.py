@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array, Mask
-from fastcontact.contact.obstacles.rigid_side import RigidSide, Stance
+from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.surface import Surface
 from fastcontact.mesh.topology import bodies, outer_facets
 from fastcontact.model.body_overlap import depths
@@ -123,8 +123,8 @@ def _through_obstacles(problem: Problem, state: State, last: StepResult) -> list
         points = np.setdiff1d(np.concatenate(beside), own)
         if not len(points):
             continue
-        at_rest = pair.primary.facing(mesh.points[points], Stance(np.zeros(mesh.dim)))[0]
-        now = Stance(state.obstacles[name], state.angles.get(name, 0.0))
+        at_rest = pair.primary.facing(mesh.points[points], Pose(np.zeros(mesh.dim)))[0]
+        now = Pose(state.obstacles[name], state.angles.get(name, 0.0))
         gap = pair.primary.facing(mesh.points[points] + u[points], now)[0]
         inside = last.contact[name].gap
         deepest = -float(np.min(inside, initial=0.0, where=np.isfinite(inside)))

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from fastcontact.analysis.extrapolation import Extrapolation
+from fastcontact.analysis.floating_bodies import RigidPosition
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
 from fastcontact.analysis.state import State
-from fastcontact.analysis.unsupported_bodies import RigidPosition
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.constraints import Constraints, StackedConstraints, stacked
 from fastcontact.contact.obstacles.rigid_side import RigidSide
@@ -33,7 +33,7 @@ class Iterate:
     frictional : FrictionalEquilibrium, optional
         The last solution with friction.
     rigid : RigidPosition, optional
-        The last position of unsupported bodies.
+        The last position of floating bodies.
     history : list of dict
         An entry for each pairing.
     rounded : bool

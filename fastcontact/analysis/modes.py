@@ -23,7 +23,7 @@ from fastcontact.elasticity.constrained_system import System
 from fastcontact.elasticity.inertia_loads import Densities
 from fastcontact.elasticity.mass import mass, stress_stiffness
 from fastcontact.elasticity.material_field import MaterialField
-from fastcontact.elasticity.relations import stacked_rows
+from fastcontact.elasticity.multipoint_constraints import stacked_rows
 from fastcontact.elasticity.springs import stiffened
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.errors import FileError, ModelError

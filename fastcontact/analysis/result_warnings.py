@@ -10,8 +10,8 @@ import numpy as np
 
 from fastcontact.analysis.facet_sag import sag_warnings
 from fastcontact.analysis.interpenetration import interpenetration
+from fastcontact.analysis.periodic_interfaces import periodicity_warnings
 from fastcontact.analysis.problem import Problem
-from fastcontact.analysis.seams import seam_warnings
 from fastcontact.analysis.state import State
 from fastcontact.analysis.stress_scatter import scatter_warnings
 from fastcontact.analysis.volumetric_locking import locking_warning
@@ -66,7 +66,7 @@ def result_warnings(problem: Problem, state: State, last: StepResult) -> list[st
         found += [sagging[name]] if name in sagging else _unresolved(name, pair, contact)
         found += [*wavering(pair, contact), *_too_fast(name, pair, state)]
     return [
-        *found, *seam_warnings(problem, last), *_unsettled(state), *_loose(problem, last), *_unbalanced(state)
+        *found, *periodicity_warnings(problem, last), *_unsettled(state), *_loose(problem, last), *_unbalanced(state)
     ]  # fmt: skip
 
 
@@ -154,9 +154,9 @@ def _loose(problem: Problem, last: StepResult) -> Iterator[str]:
 
 
 def _carrying_springs(problem: Problem, state: State) -> Iterator[str]:
-    if problem.unsupported_bodies is None or state.rigid is None:
+    if problem.floating_bodies is None or state.rigid is None:
         return
-    told = problem.unsupported_bodies.report(state.rigid, state.largest_rigid_force)
+    told = problem.floating_bodies.report(state.rigid, state.largest_rigid_force)
     if told["relative_to_load"] > problem.criteria.relative:
         yield (
             f"the springs that regularise {'; '.join(told['motions'])} still carry {told['relative_to_load']:.1e} of "

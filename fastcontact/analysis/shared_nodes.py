@@ -23,7 +23,7 @@ from scipy.sparse.csgraph import connected_components
 from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints, StackedConstraints
-from fastcontact.model.periodicity import Seam
+from fastcontact.model.periodicity import PeriodicInterface
 
 # Entries of rows [-] that differ by less are the same.
 SAME = 1e-9
@@ -44,7 +44,7 @@ class SharedNodes:
     part, along : ndarray (m,)
         Of the normal and of the tangential forces of a place, the part of each constraint [-].
     frame : ndarray (m, k, dim)
-        Tangents of the constraints, at second ends of seams as they are at the first one [-].
+        Tangents of the constraints, at second ends of periods as they are at the first one [-].
     """
 
     place: Indices
@@ -54,16 +54,16 @@ class SharedNodes:
     frame: Array
 
     @classmethod
-    def of(cls, constraints: StackedConstraints, seams: Sequence[Seam] = ()) -> SharedNodes | None:
-        """Return those of the constraints of all pairs; None where no node is in several, or at both ends of a seam."""
-        if len(constraints.parts) < 2 and not seams:
+    def of(cls, constraints: StackedConstraints, interfaces: Sequence[PeriodicInterface] = ()) -> SharedNodes | None:
+        """Return those of the constraints of all pairs; None where no node is in several, or at both ends of a period."""
+        if len(constraints.parts) < 2 and not interfaces:
             return None
         first, second, behind = _alike(constraints)
-        ends = _at_seams(constraints, seams, behind)
+        ends = _at_periodic_interfaces(constraints, interfaces, behind)
         if not len(second) + len(behind) + ends.shape[1]:
             return None
         place = _places(constraints, np.hstack([np.stack([first, second]), ends]))
-        return cls(place, behind, *_parts(constraints, place), _frame(constraints, seams))
+        return cls(place, behind, *_parts(constraints, place), _frame(constraints, interfaces))
 
     @property
     def idle(self) -> Mask:
@@ -103,8 +103,8 @@ class SharedNodes:
             if constraints.elastic_slip is not None:
                 weight = np.divide(stiffness, total[self.place], out=np.zeros_like(total), where=np.isfinite(stiffness))
                 merged["elastic_slip"] = self._mean(constraints.elastic_slip.T, weight).T
-        if constraints.drift is not None:
-            merged["drift"] = self._mean(constraints.drift.T, self.along).T
+        if constraints.slip0 is not None:
+            merged["slip0"] = self._mean(constraints.slip0.T, self.along).T
         if constraints.friction is not None:
             merged["friction"] = self.summed(self.part * constraints.friction)
         return replace(constraints, **merged).without(self.idle)  # type: ignore[arg-type]
@@ -153,28 +153,31 @@ class SharedNodes:
         )
 
 
-def _frame(constraints: StackedConstraints, seams: Sequence[Seam]) -> Array:
-    """Return the tangents (m, k, dim) of constraints, those at second ends of seams turned back to the first one [-]."""
+def _frame(constraints: StackedConstraints, interfaces: Sequence[PeriodicInterface]) -> Array:
+    """Return the tangents (m, k, dim) of constraints, those at second ends of periods turned back to the first one [-]."""
     m, dim = constraints.positions.shape
     frame = np.stack(constraints.directions, axis=1) if constraints.directions else np.zeros((m, 0, dim))
-    for seam in seams:
-        if seam.turn is not None and constraints.nodes is not None:
-            there = np.isin(constraints.nodes, seam.second)
-            frame[there] = frame[there] @ seam.turn
+    for interface in interfaces:
+        if interface.turn is not None and constraints.nodes is not None:
+            there = np.isin(constraints.nodes, interface.second)
+            frame[there] = frame[there] @ interface.turn
     return frame
 
 
-def _at_seams(constraints: StackedConstraints, seams: Sequence[Seam], behind: Indices) -> Indices:
+def _at_periodic_interfaces(
+    constraints: StackedConstraints, interfaces: Sequence[PeriodicInterface], behind: Indices
+) -> Indices:
     """Return constraints (2, k) of a pair at the two nodes of one point."""
     nodes, usable = _nodes(constraints), np.isfinite(_areas(constraints)) & constraints.usable
     usable[behind] = False
     found = [np.empty((2, 0), np.intp)]
-    for rows in constraints.rows().values() if seams else ():
+    for rows in constraints.rows().values() if interfaces else ():
         own = rows.start + np.flatnonzero(usable[rows] & (nodes[rows] >= 0))
-        row = np.full(max(*(max(seam.first.max(), seam.second.max()) for seam in seams), nodes.max()) + 1, -1)
+        last = max(int(end.max()) for interface in interfaces for end in interface[:2])
+        row = np.full(max(last, int(nodes.max())) + 1, -1)
         row[nodes[own]] = own
-        for seam in seams:
-            both = row[np.stack([seam.first, seam.second])]
+        for interface in interfaces:
+            both = row[np.stack([interface.first, interface.second])]
             found.append(both[:, (both >= 0).all(axis=0) & (both[0] != both[1])])
     ends = np.hstack(found)
     if constraints.equality is not None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact.analysis.extrapolation import Extrapolation
-from fastcontact.analysis.unsupported_bodies import RigidPosition
+from fastcontact.analysis.floating_bodies import RigidPosition
 from fastcontact.analysis.wear import Worn
 from fastcontact.analysis.work import ContactForces, Work
 from fastcontact.arrays import Array, Mask
@@ -67,7 +67,7 @@ class State:
     last_change : (int, float), optional
         The fixed number of geometry updates of the last step, and the relative change by the last one.
     rigid : RigidPosition, optional
-        Rigid position of unsupported bodies in the last step.
+        Rigid position of floating bodies in the last step.
     history : dict of str to ndarray (n_cells, n_q, 9)
         By solid element of nonlinear bodies, see `constitutive_kernels`; none before the first step.
     rise : ndarray (n_points,), optional

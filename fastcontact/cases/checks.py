@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fastcontact.analysis.contact_answers import contact_moment
+from fastcontact.analysis.contact_resultants import contact_moment
 from fastcontact.cases.keys import NUMBER
 from fastcontact.errors import CaseError, unknown
 from fastcontact.results.step import ContactResult, StepResult

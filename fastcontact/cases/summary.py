@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fastcontact._version import __version__
-from fastcontact.analysis.contact_answers import contact_answers
+from fastcontact.analysis.contact_resultants import contact_resultants
 from fastcontact.cases.case import Asked, Case
 from fastcontact.cases.checks import at_point, evaluated
 from fastcontact.errors import ModelError
@@ -54,7 +54,7 @@ def summarise(
         "n_dofs": case.model.n_dofs,
         "steps": list(steps),
         "contact": {
-            name: {**_contact(contact, penalties.get(name)), **_answers(case, last, name, steps)}
+            name: {**_contact(contact, penalties.get(name)), **_resultants(case, last, name, steps)}
             for name, contact in last.contact.items()
         },
         "probes": {name: _probe(last, point) for name, point in case.probes.items()},
@@ -128,9 +128,9 @@ def _contact(contact: ContactResult, penalty: float | None) -> dict[str, Any]:
     }
 
 
-def _answers(case: Case, last: StepResult, name: str, steps: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return what `contact_answers` tell of the last step, with the work of friction of all `steps`."""
-    (found,) = contact_answers(case.model, [last], name)
+def _resultants(case: Case, last: StepResult, name: str, steps: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return what `contact_resultants` tell of the last step, with the work of friction of all `steps`."""
+    (found,) = contact_resultants(case.model, [last], name)
     return {
         "normal_force": found.normal_force,
         "moment": found.moment.tolist(),

@@ -86,9 +86,9 @@ def bonded(law: CohesiveLaw, part: Constraints, at: Configuration, lying: Array)
     lying = none if law.reversible else lying
     sliding, damage = before.at(part.positions)
     before = Bond(part.positions, sliding, damage, before.released)
-    drifts = np.zeros((len(part.tangents), m)) if part.drift is None else part.drift
-    known = zip(part.tangents, part.directions, drifts, strict=True)
-    along = [drift + np.einsum("md,md->m", t, sliding) - T @ start for T, t, drift in known]
+    slips0 = np.zeros((len(part.tangents), m)) if part.slip0 is None else part.slip0
+    known = zip(part.tangents, part.directions, slips0, strict=True)
+    along = [slip0 + np.einsum("md,md->m", t, sliding) - T @ start for T, t, slip0 in known]
     slides = [rest + T @ u for T, rest in zip(part.tangents, along, strict=True)]
     opening = part.gaps(at.displacement) - lying
     damage = law.damage(opening, np.sqrt(sum((s**2 for s in slides), none)), damage)
@@ -111,6 +111,6 @@ def bonded(law: CohesiveLaw, part: Constraints, at: Configuration, lying: Array)
         positions=np.tile(part.positions, (len(now), 1)),
         areas=np.tile(part.areas, len(now)),
         nodes=None if part.nodes is None else np.tile(part.nodes, len(now)),
-        compliance=None, tangents=(), directions=(), drift=None, friction=None, tied=layer,
+        compliance=None, tangents=(), directions=(), slip0=None, friction=None, tied=layer,
         branches=(falls + 2 * (opening < 0.0) + 4 * ~whole).ravel().astype(np.int8),
     ).without(np.concatenate([none > 0.0, *[~whole] * len(along)]))  # fmt: skip

@@ -133,7 +133,7 @@ class Constraints:
         Tangential motion relative to the primary side, a matrix for each tangent [-]; empty without friction.
     directions : tuple of ndarray (m, dim)
         The tangents themselves [-].
-    drift : ndarray (len(tangents), m), optional
+    slip0 : ndarray (len(tangents), m), optional
         Slip of the step that the motion of a rigid primary side makes by itself [length]; None stands for zero.
     friction : ndarray (m,), optional
         Coefficient of friction of each constraint [-]; None stands for zero.
@@ -172,7 +172,7 @@ class Constraints:
     tangents: tuple[csr_array, ...] = ()
     directions: tuple[Array, ...] = ()
     friction: Array | None = None
-    drift: Array | None = None
+    slip0: Array | None = None
     equality: Mask | None = None
     softness: Array | None = None
     low_rank_compliance: Array | None = None
@@ -226,8 +226,8 @@ class Constraints:
 
     def gaps_at_rest(self) -> Array:
         """Return gaps and slips (1 + k, m) at u = 0 [length]."""
-        drift = np.zeros((len(self.tangents), len(self))) if self.drift is None else self.drift
-        return np.vstack([self.gap0, drift if self.elastic_slip is None else drift + self.elastic_slip])
+        slip0 = np.zeros((len(self.tangents), len(self))) if self.slip0 is None else self.slip0
+        return np.vstack([self.gap0, slip0 if self.elastic_slip is None else slip0 + self.elastic_slip])
 
     def force(self, multiplier: Array, tangential: Array | None = None) -> Array:
         """Return the nodal contact forces (n_dofs,) of normal forces (m,) and tangential ones (m, k) [force]."""
@@ -294,7 +294,7 @@ def stacked(parts: Mapping[str, Constraints]) -> StackedConstraints:
         _stacked_tangents(one),
         _stacked_directions(one),
         np.concatenate([np.zeros(len(part)) if part.friction is None else part.friction for part in one]),
-        _stacked_slips([part.drift for part in one], one),
+        _stacked_slips([part.slip0 for part in one], one),
         _stacked_vectors([part.equality for part in one], one, bool),
         _stacked_vectors([part.softness for part in one], one, float),
         _stacked_low_rank(one),

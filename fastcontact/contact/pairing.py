@@ -13,7 +13,7 @@ from scipy.sparse import csr_array
 
 from fastcontact.arrays import AnyArray, Array, Indices, Mask, Numbers
 from fastcontact.contact.line_projection import along_line_normals, smooth_ends
-from fastcontact.contact.obstacles.rigid_side import RigidSide, Stance
+from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.projection import (
     Places,
     along_normals,
@@ -132,7 +132,7 @@ def pair(
     coordinates: Array,
     projection_tolerance: float,
     normals: str | Sequence[float] = "facet",
-    obstacle: Stance | None = None,
+    obstacle: Pose | None = None,
     rounded: bool = False,
 ) -> Pairing:
     """Project candidate positions (n, dim) on the closest facet of `primary` at nodal `coordinates` [length].
@@ -150,7 +150,7 @@ def pair(
         If a projection does not converge; see `search.closest`.
     """
     if isinstance(primary, RigidSide):
-        at = Stance(np.zeros(candidates.shape[1])) if obstacle is None else obstacle
+        at = Pose(np.zeros(candidates.shape[1])) if obstacle is None else obstacle
         _, normal, paired, offset = primary.facing(candidates, at)
         nowhere = np.zeros(len(candidates), np.intp)
         return Pairing(nowhere, np.zeros((len(candidates), candidates.shape[1] - 1)), normal, paired, offset)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fastcontact.arrays import Array, Mask, Numbers
-from fastcontact.contact.obstacles.rigid_side import RigidSide, Stance
+from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements
@@ -51,7 +51,7 @@ def check_sides(mesh: Mesh, name: str, secondary: Surface, primary: Surface, exc
 def check_obstacle(mesh: Mesh, name: str, secondary: Surface, obstacle: RigidSide) -> None:
     """Raise ContactError for an obstacle of contact `name` that no facet of the secondary side faces."""
     centres, outward, _ = _facet_frames(mesh, secondary)
-    _, normal, paired, _ = obstacle.facing(centres, Stance(np.zeros(mesh.dim)))
+    _, normal, paired, _ = obstacle.facing(centres, Pose(np.zeros(mesh.dim)))
     along = np.einsum("id,id->i", outward, normal)[paired]
     if len(along) and (along >= 0).all():
         raise ContactError(

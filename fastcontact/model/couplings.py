@@ -14,7 +14,7 @@ from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.loads import Load, Table
-from fastcontact.elasticity.relations import Relation
+from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.errors import MeshError, ModelError, unknown
 from fastcontact.mesh.companion_groups import ROTATION
 from fastcontact.mesh.mesh import Mesh
@@ -33,7 +33,7 @@ class ReferencePoint:
     place: tuple[float, ...]
 
 
-def relation(name: str, rows: Sequence[Sequence[Term]], shape: tuple[int, int]) -> Relation:
+def relation(name: str, rows: Sequence[Sequence[Term]], shape: tuple[int, int]) -> MultiPointConstraint:
     """Return equations, lists of terms that sum to zero, as a relation of a mesh of `shape` (n_points, dim)."""
     n_points, dim = shape
     row = [i for i, terms in enumerate(rows) for _ in terms]
@@ -42,7 +42,7 @@ def relation(name: str, rows: Sequence[Sequence[Term]], shape: tuple[int, int]) 
     matrix = csr_array((values, (row, column)), shape=(len(rows), n_points * dim))
     matrix.sum_duplicates()
     matrix.eliminate_zeros()
-    return Relation(name, matrix)
+    return MultiPointConstraint(name, matrix)
 
 
 def _turn(dim: int, axis: int, arm: Array) -> list[tuple[int, float]]:
@@ -115,7 +115,7 @@ def reference_of(mesh: Mesh, name: str) -> ReferencePoint:
 def coupling(
     mesh: Mesh, kinematics: str, names: tuple[str, str], kind: str, axes: Sequence[int],
     weighting: tuple[str, float | None] = ("uniform", None),
-) -> Relation:  # fmt: skip
+) -> MultiPointConstraint:  # fmt: skip
     """Return the relation of a coupling.
 
     Parameters

@@ -2,7 +2,7 @@
 
 The points of the mesh are followed by one for each such obstacle; its displacement is that of the obstacle. Components
 under a force are free rigid motions like those of a body without supports, and get weak springs like theirs (see
-`analysis.unsupported_bodies`); the others are prescribed. A gap against a rigid obstacle changes by
+`analysis.floating_bodies`); the others are prescribed. A gap against a rigid obstacle changes by
 ``n . (u - q)``, with q its displacement: the row of an obstacle is minus what the row of the gap makes of a common
 translation of all points.
 """
@@ -19,7 +19,7 @@ from scipy.sparse import bsr_array, csr_array, hstack
 
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
-from fastcontact.elasticity.relations import Relation
+from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.rigid_motions import FreeMotions
 
@@ -76,7 +76,7 @@ class ForceDrivenObstacles:
         indptr = np.r_[K.indptr, np.full(len(self), K.indptr[-1])].astype(K.indptr.dtype)
         return bsr_array((K.data, K.indices, indptr), shape=(self.n_dofs, self.n_dofs))
 
-    def relations(self, relations: Sequence[Relation]) -> list[Relation]:
+    def relations(self, relations: Sequence[MultiPointConstraint]) -> list[MultiPointConstraint]:
         """Return relations whose rows have columns for the obstacles, too."""
         return [dataclasses.replace(relation, rows=self._wider(relation.rows)) for relation in relations]
 
@@ -142,10 +142,10 @@ class ForceDrivenObstacles:
             return dataclasses.replace(part, B=self._wider(part.B), tangents=wider)
         B, normal = self._free(part.B, number)
         tangents = tuple(self._free(tangent, number)[0] for tangent in part.tangents)
-        drift = None
-        if moved is not None and part.drift is not None:
-            drift = part.drift + np.stack([t @ moved for t in part.directions])
-        return dataclasses.replace(part, B=B, gap0=part.gap0 + normal @ position, tangents=tangents, drift=drift)
+        slip0 = None
+        if moved is not None and part.slip0 is not None:
+            slip0 = part.slip0 + np.stack([t @ moved for t in part.directions])
+        return dataclasses.replace(part, B=B, gap0=part.gap0 + normal @ position, tangents=tangents, slip0=slip0)
 
     def _free(self, rows: csr_array, number: int) -> tuple[csr_array, Array]:
         """Return rows with those of the obstacle that they act against, and their direction (m, dim)."""

@@ -15,7 +15,7 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.elasticity.constrained_system import ConstrainedMotion
 from fastcontact.elasticity.initial_states import InitialState
 from fastcontact.elasticity.loads import Load
-from fastcontact.elasticity.relations import Relation, TemporaryRelation
+from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, TemporaryConstraint
 from fastcontact.elasticity.temperature import Temperature
 from fastcontact.errors import ModelError
 from fastcontact.mesh.argument_types import typed
@@ -91,7 +91,7 @@ class Model(ModelSupports):
         self.thermal_forces_by_ramp()
         self.check_heat()
         if ramp is not None:
-            items: list[Support | Load | Relation | Temperature | InitialState] = [
+            items: list[Support | Load | MultiPointConstraint | Temperature | InitialState] = [
                 *self.supports, *self.loads, *self.relations, *self.temperatures, *self.initial_states,
                 *self.heat_loads,
             ]  # fmt: skip
@@ -115,7 +115,9 @@ class Model(ModelSupports):
         )
         for begin in self._changes():
             acting = copy.copy(self)
-            acting.relations = [r for r in self.relations if not isinstance(r, TemporaryRelation) or r.acts_from(begin)]
+            acting.relations = [
+                r for r in self.relations if not isinstance(r, TemporaryConstraint) or r.acts_from(begin)
+            ]
             try:
                 acting._check_motions(fixed, list(self.force_driven.forces(forces).values()))
             except ModelError as error:
@@ -123,11 +125,11 @@ class Model(ModelSupports):
 
     def _changes(self) -> list[float]:
         """Return the instants at which temporary relations begin or end, and 0."""
-        temporary = [own for own in self.relations if isinstance(own, TemporaryRelation)]
+        temporary = [own for own in self.relations if isinstance(own, TemporaryConstraint)]
         return sorted({0.0, *(t for own in temporary for t in (own.begins, own.ends) if 0.0 < t < np.inf)})
 
     def _check_relations(self, fixed: Mask, prescribed: Mapping[Table | None, Array], ramp: Ramp) -> None:
-        relations = [own for own in self.relations if not isinstance(own, TemporaryRelation)]
+        relations = [own for own in self.relations if not isinstance(own, TemporaryConstraint)]
         if not relations:
             return
         motion = ConstrainedMotion(fixed.ravel(), relations)

@@ -11,7 +11,7 @@ from scipy.sparse import csr_array, vstack
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.loads import Load, Table, check_number
-from fastcontact.elasticity.relations import Relation
+from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.errors import ModelError
 from fastcontact.mesh.companion_groups import OPPOSITE
 from fastcontact.mesh.mesh import Mesh
@@ -74,7 +74,7 @@ class Pretension:
         each = np.tile(direction, (len(self.nodes), 1))
         return csr_array(along(self.nodes, each, n_dofs) - along(self.opposite, each, n_dofs))
 
-    def relations(self, n_dofs: int) -> list[Relation]:
+    def relations(self, n_dofs: int) -> list[MultiPointConstraint]:
         """Return the relations that hold at all times: no shear, one shortening of all nodes, the prescribed one if any."""
         rows = [self._approach(direction, n_dofs) for direction in _across(self.normal)]
         own = self._approach(self.normal, n_dofs)
@@ -82,18 +82,18 @@ class Pretension:
             rows.append(own[1:] - csr_array(vstack([own[[0]]] * (len(self.nodes) - 1))))
         matrix = csr_array(vstack(rows, format="csr"))
         matrix.eliminate_zeros()
-        found = [Relation(f"the sides of {self.name}", matrix)]
+        found = [MultiPointConstraint(f"the sides of {self.name}", matrix)]
         if self.shortening is not None:
-            found.append(Relation(self.prescribed, self.row(n_dofs), self.shortening, self.ramp))
+            found.append(MultiPointConstraint(self.prescribed, self.row(n_dofs), self.shortening, self.ramp))
         return found
 
     def shortened(self, displacement: Array) -> float:
         """Return by how much the sides approach in displacements (n_points, dim) [length]."""
         return float((self.row(displacement.size) @ displacement.ravel())[0])
 
-    def locked(self, n_dofs: int, reached: float) -> Relation:
+    def locked(self, n_dofs: int, reached: float) -> MultiPointConstraint:
         """Return the relation that keeps a shortening [length]."""
-        return Relation(f"the locked length of {self.name}", self.row(n_dofs), reached, ((0.0, 1.0),))
+        return MultiPointConstraint(f"the locked length of {self.name}", self.row(n_dofs), reached, ((0.0, 1.0),))
 
 
 @dataclass(frozen=True, eq=False)

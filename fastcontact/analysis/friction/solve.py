@@ -21,7 +21,7 @@ from fastcontact.analysis.friction.slip_directions import GIVING, aligning, idle
 from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
-from fastcontact.linear.flexibility import MOST_ROWS_WITH_FRICTION, check_rows
+from fastcontact.linear.delassus import MOST_ROWS_WITH_FRICTION, check_rows
 from fastcontact.linear.protocol import Loaded, LoadedNonsymmetric
 
 log = logging.getLogger("fastcontact")
@@ -33,15 +33,15 @@ def solve(
 ) -> FrictionalEquilibrium:  # fmt: skip
     """Find displacement and contact forces under contact and friction.
 
-    Constraints that nothing presses together are left out, for each costs columns of the flexibility: the problem begins
-    with those that were closed, and takes up others as they are found to penetrate. What is left out in the end is open
-    and free of forces, so nothing is lost. Constraints that a compliance of their own couples are taken all at once.
+    Constraints that nothing presses together are left out, for each costs columns of the inverse stiffness: the problem
+    begins with those that were closed, and takes up others as they are found to penetrate. What is left out in the end is
+    open and free of forces, so nothing is lost. Constraints that a compliance of their own couples are taken all at once.
 
     Parameters
     ----------
     loaded : Loaded
     constraints : Constraints
-        Rows for the unknowns of the solver; `Constraints.drift` (k, m) is the slip at zero unknowns, minus that at the
+        Rows for the unknowns of the solver; `Constraints.slip0` (k, m) is the slip at zero unknowns, minus that at the
         beginning of the step [length].
     closed : ndarray of bool (m,)
         Constraints to start from as closed and sticking.
@@ -80,7 +80,7 @@ def _eliminated(
     u: Array,
     forces: Array | None,
 ) -> FrictionalEquilibrium | None:
-    """Solve without the flexibility of the constraints, see `eliminated`; None where that fails."""
+    """Solve without the Delassus operator of the constraints, see `eliminated`; None where that fails."""
     usable = constraints.usable
     solved = eliminated.solve(loaded, constraints, closed & usable, accuracy, u, forces)
     if solved is None:
@@ -102,7 +102,7 @@ def _among(
     check_rows((1 + k) * len(rows), MOST_ROWS_WITH_FRICTION)
     R = csr_array(vstack([matrix[rows] for matrix in (constraints.B, *constraints.tangents)], format="csr"))
     at_rest = constraints.gaps_at_rest()
-    free, F = loaded.flexibility(R)
+    free, F = loaded.delassus(R)
     if constraints.tangential_softness is not None:  # before idle slips are looked for: what gives way is not idle
         slips = np.arange(len(rows), len(F))
         F[slips, slips] += np.tile(constraints.tangential_softness[rows], k)
@@ -122,7 +122,7 @@ def _among(
         F[still, still] = np.where(moved, GIVING * own[0, 0], np.diag(F).max())[idle_slips]
         free[1:][idle_slips & ~moved] = 0.0
     equations = np.zeros(len(rows), bool) if constraints.equality is None else constraints.equality[rows]
-    found = _on_flexibility(F, free, constraints.coefficients[rows], closed[rows], equations, start)
+    found = _on_delassus_operator(F, free, constraints.coefficients[rows], closed[rows], equations, start)
     y, relative = found.y, found.gaps
     if Q is not None:
         y, relative = (Q.T @ y.ravel()).reshape(y.shape), (Q.T @ relative.ravel()).reshape(y.shape)
@@ -149,7 +149,7 @@ def _add_compliance(F: Array, constraints: Constraints, rows: Indices) -> None:
         F[np.arange(len(rows)), np.arange(len(rows))] += constraints.softness[rows]
 
 
-def _on_flexibility(
+def _on_delassus_operator(
     F: Array, free: Array, friction: Array, closed: Mask, equality: Mask, start: Array | None
 ) -> dense.Forces:
     """Solve the problem on the compliance F, from which constraints that are equations are eliminated first."""

@@ -144,7 +144,7 @@ class Adjoint:
 
     def _transposed(self, w: Array, mu: Array) -> Array:
         """Return ``E.T y`` (n,)."""
-        system, bodies = self._system, self._contact.problem.unsupported_bodies
+        system, bodies = self._system, self._contact.problem.floating_bodies
         along = w if system.T is None else system.T @ w
         found = system.reduced(self._gap.T @ mu - self._force.T @ along)
         if bodies is not None:

@@ -125,7 +125,7 @@ def _pressure(contact: MovingContact, none: Gradient, step: StepResult, asked: A
         place = int(places[0])
     if not found.active[place]:
         raise ModelError(f"point {found.points[place]} of contact '{name}' is open: its pressure is zero")
-    if contact.problem.model.seams:
+    if contact.problem.model.periodic_interfaces:
         raise ModelError(
             "pressures of a part that repeats itself have no sensitivities: ask for a force or a displacement"
         )

@@ -32,8 +32,8 @@ from fastcontact.contact.obstacles.shapes import HalfSpace
 from fastcontact.elasticity.anisotropic_materials import Orthotropic
 from fastcontact.elasticity.material_axes import CylindricalAxes
 from fastcontact.elasticity.materials import LinearElastic
+from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, TemporaryConstraint
 from fastcontact.elasticity.nonlinear_materials import NonlinearElastic
-from fastcontact.elasticity.relations import Relation, TemporaryRelation
 from fastcontact.errors import FastcontactError
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, Table
@@ -52,7 +52,7 @@ class Building:
     model : Model
     thickness : float
         Of a plane model; forces of the model are those of a unit of it [length].
-    local_supports : list of Relation
+    local_supports : list of MultiPointConstraint
         Relations that are supports: those along local axes, and those that come or go between steps.
     linearised : str
         Why small strains are solved although a step has NLGEOM; empty where not.
@@ -76,7 +76,7 @@ class Building:
         self.model = Model(mesh, self.found.kinematics, case_text, strain=strain)
         for material, group in materials:
             self.model.add_material(material, group)
-        self.local_supports: list[Relation] = []
+        self.local_supports: list[MultiPointConstraint] = []
         self._supports(conditions)
         self.links = relations_of(self.found, self.model.mesh)
         self.model.relations.extend(self.links)
@@ -227,14 +227,14 @@ class Building:
             )
             rows = csr_array(vstack([self._support_row(conditions, name) for name in names]))
             self._relate_support(
-                TemporaryRelation(label, rows, 1.0, table, acting.begins, acting.ends, keeps=acting.keeps)
+                TemporaryConstraint(label, rows, 1.0, table, acting.begins, acting.ends, keeps=acting.keeps)
             )
 
     def _local_support(self, conditions: Conditions, name: Component, table: Table) -> None:
         label = f"the support of {conditions.named(name)} on local axes"
-        self._relate_support(Relation(label, self._support_row(conditions, name), 1.0, table))
+        self._relate_support(MultiPointConstraint(label, self._support_row(conditions, name), 1.0, table))
 
-    def _relate_support(self, made: Relation) -> None:
+    def _relate_support(self, made: MultiPointConstraint) -> None:
         self.local_supports.append(made)
         self.model.relations.append(made)
 

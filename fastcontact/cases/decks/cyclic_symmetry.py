@@ -7,7 +7,7 @@ import numpy as np
 from fastcontact.cases.decks.blocks import Block, folded, unquoted
 from fastcontact.cases.decks.content import Content, SectorEnds, Sectors
 from fastcontact.cases.decks.meshing import DeckMesh, group_of_surface
-from fastcontact.elasticity.relations import Relation
+from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.errors import ModelError
 from fastcontact.model.model import Model
 
@@ -36,7 +36,7 @@ def cyclic_symmetry_model(content: Content, block: Block) -> None:
     content.sectors.append(Sectors(block.place, int(text), block.get("TIE"), points))
 
 
-def add_sectors(model: Model, found: DeckMesh) -> list[Relation]:
+def add_sectors(model: Model, found: DeckMesh) -> list[MultiPointConstraint]:
     """Add the cyclic symmetries of the deck to the model; return their relations."""
     content, before = found.made.content, len(model.relations)
     used: set[int] = set()

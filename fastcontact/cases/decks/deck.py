@@ -19,7 +19,7 @@ from fastcontact.cases.decks.building import Building
 from fastcontact.cases.decks.content import Content
 from fastcontact.cases.decks.reading import read_content
 from fastcontact.elasticity import recovery
-from fastcontact.elasticity.relations import TemporaryRelation
+from fastcontact.elasticity.multipoint_constraints import TemporaryConstraint
 from fastcontact.errors import ContactError, FileError, MeshError, ModelError, warn
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.files.paths import PathLike, existing_file
@@ -137,7 +137,7 @@ class Deck:
             return reaction.copy()
         held = self.model.prescribed()[0].ravel()
         for support in self.building.local_supports:
-            if not isinstance(support, TemporaryRelation) or support.acts_from(instant):
+            if not isinstance(support, TemporaryConstraint) or support.acts_from(instant):
                 held[support.rows.indices[support.rows.data != 0.0]] = True
         rows = [link.rows for link in links]
         forces = multipliers(reaction.ravel(), rows, held)

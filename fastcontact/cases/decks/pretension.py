@@ -9,7 +9,7 @@ from fastcontact.cases.decks.assembled import Assembled, facet_points
 from fastcontact.cases.decks.blocks import Block
 from fastcontact.cases.decks.content import Content, Given, PretensionSection
 from fastcontact.cases.decks.meshing import DeckMesh, group_of_surface
-from fastcontact.elasticity.relations import Relation
+from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.errors import MeshError
 from fastcontact.mesh.generate.cut import cut
 from fastcontact.mesh.mesh import Mesh
@@ -89,7 +89,7 @@ def cut_sections(found: DeckMesh, mesh: Mesh) -> Mesh:
     return mesh
 
 
-def add_sections(model: Model, found: DeckMesh, locks: Locks) -> list[Relation]:
+def add_sections(model: Model, found: DeckMesh, locks: Locks) -> list[MultiPointConstraint]:
     """Add the pretension sections to a model; return all relations that they have at any time, and those to their nodes."""
     before, links, locked = len(model.relations), [], []
     for point, section in locks.points.items():
@@ -98,9 +98,9 @@ def add_sections(model: Model, found: DeckMesh, locks: Locks) -> list[Relation]:
         model.add_pretension(group, group, force=0.0, locked_from=locks.begins.get(point), normal=normal)
         row = _side(found, section) * model.pretensions[-1].row(model.n_dofs)
         node = csr_array((np.ones(1), ([0], [point * found.dim])), shape=row.shape)
-        links.append(Relation(f"*{place.keyword} of line {place.line}", csr_array(row - node)))
+        links.append(MultiPointConstraint(f"*{place.keyword} of line {place.line}", csr_array(row - node)))
         if point in locks.begins:
-            locked.append(Relation(f"the locked length of line {place.line}", row))
+            locked.append(MultiPointConstraint(f"the locked length of line {place.line}", row))
     model.relations.extend(links)
     return [*model.relations[before:], *locked]
 

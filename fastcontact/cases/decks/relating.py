@@ -13,7 +13,7 @@ from fastcontact.cases.decks.local_axes import local_axes, local_directions, ori
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.cases.decks.multi_points import multi_point_rows
 from fastcontact.elasticity.loads import Traction
-from fastcontact.elasticity.relations import Relation
+from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.errors import ModelError
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.couplings import ReferencePoint, Term, distributing_rows, relation, rigid_rows
@@ -31,7 +31,7 @@ def make_rotations(found: DeckMesh) -> None:
             found.rotation(point)
 
 
-def relations_of(found: DeckMesh, mesh: Mesh) -> list[Relation]:
+def relations_of(found: DeckMesh, mesh: Mesh) -> list[MultiPointConstraint]:
     """Return the relations of all equations, rigid bodies and couplings."""
     content = found.made.content
     axes = local_directions(found.made)

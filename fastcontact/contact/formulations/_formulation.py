@@ -140,7 +140,7 @@ class Formulation(ABC):
         return isinstance(self.primary, Surface) and self.normals == "facet" and not self.options.tied
 
     @property
-    def corner_functions(self) -> csr_array | None:
+    def basis_transformation(self) -> csr_array | None:
         """Values at mid nodes of functions that gaps are weighted with, where these are linear on quadratic facets.
 
         A matrix (n_points, n_points) with rows of mid nodes and columns of corners [-]; None where there are none.
@@ -242,7 +242,7 @@ class Formulation(ABC):
         assert self.normals is not None
         assert beyond is not None
         positions = candidates.positions(deformed)
-        pairing = pair(positions, self.primary, deformed, beyond, self.normals, at.stance, at.rounded)
+        pairing = pair(positions, self.primary, deformed, beyond, self.normals, at.pose, at.rounded)
         if self.normals != "secondary":
             return pairing
         return opposed(pairing, self._secondary_normals(candidates, deformed))
@@ -266,9 +266,9 @@ class Formulation(ABC):
         if not self.slides:
             return Constraints(B, gap0, positions, compliance)
         directions, rubbing = self.options.rubbing(tangents(pairing.normal), candidates)
-        along, drift = self.slips(candidates, pairing, rubbing, at)
+        along, slip0 = self.slips(candidates, pairing, rubbing, at)
         friction = self.options.coefficients(self.friction, candidates)
-        return Constraints(B, gap0, positions, compliance, along, directions, friction, drift)
+        return Constraints(B, gap0, positions, compliance, along, directions, friction, slip0)
 
     def slips(
         self, candidates: Candidates, pairing: Pairing, directions: Sequence[Array], at: Configuration
@@ -278,15 +278,15 @@ class Formulation(ABC):
         The latter: what a rigid primary side moves in the step, or minus the part that closes a gap [length]; None is zero.
         """
         along = tuple(rows_along(t, candidates, pairing, self.primary, self.points.size) for t in directions)
-        drift: Array | None = None
+        slip0: Array | None = None
         if isinstance(self.primary, RigidSide):
-            drift = -np.stack([t @ (at.obstacle - at.obstacle_start) for t in directions])
+            slip0 = -np.stack([t @ (at.obstacle - at.obstacle_start) for t in directions])
             turning = self.turning(candidates, at)
             if turning is not None:
-                drift -= np.stack([np.einsum("nd,nd->n", t, turning) for t in directions])
+                slip0 -= np.stack([np.einsum("nd,nd->n", t, turning) for t in directions])
         elif self.slip == "symmetric":
-            drift = self._closing_slip(candidates, pairing, directions, at)
-        return along, drift
+            slip0 = self._closing_slip(candidates, pairing, directions, at)
+        return along, slip0
 
     def added_gap(self, candidates: Candidates, pairing: Pairing, at: Configuration) -> Array:
         """Return the contribution of clearances and wear to the gaps (n,) of candidates, zero if unpaired [length]."""
@@ -315,7 +315,7 @@ class Formulation(ABC):
         """Return the displacement of the points faced by candidates due to obstacle rotation (n, dim) [length], or None."""
         assert isinstance(self.primary, RigidSide)
         now, before = (candidates.positions(self.points + u) for u in (at.displacement, at.start))
-        return self.primary.turning(now, before, at.stance, at.stance_start)
+        return self.primary.turning(now, before, at.pose, at.pose_start)
 
     def without_slip(self, at: Configuration) -> list[tuple[Array, Mask]]:
         """Return directions (n_nodes, dim) in which both sides are held, and do not move apart, with the nodes (n_nodes,).
@@ -374,7 +374,7 @@ class Formulation(ABC):
         """
         assert isinstance(self.primary, Surface)
         deformed, start = self.points + at.displacement, self.points + at.start
-        drift = np.zeros((len(directions), len(pairing.paired)))
+        slip0 = np.zeros((len(directions), len(pairing.paired)))
         rows = np.flatnonzero(pairing.paired)
         facing = places(self.primary, pairing.facet[rows], pairing.xi[rows])
         nodes, shape = candidates.nodes[rows], candidates.shape[rows]
@@ -387,8 +387,8 @@ class Formulation(ABC):
         apart -= np.einsum("nk,nkd->nd", facing.shape, start[facing.nodes])
         opening = np.einsum("nd,nd->n", mean, apart)
         for k, along in enumerate(directions):
-            drift[k, rows] = np.einsum("nd,nd->n", along[rows], mean) * opening
-        return drift
+            slip0[k, rows] = np.einsum("nd,nd->n", along[rows], mean) * opening
+        return slip0
 
     def first_contact(self, at: Configuration) -> tuple[Array, Array]:
         """Return where the bodies meet first [length], and the normal faced there [-], both (dim,).

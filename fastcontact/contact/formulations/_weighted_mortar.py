@@ -34,7 +34,7 @@ from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.formulations._overlap import Overlap, obstacle_overlap
 from fastcontact.contact.formulations._rows import Entries, rows_of
 from fastcontact.contact.integration import facet_measure, fine_rule, nodal_areas
-from fastcontact.contact.obstacles.rigid_side import RigidSide, Stance
+from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.pairing import Candidates, tangents
 from fastcontact.contact.prescribed_normals import Normals
 from fastcontact.contact.projection import facet_normals, nodal_normals, smooth_normals
@@ -91,7 +91,7 @@ class WeightedMortar(Formulation):
         return exact and self.points.shape[1] == 3
 
     @property
-    def corner_functions(self) -> csr_array | None:
+    def basis_transformation(self) -> csr_array | None:
         """See `Formulation`."""
         if self.multipliers == "dual" or self.secondary.order == 1:
             return None
@@ -116,9 +116,9 @@ class WeightedMortar(Formulation):
         linear = elements.get(element.linear).shape(element.nodes)
         return np.vstack([linear.T, np.zeros((element.n_nodes - element.n_corners, element.n_nodes))])
 
-    def _overlap(self, deformed: Array, stance: Stance) -> Overlap:
+    def _overlap(self, deformed: Array, pose: Pose) -> Overlap:
         if isinstance(self.primary, RigidSide):
-            return obstacle_overlap(self.secondary, self.primary, (self.points, deformed), self.axisymmetric, stance)
+            return obstacle_overlap(self.secondary, self.primary, (self.points, deformed), self.axisymmetric, pose)
         if deformed.shape[1] == 3:
             return face_overlap(self.secondary, self.primary, self.points, deformed, self.smoothing)
         return line_overlap(
@@ -134,7 +134,7 @@ class WeightedMortar(Formulation):
     def unilateral(self, at: Configuration) -> Constraints:
         """Cut and pair on the displaced configuration and return one mean gap per node."""
         deformed = self.points + at.displacement
-        overlap = self._overlap(deformed, at.stance)
+        overlap = self._overlap(deformed, at.pose)
         covered = [mass.sum(axis=2) @ T.T for T, mass in zip(self._test, overlap.mass, strict=True)]
         kept = self._taking_part(covered)
         own, across, closer = self._weighted(overlap, covered, kept)
@@ -142,7 +142,7 @@ class WeightedMortar(Formulation):
         sums = np.where(self.options.excluded_nodes(self.secondary), 0.0, np.asarray(own.sum(axis=1)).ravel())
         weight = np.where(sums > 0.0, sums, np.inf)
         mean = scaled(csr_array(own - across), 1.0 / weight)
-        normal = self._mean_normals(overlap, deformed, at.stance)
+        normal = self._mean_normals(overlap, deformed, at.pose)
         B = rows_of(mean, normal)
         gap0 = B @ self.points.ravel() + at.clearance_factor * self._clearance(own, across, weight)
         gap0 -= np.einsum("nd,nd->n", closer, normal) / weight
@@ -161,10 +161,10 @@ class WeightedMortar(Formulation):
             tangents=slips,
             directions=directions,
             friction=self.options.coefficients(self.friction, candidates),
-            drift=self._drift(mean, apart, normal, rubbing, at),
+            slip0=self._slip0(mean, apart, normal, rubbing, at),
         )
 
-    def _drift(
+    def _slip0(
         self, mean: csr_array, apart: Array, normal: Array, directions: tuple[Array, ...], at: Configuration
     ) -> Array | None:
         """Return the slip (k, m) beside that by displacements: by a rigid obstacle, or see `_closing_slip_of_nodes`."""
@@ -172,7 +172,7 @@ class WeightedMortar(Formulation):
             return self._closing_slip_of_nodes(apart, normal, directions, at) if self.slip == "symmetric" else None
         moved = np.tile(at.obstacle - at.obstacle_start, (len(normal), 1))
         now, before = (mean @ (self.points + u) for u in (at.displacement, at.start))
-        turning = self.primary.turning(now, before, at.stance, at.stance_start)
+        turning = self.primary.turning(now, before, at.pose, at.pose_start)
         moved = moved if turning is None else moved + turning
         return -np.stack([np.einsum("nd,nd->n", t, moved) for t in directions])
 
@@ -284,13 +284,13 @@ class WeightedMortar(Formulation):
             rescued[block.local[lost][np.arange(len(most)), most]] = True
         return (enough | rescued) & (whole > 0.0)
 
-    def _mean_normals(self, overlap: Overlap, deformed: Array, stance: Stance) -> Array:
+    def _mean_normals(self, overlap: Overlap, deformed: Array, pose: Pose) -> Array:
         """Return unit means (m, dim) of the primary normals that the nodes face; the last axis for nodes without.
 
         Against an obstacle the normals at the nodes themselves, which lie in planes of symmetry.
         """
         if isinstance(self.primary, RigidSide):
-            _, normal, paired, _ = self.primary.facing(deformed[self.secondary.points], stance)
+            _, normal, paired, _ = self.primary.facing(deformed[self.secondary.points], pose)
             return np.where(paired[:, None], normal, -nodal_normals(self.secondary, deformed))
         if self.normals == "secondary":
             return -nodal_normals(self.secondary, deformed)

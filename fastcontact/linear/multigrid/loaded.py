@@ -14,7 +14,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.linear.elimination.corner_functions import eliminated
+from fastcontact.linear.elimination.basis_transformation import eliminated
 from fastcontact.linear.elimination.elimination import Elimination, eliminate
 from fastcontact.linear.elimination.loaded import LoadedIteration
 from fastcontact.linear.elimination.pivot_order import RepeatedError
@@ -56,7 +56,7 @@ class LoadedMultigrid(LoadedIteration):
 
     @property
     def _functions(self) -> csr_array | None:
-        functions: csr_array | None = self._solver.corner_functions
+        functions: csr_array | None = self._solver.basis_transformation
         return functions
 
     @property

@@ -12,8 +12,8 @@ from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.elasticity.initial_states import InitialState
 from fastcontact.elasticity.loads import Load, Value
 from fastcontact.elasticity.materials import KINEMATICS, Material
+from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, stacked_rows
 from fastcontact.elasticity.nonlinear_materials import STRAINS
-from fastcontact.elasticity.relations import Relation, stacked_rows
 from fastcontact.elasticity.springs import Springs, stacked
 from fastcontact.elasticity.temperature import Temperature
 from fastcontact.elasticity.varying_constants import Cells
@@ -23,7 +23,7 @@ from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
 from fastcontact.model.contact_pair import ContactPair
-from fastcontact.model.periodicity import Seam
+from fastcontact.model.periodicity import PeriodicInterface
 from fastcontact.model.pretension import Pretension
 from fastcontact.model.ramp import Table
 
@@ -98,11 +98,13 @@ class ModelBase:
         self.temperatures: list[Temperature] = []
         self.heat_loads: list[FixedTemperature | Heating | Film] = []
         self.initial_states: list[InitialState] = []
-        self.relations: list[Relation] = []
-        self.related_supports: list[tuple[str, Relation]] = []  # those of the relations that support a group
+        self.relations: list[MultiPointConstraint] = []
+        self.related_supports: list[
+            tuple[str, MultiPointConstraint]
+        ] = []  # those of the relations that support a group
         self.springs: list[Springs] = []
         self.pretensions: list[Pretension] = []
-        self.seams: list[Seam] = []  # nodes that are one place of a part that repeats itself
+        self.periodic_interfaces: list[PeriodicInterface] = []  # nodes that are one place of a part that repeats itself
         self.contact: list[ContactPair] = []
 
     @property

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import csr_array, vstack
 
 from fastcontact.elasticity.loads import axes_of, check_number
-from fastcontact.elasticity.relations import Relation
+from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.elasticity.springs import grounded, joined
 from fastcontact.errors import ModelError
 from fastcontact.mesh.argument_types import typed
@@ -88,13 +88,13 @@ class ModelConnections(ModelInitialStates):
         if component == NORMAL:
             rows = along(*normals_of(self.mesh, group), self.n_dofs)
             first = csr_array(vstack([rows[[0]]] * (rows.shape[0] - 1), format="csr"))
-            self.relations.append(Relation(f"couple('{group}', 'normal')", csr_array(rows[1:] - first)))
+            self.relations.append(MultiPointConstraint(f"couple('{group}', 'normal')", csr_array(rows[1:] - first)))
             return
         for axis in axes_of(f"couple('{group}')", dict.fromkeys(component, 1.0), self.mesh.dim):
             m = len(nodes) - 1
             dofs = np.column_stack([np.full(m, nodes[0]), nodes[1:]]).astype(np.intp) * self.mesh.dim + axis
             rows = csr_array((np.tile([-1.0, 1.0], m), dofs.ravel(), 2 * np.arange(m + 1)), shape=(m, self.n_dofs))
-            self.relations.append(Relation(f"couple('{group}', '{'xyz'[axis]}')", rows))
+            self.relations.append(MultiPointConstraint(f"couple('{group}', '{'xyz'[axis]}')", rows))
 
     @typed(ModelError)
     def relate_groups(
@@ -140,7 +140,9 @@ class ModelConnections(ModelInitialStates):
             rows = csr_array(rows + coefficients[1] * along(opposite[place], theirs[place], self.n_dofs))
             rows.eliminate_zeros()
             self.relations.append(
-                Relation(name, rows[np.diff(rows.indptr) > 0], float(value), table_of(ramp, f"the ramp of {name}"))
+                MultiPointConstraint(
+                    name, rows[np.diff(rows.indptr) > 0], float(value), table_of(ramp, f"the ramp of {name}")
+                )
             )
 
     @typed(ModelError)
@@ -187,11 +189,11 @@ class ModelConnections(ModelInitialStates):
         loose = sorted(axes_of(name, dict.fromkeys(free, 1.0), self.mesh.dim)) if free else []
         if any(axis in jump for axis in loose):
             raise ModelError(f"{name}: '{free}' is free, so no displacement can be given there")
-        relations, seam = periodic(
+        relations, interface = periodic(
             self.mesh, (first, second), jump, loose, translation, table_of(ramp, f"the ramp of {name}")
         )
         self.relations.extend(relations)
-        self.seams.append(seam)
+        self.periodic_interfaces.append(interface)
 
     @typed(ModelError)
     def add_cyclic_symmetry(
@@ -236,9 +238,9 @@ class ModelConnections(ModelInitialStates):
                 f"{name} needs two sectors at least, a whole number, an origin of {self.mesh.dim} numbers and a direction of "
                 f"three, not {sectors}, {place} and {along}"
             )
-        relations, seam = cyclic(self.mesh, (first, second), sectors, place, along)
+        relations, interface = cyclic(self.mesh, (first, second), sectors, place, along)
         self.relations.extend(relations)
-        self.seams.append(seam)
+        self.periodic_interfaces.append(interface)
 
     @typed(ModelError)
     def relate(
@@ -270,7 +272,7 @@ class ModelConnections(ModelInitialStates):
         dofs = np.array(sorted(row), np.intp)
         values = np.array([row[dof] for dof in dofs])
         rows = csr_array((values, dofs, np.array([0, len(dofs)])), shape=(1, self.n_dofs))
-        self.relations.append(Relation(name, rows, float(value), table_of(ramp, f"the ramp of {name}")))
+        self.relations.append(MultiPointConstraint(name, rows, float(value), table_of(ramp, f"the ramp of {name}")))
 
     @typed(ModelError)
     def add_coupling(

@@ -356,8 +356,11 @@ class ModelContact(ModelConnections):
         modulus = min((m.contact_modulus for m, _ in self.materials), default=1.0)
         axisymmetric = self.kinematics == "axisymmetric"
         # Tangential fields that turn from one end to the other are not one field of components.
-        seams = [seam for seam in self.seams if seam.turn is None or not pair.options.get("friction")]
+        friction = pair.options.get("friction")
+        interfaces = [end for end in self.periodic_interfaces if end.turn is None or not friction]
         options = dataclasses.replace(
-            options, same_place=same_place(seams, self.mesh.n_points), source=self._source(pair, secondary, options)
+            options,
+            same_place=same_place(interfaces, self.mesh.n_points),
+            source=self._source(pair, secondary, options),
         )
         return kind(secondary, primary, self.mesh.points, axisymmetric, modulus, options=options, held=held, **own)

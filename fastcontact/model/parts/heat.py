@@ -101,7 +101,7 @@ class ModelHeat(ModelMaterials):
     def same_temperature(self) -> Indices:
         """Return for each node (n_points,) the first one of the same temperature: ends of periods, sides of sections."""
         cuts = [(cut.nodes, cut.opposite) for cut in self.pretensions]
-        found = same_place([*self.seams, *cuts], self.mesh.n_points)  # type: ignore[list-item]
+        found = same_place([*self.periodic_interfaces, *cuts], self.mesh.n_points)  # type: ignore[list-item]
         return np.arange(self.mesh.n_points) if found is None else found
 
     def fixed_temperatures(self) -> tuple[Mask, dict[Table | None, Array]]:

@@ -45,7 +45,7 @@ def contact_moment(contact: ContactResult, about: ArrayLike | None = None) -> Ar
 
 
 @dataclass(frozen=True, eq=False)
-class ContactAnswers:
+class ContactResultants:
     """Contact summary of one pair in one load step.
 
     Attributes
@@ -85,7 +85,7 @@ class ContactAnswers:
 
 
 @typed(ContactError)
-def contact_answers(model: Model, steps: Iterable[StepResult], name: str) -> list[ContactAnswers]:
+def contact_resultants(model: Model, steps: Iterable[StepResult], name: str) -> list[ContactResultants]:
     """Return the contact summary of a pair in each load step.
 
     Parameters
@@ -105,18 +105,21 @@ def contact_answers(model: Model, steps: Iterable[StepResult], name: str) -> lis
         if model.strain == "finite":
             areas = lumped_areas(pair.secondary, pair.points + step.displacement, pair.axisymmetric)
         work += contact.dissipation
-        found.append(_answers(contact, areas, pair.axisymmetric, work))
+        found.append(_resultants(contact, areas, pair.axisymmetric, work))
     return found
 
 
-def _answers(contact: ContactResult, areas: Array, axisymmetric: bool, work: float) -> ContactAnswers:
+ContactResultants, contact_resultants = ContactResultants, contact_resultants  # earlier names
+
+
+def _resultants(contact: ContactResult, areas: Array, axisymmetric: bool, work: float) -> ContactResultants:
     closed, facing = contact.active, np.isfinite(contact.gap)
     normal = np.where(np.isfinite(contact.normal), contact.normal, 0.0)
     pushed = np.einsum("nd,nd->n", contact.force_vectors, normal)
     total, area = float(pushed.sum()), float(areas[closed].sum())
     pressed = bool(total > 0.0)
     moment = contact_moment(contact)
-    return ContactAnswers(
+    return ContactResultants(
         force=contact.force,
         normal_force=contact.normal_force,
         moment=np.zeros_like(moment) if axisymmetric else moment,
@@ -132,7 +135,7 @@ def _answers(contact: ContactResult, areas: Array, axisymmetric: bool, work: flo
 
 @typed(ContactError)
 def contact_history(model: Model, steps: Sequence[StepResult], name: str) -> NDArray[np.void]:
-    """Return `contact_answers` as a table, one row for each load step, for `write_csv` and pandas.
+    """Return `contact_resultants` as a table, one row for each load step, for `write_csv` and pandas.
 
     Returns
     -------
@@ -140,7 +143,7 @@ def contact_history(model: Model, steps: Sequence[StepResult], name: str) -> NDA
         ``step``, ``load_factor``; ``force_x`` ...; ``moment_z``, in space ``moment_x`` ...; ``area``; ``centre_x`` ...;
         ``normal_force``, ``mean_gap``, ``pressure_mean``, ``pressure_max``, ``dissipation``, ``friction_work``.
     """
-    answers = contact_answers(model, steps, name)
+    answers = contact_resultants(model, steps, name)
     axes = "xyz"[: model.mesh.dim]
     turns = "z" if model.mesh.dim == 2 else axes
     rows = [

@@ -69,7 +69,7 @@ class RigidPosition:
     derivative: Array | None = None
 
 
-class UnsupportedBodies:
+class FloatingBodies:
     """Springs on the free motions of a system.
 
     Parameters

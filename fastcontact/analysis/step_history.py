@@ -20,7 +20,7 @@ from fastcontact.contact.cohesive_layer import Layer
 from fastcontact.results.step import ContactResult
 
 
-def keep_contact(problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State) -> State:
+def save_contact_history(problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State) -> State:
     """Return the state at the end of a step with its contact.
 
     Parameters

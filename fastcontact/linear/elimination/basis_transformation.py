@@ -22,7 +22,7 @@ from fastcontact.linear.sparse_rows import scaled
 
 
 @dataclass(frozen=True, eq=False)
-class CornerElimination(Elimination):
+class BasisTransformation(Elimination):
     """``u[pivots] += moves (B moves)^-1 (c - B u)``.
 
     Its `pivots` (q,) are all unknowns that move, its `weights` (m, n) are -B, its `force_weights` the rows that multipliers
@@ -93,17 +93,17 @@ def eliminated(
 ) -> Elimination:
     """Eliminate equations along the `functions` of corners where they are of that kind, by nodal unknowns elsewhere.
 
-    See `eliminate_corners` and `elimination.eliminate`.
+    See `eliminate_transformed` and `elimination.eliminate`.
     """
     found = None
     if functions is not None and nodes is not None:
-        found = eliminate_corners(B, c, force_rows, nodes, size, functions)
+        found = eliminate_transformed(B, c, force_rows, nodes, size, functions)
     return eliminate(B, c, force_rows, nodes, size) if found is None else found
 
 
-def eliminate_corners(
+def eliminate_transformed(
     B: csr_array, c: Array, force_rows: csr_array | None, nodes: Indices, size: int, functions: csr_array
-) -> CornerElimination | None:
+) -> BasisTransformation | None:
     """Return the elimination of equations along the functions of corners, None where they are not of that kind.
 
     Parameters
@@ -145,6 +145,6 @@ def eliminate_corners(
     if force_rows is not None:
         force_weights = csr_array(-force_rows)
         inverse = pivot_order.inverse_of(csr_array(force_rows + force_rows @ beside), corners, size)
-    return CornerElimination(
+    return BasisTransformation(
         pivots, weights, offset, force_weights, inverse, coupled, own, moves=moves, corners=corners
     )
