@@ -32,13 +32,11 @@ _MODULES = {
 _NAMES = {
     "analysis.contact_resultants": (
         "ContactResultants",
-        "ContactResultants",
-        "contact_resultants",
         "contact_history",
         "contact_moment",
         "contact_resultants",
         "wear",
-    ),  # fmt: skip
+    ),
     "analysis.criteria": ("Criteria",),
     "analysis.modes": ("Modes", "modes"),
     "analysis.run": ("solve", "solve_steps"),

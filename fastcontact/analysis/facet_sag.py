@@ -27,7 +27,7 @@ DOUBTFUL, AGAINST_RIGID = {1: 0.5, 2: 0.1}, 0.2
 
 def sag_warnings(problem: Problem, state: State, last: StepResult) -> dict[str, str]:
     """Return by name a warning for each pair that chords may push apart by much of its pressure in the `last` step."""
-    found, load, displacement = {}, problem.load_at(last.load_factor), problem.displacement(state.u)
+    warnings, load, displacement = {}, problem.load_at(last.load_factor), problem.displacement(state.u)
     for name, pair in problem.pairs.items():
         contact = last.contact[name]
         corrected = pair.smoothing is not None or not isinstance(pair.normals, str)
@@ -37,8 +37,8 @@ def sag_warnings(problem: Problem, state: State, last: StepResult) -> dict[str, 
         off = _standing_off(pair, at, contact.active)
         text = _text(pair, float(np.ptp(off)), contact) if len(off) else ""
         if text:
-            found[name] = f"contact '{name}': {text}"
-    return found
+            warnings[name] = f"contact '{name}': {text}"
+    return warnings
 
 
 def _text(pair: Formulation, spread: float, contact: ContactResult) -> str:

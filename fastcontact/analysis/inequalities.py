@@ -100,14 +100,14 @@ def _solve(
 
     `lift` (n_dofs,) is what they prescribe, `guess` (n_dofs,) are displacements to start from [length].
     """
-    own = constraints_on_unknowns(step.dofs, constraints, lift, step.state.u)
+    condensed = constraints_on_unknowns(step.dofs, constraints, lift, step.state.u)
     u = step.dofs.unknowns(guess, lift)
     if not constraints.tangents:
-        return active_set.solve(step.loaded, own, active, accuracy, u)
+        return active_set.solve(step.loaded, condensed, active, accuracy, u)
     from fastcontact.analysis.friction import solve as friction
 
-    own = replace(own, driven=step.driven(constraints))
-    iterate.frictional = friction.solve(step.loaded, own, active, accuracy, u, iterate.frictional)
+    condensed = replace(condensed, driven=step.driven(constraints))
+    iterate.frictional = friction.solve(step.loaded, condensed, active, accuracy, u, iterate.frictional)
     return iterate.frictional
 
 
@@ -135,17 +135,17 @@ def _with_floating_bodies(
         moved = _approach(step, bodies, constraints, iterate.u)
         start = start if active.any() else start + moved
     noise = 10 * problem.solver.tolerance
-    found = bodies.settle(
+    rigid = bodies.settle(
         solve_at, start, state.largest_rigid_force, noise, state.gap_round_off,
         None if iterate.rigid is None else iterate.rigid.derivative,
     )  # fmt: skip
-    if found.state.settled and not found.slack:
+    if rigid.state.settled and not rigid.slack:
         rubbing = bool(constraints.coefficients.any())
-        text = not_balanced(bodies, found, state.largest_rigid_force, rubbing)
+        text = not_balanced(bodies, rigid, state.largest_rigid_force, rubbing)
         raise ConvergenceError(text, iterate.history)
-    iterate.rigid = found
-    at = lift + bodies.rigid(found.position)
-    return found.state, problem.system.displacement(found.state.u, at)
+    iterate.rigid = rigid
+    at = lift + bodies.rigid(rigid.position)
+    return rigid.state, problem.system.displacement(rigid.state.u, at)
 
 
 def _approach(step: StepContext, bodies: FloatingBodies, constraints: Constraints, u: Array) -> Array:
@@ -159,9 +159,9 @@ def _approach(step: StepContext, bodies: FloatingBodies, constraints: Constraint
     work = generalised(bodies.motions, step.load.force)
     rows, gap0 = resisting(constraints)
     size = float(np.ptp(step.problem.model.mesh.points, axis=0).max())
-    found = stopped_at(rows @ bodies.motions.displacement, gap0 + rows @ u, work, size)
-    if found is None:
+    stop = stopped_at(rows @ bodies.motions.displacement, gap0 + rows @ u, work, size)
+    if stop is None:
         more = needed_friction(constraints, bodies.motions.displacement, u, work, size)
         text = no_contact_stops(bodies, work) if more is None else friction_exceeded(bodies, work, more)
         raise ConvergenceError(text, smaller_steps_help=False)
-    return found
+    return stop

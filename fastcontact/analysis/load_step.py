@@ -59,11 +59,17 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     loaded = with_loads(problem, load)
     start, expected = prepare_start(problem, state, load, loaded)
     if problem.bodies is not None:
-        found = newton(problem, start, load, expected)
+        solution = newton(problem, start, load, expected)
         done = problem.solver.counters.iterations - solved_before
-        iterations = {**counted(found.settled, done), **found.counts, "history": found.history}
+        iterations = {**counted(solution.settled, done), **solution.counts, "history": solution.history}
         return _ended(
-            problem, start, load, found.settled, (found.u, found.balance, iterations), (index, instant), found.bodies
+            problem,
+            start,
+            load,
+            solution.settled,
+            (solution.u, solution.balance, iterations),
+            (index, instant),
+            solution.bodies,
         )
 
     def solve(under: StepLoad, before: SettledContact | None) -> tuple[SettledContact | None, Array, Balance]:
@@ -92,14 +98,14 @@ def _balanced(
 
 def _ended(
     problem: Problem, start: State, load: StepLoad, settled: SettledContact | None,
-    solution: tuple[Array, Balance, dict[str, Any]], place: tuple[int, float], bodies: DeformedBodies | None,
+    solution: tuple[Array, Balance, dict[str, Any]], instant: tuple[int, float], bodies: DeformedBodies | None,
     heated: Heated | None = None,
 ) -> tuple[State, StepResult]:  # fmt: skip
     """Return state and result of a load step, from its displacements, the balance of forces and the iterations."""
     u, balanced, iterations = solution
     end = replace(
         start, u=u, largest_force=balanced.largest, obstacles=problem.obstacles_at(load, u), angles=load.angles,
-        history=start.history if bodies is None else bodies.history, instant=place[1],
+        history=start.history if bodies is None else bodies.history, instant=instant[1],
         rise=None if heated is None else heated.rise,
     )  # fmt: skip
     contact: dict[str, ContactResult] = {}
@@ -114,7 +120,7 @@ def _ended(
     if problem.floating_bodies is not None and end.rigid is not None:
         iterations["regularised"] = problem.floating_bodies.report(end.rigid, end.largest_rigid_force)
     end = replace(end, solver=problem.solver.snapshot())
-    result = recover(problem, end, contact, balanced.reaction, iterations, place, bodies)
+    result = recover(problem, end, contact, balanced.reaction, iterations, instant, bodies)
     return end, result if heated is None else heated.told(problem, result)
 
 

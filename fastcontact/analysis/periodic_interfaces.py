@@ -22,21 +22,21 @@ APART = 0.02
 
 def joined(problem: Problem, results: dict[str, ContactResult]) -> dict[str, ContactResult]:
     """Return the results of contact pairs with one traction for both nodes of a point, closed where one of them is."""
-    found = dict(results)
+    results_of_pairs = dict(results)
     for name, contact in results.items() if problem.model.periodic_interfaces else ():
         pair = problem.pairs[name]
         areas = lumped_areas(pair.secondary, pair.points, pair.axisymmetric)
         pressure, shear, active = contact.pressure.copy(), contact.shear.copy(), contact.active.copy()
         for interface in problem.model.periodic_interfaces:
             a, b = _rows(problem, contact, interface)
-            part = areas[a] / (areas[a] + areas[b])
+            share = areas[a] / (areas[a] + areas[b])
             turn = np.eye(shear.shape[1]) if interface.turn is None else interface.turn
-            pressure[a] = pressure[b] = part * pressure[a] + (1.0 - part) * pressure[b]
-            shear[a] = part[:, None] * shear[a] + (1.0 - part[:, None]) * (shear[b] @ turn)
+            pressure[a] = pressure[b] = share * pressure[a] + (1.0 - share) * pressure[b]
+            shear[a] = share[:, None] * shear[a] + (1.0 - share[:, None]) * (shear[b] @ turn)
             shear[b] = shear[a] @ turn.T
             active[a] = active[b] = active[a] | active[b]
-        found[name] = replace(contact, pressure=pressure, shear=shear, active=active)
-    return found
+        results_of_pairs[name] = replace(contact, pressure=pressure, shear=shear, active=active)
+    return results_of_pairs
 
 
 def _rows(problem: Problem, contact: ContactResult, interface: PeriodicInterface) -> tuple[Indices, Indices]:
@@ -52,7 +52,7 @@ def periodicity_warnings(problem: Problem, last: StepResult) -> list[str]:
 
     Formulations with a condition a node know of such nodes (`shared_nodes`), fields of pressures unless tractions turn.
     """
-    found = []
+    warnings = []
     for name, contact in last.contact.items():
         largest, pair = contact.pressure_max, problem.pairs[name]
         if pair.options.gap_only or not hasattr(pair, "augmentation") or not largest > 0.0:
@@ -63,11 +63,11 @@ def periodicity_warnings(problem: Problem, last: StepResult) -> list[str]:
             wrong = apart > APART * largest
             if wrong.any():
                 worst = int(np.argmax(apart))
-                found.append(
+                warnings.append(
                     f"contact '{name}' is closed where a period or sector begins and ends: at {int(wrong.sum())} places its "
                     f"forces are split unevenly between the two nodes of one place, by {apart[worst]:.4g} in pressure "
                     f"(points {contact.points[a[worst]]} and {contact.points[b[worst]]}). Their pressure is the mean, but "
                     "that of neighbours may waver: let the period end where the contact is open, or use "
                     'formulation="mortar" with multipliers="dual"'
                 )
-    return found
+    return warnings

@@ -177,7 +177,7 @@ class Problem:
 
     def factors(self, histories: Iterable[Temperature | InitialState], instant: float) -> list[float]:
         """Return the load factors of temperatures or initial states at an instant of the ramp [-]."""
-        return [multiplier(own.ramp, self.ramp, instant) for own in histories]
+        return [multiplier(history.ramp, self.ramp, instant) for history in histories]
 
     def displacement(self, u: Array) -> Array:
         """Return the displacements (n_points, dim) of the mesh of all displacements u (n_dofs,) [length]."""
@@ -346,8 +346,8 @@ def active_dofs(
 def _forces(model: Model) -> dict[Table | None, Array]:
     """Return by history the nodal forces (n_points, dim) of loads, heat and initial states at multiplier 1 [force]."""
     forces = model.forces_by_ramp()
-    for own, values in (*model.thermal_forces_by_ramp().items(), *model.initial_forces_by_ramp().items()):
-        forces[own] = forces[own] + values if own in forces else values
+    for table, values in (*model.thermal_forces_by_ramp().items(), *model.initial_forces_by_ramp().items()):
+        forces[table] = forces[table] + values if table in forces else values
     return forces
 
 
@@ -377,10 +377,10 @@ def _basis_transformation(pairs: Iterable[Formulation], n: int, dim: int) -> csr
     """Return the `Formulation.basis_transformation` of all pairs as rows of displacement components (n, n)."""
     total = None
     for pair in pairs:
-        if (own := pair.basis_transformation) is not None:
-            own = csr_array(kron(own, eye_array(dim), format="csr"))
-            own.resize((n, n))
-            total = own if total is None else csr_array(total.maximum(own))
+        if (functions := pair.basis_transformation) is not None:
+            functions = csr_array(kron(functions, eye_array(dim), format="csr"))
+            functions.resize((n, n))
+            total = functions if total is None else csr_array(total.maximum(functions))
     return total
 
 

@@ -62,15 +62,15 @@ class SharedNodes:
         ends = _at_periodic_interfaces(constraints, interfaces, behind)
         if not len(second) + len(behind) + ends.shape[1]:
             return None
-        place = _places(constraints, np.hstack([np.stack([first, second]), ends]))
-        return cls(place, behind, *_parts(constraints, place), _frame(constraints, interfaces))
+        representative = _places(constraints, np.hstack([np.stack([first, second]), ends]))
+        return cls(representative, behind, *_parts(constraints, representative), _frame(constraints, interfaces))
 
     @property
     def idle(self) -> Mask:
         """Constraints (m,) that are not solved for."""
-        found = self.place != np.arange(len(self.place))
-        found[self.behind] = True
-        return found
+        redundant = self.place != np.arange(len(self.place))
+        redundant[self.behind] = True
+        return redundant
 
     def closed(self, active: Mask) -> Mask:
         """Return the places (m,) at which some of the constraints (m,) are active."""
@@ -130,16 +130,16 @@ class SharedNodes:
 
     def shared(self, solution: Solution, constraints: StackedConstraints, u: Array) -> Solution:
         """Return a solution of `once` at displacements `u` (n_dofs,) [length] with forces that all constraints share."""
-        place = self.place
-        normal, gap = self.part * solution.multiplier[place], solution.gap[place]
+        representative = self.place
+        normal, gap = self.part * solution.multiplier[representative], solution.gap[representative]
         gap[self.behind] = constraints.gaps(u)[self.behind]
-        active = solution.active[place]
+        active = solution.active[representative]
         if not isinstance(solution, FrictionalEquilibrium):
             return replace(solution, multiplier=normal, gap=gap, active=active, wanted=active)
         frame = self.frame
 
         def turned(along: Array) -> Array:
-            return np.einsum("md,mkd->mk", np.einsum("mk,mkd->md", along, frame)[place], frame)
+            return np.einsum("md,mkd->mk", np.einsum("mk,mkd->md", along, frame)[representative], frame)
 
         return replace(
             solution,
@@ -147,7 +147,7 @@ class SharedNodes:
             gap=gap,
             slip=np.where(self.idle[:, None], turned(solution.slip), solution.slip),
             active=active,
-            sticking=solution.sticking[place],
+            sticking=solution.sticking[representative],
             tangential=self.along[:, None]
             * np.where(self.idle[:, None], turned(solution.tangential), solution.tangential),
         )
@@ -170,16 +170,16 @@ def _at_periodic_interfaces(
     """Return constraints (2, k) of a pair at the two nodes of one point."""
     nodes, usable = _nodes(constraints), np.isfinite(_areas(constraints)) & constraints.usable
     usable[behind] = False
-    found = [np.empty((2, 0), np.intp)]
+    pairs = [np.empty((2, 0), np.intp)]
     for rows in constraints.rows().values() if interfaces else ():
-        own = rows.start + np.flatnonzero(usable[rows] & (nodes[rows] >= 0))
+        usable_rows = rows.start + np.flatnonzero(usable[rows] & (nodes[rows] >= 0))
         last = max(int(end.max()) for interface in interfaces for end in interface[:2])
         row = np.full(max(last, int(nodes.max())) + 1, -1)
-        row[nodes[own]] = own
+        row[nodes[usable_rows]] = usable_rows
         for interface in interfaces:
             both = row[np.stack([interface.first, interface.second])]
-            found.append(both[:, (both >= 0).all(axis=0) & (both[0] != both[1])])
-    ends = np.hstack(found)
+            pairs.append(both[:, (both >= 0).all(axis=0) & (both[0] != both[1])])
+    ends = np.hstack(pairs)
     if constraints.equality is not None:
         ends = ends[:, constraints.equality[ends[0]] == constraints.equality[ends[1]]]
     return ends
@@ -200,25 +200,25 @@ def _stiffness(softness: Array) -> Array:
     return np.divide(1.0, softness, out=np.full_like(softness, np.inf), where=softness > 0.0)
 
 
-def _parts(constraints: StackedConstraints, place: Indices) -> tuple[Array, Array]:
+def _parts(constraints: StackedConstraints, representative: Indices) -> tuple[Array, Array]:
     """Return the parts (m,) of normal and tangential forces of places (m,) that constraints carry [-].
 
     Normal forces by stiffness where all give way, by area among those that do not. Tangential forces as far as friction
     can carry them: what slides then slides in each pair.
     """
-    m = len(place)
-    several = np.bincount(place, minlength=m)[place] > 1  # others need not stand for an area
+    m = len(representative)
+    several = np.bincount(representative, minlength=m)[representative] > 1  # others need not stand for an area
     weight = np.where(several, _areas(constraints), 1.0)
     if constraints.softness is not None:
         hard = constraints.softness == 0.0
-        held = np.bincount(place, hard, minlength=m)[place] > 0
+        held = np.bincount(representative, hard, minlength=m)[representative] > 0
         weight = np.where(several & ~held, _stiffness(constraints.softness), np.where(hard | ~several, weight, 0.0))
-    part = weight / np.bincount(place, weight, minlength=m)[place]
+    fraction = weight / np.bincount(representative, weight, minlength=m)[representative]
     if constraints.friction is None:
-        return part, part
-    rubbing = part * constraints.friction
-    total = np.bincount(place, rubbing, minlength=m)[place]
-    return part, np.where(several, np.divide(rubbing, total, out=part.copy(), where=total > 0.0), 1.0)
+        return fraction, fraction
+    rubbing = fraction * constraints.friction
+    total = np.bincount(representative, rubbing, minlength=m)[representative]
+    return fraction, np.where(several, np.divide(rubbing, total, out=fraction.copy(), where=total > 0.0), 1.0)
 
 
 def _areas(constraints: StackedConstraints) -> Array:
@@ -230,11 +230,11 @@ def _areas(constraints: StackedConstraints) -> Array:
 
 def _nodes(constraints: StackedConstraints) -> Indices:
     """Return the node of each constraint (m,), -1 without one or where a compliance couples it with others."""
-    found = []
+    nodes = []
     for part in constraints.parts.values():
         coupled = part.compliance is not None or part.low_rank_compliance is not None
-        found.append(np.full(len(part), -1) if part.nodes is None or coupled else part.nodes)
-    return np.concatenate(found).astype(np.intp)
+        nodes.append(np.full(len(part), -1) if part.nodes is None or coupled else part.nodes)
+    return np.concatenate(nodes).astype(np.intp)
 
 
 def _alike(constraints: StackedConstraints) -> tuple[Indices, Indices, Indices]:
@@ -267,12 +267,12 @@ def _of_one_node(constraints: StackedConstraints) -> tuple[Indices, Indices]:
     usable = np.isfinite(_areas(constraints)) & constraints.usable & (nodes >= 0)
     order = np.flatnonzero(usable)
     order = order[np.lexsort((constraints.gap0[order], nodes[order]))]
-    node, found = nodes[order], [np.empty((2, 0), np.intp)]
+    node, pairs = nodes[order], [np.empty((2, 0), np.intp)]
     apart = 1
     while len(same := np.flatnonzero(node[apart:] == node[:-apart])):
-        found.append(np.stack([order[same], order[same + apart]]))
+        pairs.append(np.stack([order[same], order[same + apart]]))
         apart += 1
-    first, second = np.concatenate(found[::-1], axis=1)
+    first, second = np.concatenate(pairs[::-1], axis=1)
     return first, second
 
 

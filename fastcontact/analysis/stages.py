@@ -45,7 +45,7 @@ def go_on(
     begin : float
     """
     stage, kept = _stage(model, begin, problem.displacement(state.u), state.locked)
-    if [own.name for own in stage.relations] == [own.name for own in problem.model.relations]:
+    if [relation.name for relation in stage.relations] == [relation.name for relation in problem.model.relations]:
         return problem, state
     problem = prepared(stage)
     return problem, replace(
@@ -70,16 +70,16 @@ def _stage(
     locks = [
         own.locked(model.mesh.points.size, lengths[own.label]) for own in model.pretensions if own.label in lengths
     ]
-    found: dict[str, float | Array] = {**lengths}
+    reached: dict[str, float | Array] = {**lengths}
     relations: list[MultiPointConstraint] = []
     for own in model.relations:
         if not isinstance(own, TemporaryConstraint):
             relations.append(own)
         elif own.acts_from(begin):
-            found[own.name] = kept[own.name] if own.name in kept else own.rows @ displacement.ravel()
-            relations += own.after(np.asarray(found[own.name]))
+            reached[own.name] = kept[own.name] if own.name in kept else own.rows @ displacement.ravel()
+            relations += own.after(np.asarray(reached[own.name]))
     if not locks and not any(isinstance(own, TemporaryConstraint) for own in model.relations):
-        return model, found
+        return model, reached
     made = copy.copy(model)
     made.relations = [*relations, *locks]
-    return made, found
+    return made, reached

@@ -65,11 +65,11 @@ def shared_facets(mesh: Mesh, group: str, other: str) -> Numbers:
     ours, theirs = mesh.cells_of(group, dim=mesh.dim - 1), mesh.cells_of(other, dim=mesh.dim - 1)
     nodes = [np.empty(0, np.int32)]
     for name in ours.keys() & theirs.keys():
-        found, count = np.unique(
+        facets, count = np.unique(
             np.concatenate([np.unique(np.sort(side[name], axis=1), axis=0) for side in (ours, theirs)]),
             axis=0, return_counts=True,
         )  # fmt: skip
-        nodes.append(found[count > 1].ravel())
+        nodes.append(facets[count > 1].ravel())
     return np.unique(np.concatenate(nodes))
 
 

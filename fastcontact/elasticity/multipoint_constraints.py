@@ -150,8 +150,8 @@ def _substituted(R: csr_array, k: int, expressed: dict[int, Row]) -> Row:
     """Return row `k` of R with pivots replaced by their expressions."""
     row: Row = {}
     size = 0.0
-    for place in range(R.indptr[k], R.indptr[k + 1]):
-        key, c = int(R.indices[place]), float(R.data[place])
+    for entry in range(R.indptr[k], R.indptr[k + 1]):
+        key, c = int(R.indices[entry]), float(R.data[entry])
         size = max(size, abs(c))
         for other, d in expressed.get(key, {key: 1.0}).items():
             row[other] = row.get(other, 0.0) + c * d
@@ -180,11 +180,11 @@ def _matrices(expressed: dict[int, Row], n: int, m: int) -> tuple[csr_array, csr
     rows = np.array([entry[0] for entry in entries], np.intp)
     columns = np.array([entry[1] for entry in entries], np.intp)
     values = np.array([entry[2] for entry in entries], np.float64)
-    own = columns < n
+    free = columns < n
     T = csr_array(
-        (np.r_[np.ones(len(kept)), values[own]], (np.r_[kept, rows[own]], np.r_[kept, columns[own]])), shape=(n, n)
+        (np.r_[np.ones(len(kept)), values[free]], (np.r_[kept, rows[free]], np.r_[kept, columns[free]])), shape=(n, n)
     )
-    S = csr_array((values[~own], (rows[~own], columns[~own] - n)), shape=(n, m))
+    S = csr_array((values[~free], (rows[~free], columns[~free] - n)), shape=(n, m))
     return T, S
 
 

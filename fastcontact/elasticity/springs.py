@@ -211,8 +211,8 @@ def _stiffer(spring: Springs, diagonal: Array, dim: int) -> tuple[float, float]:
     """Return the largest ratio of a spring's stiffness to that of the softer body at its ends, and that stiffness."""
     rows = spring.rows.tocoo()
     row, node = rows.coords[0], rows.coords[1] // dim
-    ends, place = np.unique(np.stack([row, node]), axis=1, return_inverse=True)
-    body = np.bincount(place.ravel(), weights=rows.data**2 * diagonal[rows.coords[1]])
+    ends, index = np.unique(np.stack([row, node]), axis=1, return_inverse=True)
+    body = np.bincount(index.ravel(), weights=rows.data**2 * diagonal[rows.coords[1]])
     # Not springs that add to the diagonal alone, nor points that no body holds.
     coupling = (np.diff(spring.rows.indptr)[ends[0]] > 1) & (body > 0.0)
     if not coupling.any():

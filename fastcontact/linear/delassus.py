@@ -91,9 +91,9 @@ class InverseColumns:
         """Return ``R K^-1 R.T`` (m, m) [length / force] for sparse rows R (m, n)."""
         check_rows(R.shape[0])
         used = R.data != 0.0
-        place = self._places(R.indices[used])
+        column = self._places(R.indices[used])
         starts = np.concatenate([[0], np.cumsum(used)])[R.indptr]
-        rows = csr_array((R.data[used], place, starts), shape=(R.shape[0], len(self._dofs)))
+        rows = csr_array((R.data[used], column, starts), shape=(R.shape[0], len(self._dofs)))
         return symmetric(np.asarray(rows @ (rows @ self._values).T))
 
     def put_back(self, asked: Sequence[Indices]) -> None:

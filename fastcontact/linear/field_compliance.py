@@ -64,8 +64,8 @@ class FieldCompliance:
     @classmethod
     def none(cls, m: int) -> FieldCompliance:
         """Return that of m exact constraints."""
-        one = csr_array(diags_array(np.ones(m)))
-        return cls(one, np.ones(m), np.zeros(m), csr_array((m, m)), lambda: np.zeros((m, m)))
+        identity = csr_array(diags_array(np.ones(m)))
+        return cls(identity, np.ones(m), np.zeros(m), csr_array((m, m)), lambda: np.zeros((m, m)))
 
     def softened(self, softness: Array, dense: Callable[[], Array]) -> FieldCompliance:
         """Return that of points softer by `softness` (m,) [length / force]."""
@@ -98,8 +98,8 @@ class FieldCompliance:
             beside = np.flatnonzero(np.diff(across.indptr))
             of_beside = csr_array(across[beside])
             gives = of_beside @ splu(csc_array(self.others[rest][:, rest])).solve(of_beside.T.toarray())
-            place = csr_array((np.ones(len(beside)), (beside, np.arange(len(beside)))), (len(given), len(beside)))
-            E = csr_array(E - place @ csr_array(gives) @ place.T)
+            selection = csr_array((np.ones(len(beside)), (beside, np.arange(len(beside)))), (len(given), len(beside)))
+            E = csr_array(E - selection @ csr_array(gives) @ selection.T)
         in_units = diags_array(units)
         return csr_array(in_units @ E @ in_units)
 

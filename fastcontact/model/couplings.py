@@ -149,8 +149,8 @@ def coupling(
         spread = Spread(reference.place, *weighting)
         spread.check(name, mesh.dim)
     points, weight = shares_of(mesh, kinematics, names[1], spread)
-    own = np.isin(points, (reference.point, reference.rotation))
-    if own.any() or not len(points):
+    reference_nodes = np.isin(points, (reference.point, reference.rotation))
+    if reference_nodes.any() or not len(points):
         raise ModelError(f"{name}: the group needs points, without the reference point itself")
     places = mesh.points[points]
     try:

@@ -70,8 +70,8 @@ def periodic(
     first, second = (mesh.points_of(end).astype(np.intp) for end in ends)
     if not len(first):
         raise ModelError(f"{name}: group '{ends[0]}' is empty")
-    place = matched(mesh, (ends[0], first), (ends[1], second), translation)
-    interface = PeriodicInterface(first, second[place])
+    match = matched(mesh, (ends[0], first), (ends[1], second), translation)
+    interface = PeriodicInterface(first, second[match])
     if (common := interface.first[interface.first == interface.second]).size:
         raise ModelError(f"{name}: both have point {common[0]}: a period has two ends")
     relations = []
@@ -108,16 +108,16 @@ def cyclic(
             f"{name}: the groups have {len(first)} and {len(second)} nodes, but need as many, one at least"
         )
     rotation = Rotation(tuple(map(float, origin)), tuple(map(float, direction)), 2.0 * math.pi / sectors)  # type: ignore[arg-type]
-    found = [_turned(mesh, first, second, rotation, sign) for sign in (1.0, -1.0)]
-    distance, place, turn = min(found, key=lambda one: float(one[0].max()))
+    turns = [_turned(mesh, first, second, rotation, sign) for sign in (1.0, -1.0)]
+    distance, match, turn = min(turns, key=lambda one: float(one[0].max()))
     size = float(np.ptp(mesh.points[first], axis=0).max())
     far = int(np.argmax(distance))
-    if distance[far] > APART * size or len(np.unique(place)) < len(place):
+    if distance[far] > APART * size or len(np.unique(match)) < len(match):
         raise ModelError(
             f"{name}: point {first[far]} of '{ends[0]}', turned by 1/{sectors} of a turn, lies {distance[far]:.3g} from the "
             f"nearest node of '{ends[1]}': the ends need nodes upon nodes; check axis and sectors, or mesh them alike"
         )
-    interface = PeriodicInterface(first, second[place], turn)
+    interface = PeriodicInterface(first, second[match], turn)
     # u_second = Q u_first: rows (u_second - Q u_first) along the axes of the mesh, none for what lies along the axis on it.
     rows = csr_array(
         vstack([_differences(interface, np.column_stack([unit, -turn.T @ unit]), mesh) for unit in np.eye(mesh.dim)])
@@ -134,8 +134,8 @@ def _turned(
     from scipy.spatial import cKDTree
 
     turn, centre = rotation.matrix(sign * rotation.angle), np.array(rotation.centre)
-    distance, place = cKDTree(mesh.points[second]).query((mesh.points[first] - centre) @ turn.T + centre)
-    return np.asarray(distance), np.asarray(place, np.intp), turn
+    distance, match = cKDTree(mesh.points[second]).query((mesh.points[first] - centre) @ turn.T + centre)
+    return np.asarray(distance), np.asarray(match, np.intp), turn
 
 
 def _differences(interface: PeriodicInterface, directions: Array, mesh: Mesh) -> csr_array:

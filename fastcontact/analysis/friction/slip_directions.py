@@ -35,21 +35,21 @@ def compliance_of_rows(rows: tuple[csr_array, ...], yielding: Array) -> Array:
     yielding : ndarray (n,)
         Compliance of each unknown [length / force].
     """
-    own = np.empty((len(rows), len(rows), rows[0].shape[0]))
+    compliance = np.empty((len(rows), len(rows), rows[0].shape[0]))
     parts = tuple(tuple(getattr(R, part) for R in rows) for part in ("indptr", "indices", "data"))
-    slip_directions_kernels.products_of_rows(*parts, yielding, own)
-    return own
+    slip_directions_kernels.products_of_rows(*parts, yielding, compliance)
+    return compliance
 
 
-def aligning(own: Array) -> csr_array | None:
+def aligning(compliance: Array) -> csr_array | None:
     """Return Q (3 m, 3 m) that turns two tangents so that one is idle where supports leave one direction of slip.
 
     In a plane of symmetry both tangents may lie across it; then neither is idle by itself. None where nothing turns.
     """
-    m = own.shape[2]
-    gap = np.maximum(own[0, 0], np.finfo(float).tiny)
-    first, second = own[1, 1] - own[1, 0] ** 2 / gap, own[2, 2] - own[2, 0] ** 2 / gap
-    mixed = own[1, 2] - own[1, 0] * own[2, 0] / gap
+    m = compliance.shape[2]
+    gap = np.maximum(compliance[0, 0], np.finfo(float).tiny)
+    first, second = compliance[1, 1] - compliance[1, 0] ** 2 / gap, compliance[2, 2] - compliance[2, 0] ** 2 / gap
+    mixed = compliance[1, 2] - compliance[1, 0] * compliance[2, 0] / gap
     apart = np.hypot(0.5 * (first - second), mixed)
     largest, least = 0.5 * (first + second) + apart, 0.5 * (first + second) - apart
     across = (least <= IDLE * np.maximum(largest, gap)) & (np.abs(mixed) > IDLE * np.maximum(largest, gap))

@@ -54,21 +54,21 @@ def solve(
     forces = None if guess is None else guess.forces_along(constraints.directions, len(constraints))
     together = constraints.compliance is not None or constraints.low_rank_compliance is not None
     if isinstance(loaded, LoadedNonsymmetric) and not together:
-        found = _eliminated(loaded, constraints, closed, accuracy, u, forces)
-        if found is not None:
-            return found
+        equilibrium = _eliminated(loaded, constraints, closed, accuracy, u, forces)
+        if equilibrium is not None:
+            return equilibrium
         log.info("friction: the iteration on eliminated constraints did not settle, their compliance is formed")
     usable = constraints.usable
     begun = closed if constraints.equality is None else closed | constraints.equality
     chosen = usable if together else usable & begun
     iterations = 0
     while True:
-        found = _among(chosen, loaded, constraints, closed, u, forces)
-        found.gap[~usable], found.slip[~usable] = np.inf, 0.0
-        iterations += found.iterations
-        missing = usable & ~chosen & (found.gap < 0.0)
+        equilibrium = _among(chosen, loaded, constraints, closed, u, forces)
+        equilibrium.gap[~usable], equilibrium.slip[~usable] = np.inf, 0.0
+        iterations += equilibrium.iterations
+        missing = usable & ~chosen & (equilibrium.gap < 0.0)
         if not missing.any():
-            return dataclasses.replace(found, iterations=iterations)
+            return dataclasses.replace(equilibrium, iterations=iterations)
         chosen = chosen | missing
 
 
@@ -85,11 +85,11 @@ def _eliminated(
     solved = eliminated.solve(loaded, constraints, closed & usable, accuracy, u, forces)
     if solved is None:
         return None
-    u, found = solved
-    found.gaps[0, ~usable], found.gaps[1:, ~usable] = np.inf, 0.0
+    u, cone = solved
+    cone.gaps[0, ~usable], cone.gaps[1:, ~usable] = np.inf, 0.0
     return FrictionalEquilibrium(
-        u, found.y[0], found.gaps[0], found.y[1:].T, found.gaps[1:].T, found.closed & usable, found.sticking, found.settled,
-        found.residual, found.iterations, constraints.directions,
+        u, cone.y[0], cone.gaps[0], cone.y[1:].T, cone.gaps[1:].T, cone.closed & usable, cone.sticking, cone.settled,
+        cone.residual, cone.iterations, constraints.directions,
     )  # fmt: skip
 
 
@@ -122,17 +122,17 @@ def _among(
         F[still, still] = np.where(moved, GIVING * own[0, 0], np.diag(F).max())[idle_slips]
         free[1:][idle_slips & ~moved] = 0.0
     equations = np.zeros(len(rows), bool) if constraints.equality is None else constraints.equality[rows]
-    found = _on_delassus_operator(F, free, constraints.coefficients[rows], closed[rows], equations, start)
-    y, relative = found.y, found.gaps
+    result = _on_delassus_operator(F, free, constraints.coefficients[rows], closed[rows], equations, start)
+    y, relative = result.y, result.gaps
     if Q is not None:
         y, relative = (Q.T @ y.ravel()).reshape(y.shape), (Q.T @ relative.ravel()).reshape(y.shape)
     u = loaded.involved_solution(R.T @ y.ravel(), u)
     full, gaps = np.zeros((1 + k, m)), at_rest + np.stack([own @ u for own in (constraints.B, *constraints.tangents)])
     full[:, rows], gaps[:, rows] = y, relative
     active, sticking = np.zeros(m, bool), np.zeros(m, bool)
-    active[rows], sticking[rows] = found.closed, found.sticking
+    active[rows], sticking[rows] = result.closed, result.sticking
     return FrictionalEquilibrium(
-        u, full[0], gaps[0], full[1:].T, gaps[1:].T, active, sticking, found.settled, found.residual, found.iterations,
+        u, full[0], gaps[0], full[1:].T, gaps[1:].T, active, sticking, result.settled, result.residual, result.iterations,
         constraints.directions,
     )  # fmt: skip
 
@@ -161,13 +161,13 @@ def _on_delassus_operator(
     rest = free.ravel()[r] - F[np.ix_(r, h)] @ give[:, -1]
     remaining = F[np.ix_(r, r)] - F[np.ix_(r, h)] @ give[:, :-1]
     start = None if start is None else start[:, ~equality]
-    found = dense.solve(remaining, rest.reshape(len(free), -1), friction[~equality], closed[~equality], start)
+    forces = dense.solve(remaining, rest.reshape(len(free), -1), friction[~equality], closed[~equality], start)
     y, gaps = np.zeros(free.shape), np.zeros(free.shape)
-    y[:, ~equality], gaps[:, ~equality] = found.y, found.gaps
-    y[0, equality] = -(give[:, -1] + give[:, :-1] @ found.y.ravel())
+    y[:, ~equality], gaps[:, ~equality] = forces.y, forces.gaps
+    y[0, equality] = -(give[:, -1] + give[:, :-1] @ forces.y.ravel())
     now, sticking = equality.copy(), equality.copy()
-    now[~equality], sticking[~equality] = found.closed, found.sticking
-    return dataclasses.replace(found, y=y, gaps=gaps, closed=now, sticking=sticking)
+    now[~equality], sticking[~equality] = forces.closed, forces.sticking
+    return dataclasses.replace(forces, y=y, gaps=gaps, closed=now, sticking=sticking)
 
 
 def _turned(C: Array, along: Array) -> Array:

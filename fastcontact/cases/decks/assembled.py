@@ -78,12 +78,14 @@ class Assembled:
     @cached_property
     def solids(self) -> list[Element]:
         """All solids."""
-        return [own for elements in self.elements.values() for own in elements.values() if own.type is not None]
+        return [
+            element for elements in self.elements.values() for element in elements.values() if element.type is not None
+        ]
 
     @cached_property
     def discrete(self) -> list[Element]:
         """All gap elements and springs."""
-        return [own for elements in self.elements.values() for own in elements.values() if own.type is None]
+        return [element for elements in self.elements.values() for element in elements.values() if element.type is None]
 
     def part(self, scope: str) -> Part:
         """Return the part of an instance, or what belongs to none."""
@@ -121,9 +123,9 @@ class Assembled:
             if label in self.open:
                 raise place.refuse(f"set '{part.set_names[name]}' contains itself")
             self.open.append(label)
-            found = [own for entry in sets[name] for own in self._entry(kind, scope, entry)]
+            members = [own for entry in sets[name] for own in self._entry(kind, scope, entry)]
             self.open.pop()
-            self.resolved[label] = list(dict.fromkeys(found)) if len(sets[name]) > 1 or len(found) > 1 else found
+            self.resolved[label] = list(dict.fromkeys(members)) if len(sets[name]) > 1 or len(members) > 1 else members
         return self.resolved[label]
 
     def _entry(self, kind: str, scope: str, entry: Members) -> Iterable[Any]:
@@ -137,18 +139,22 @@ class Assembled:
         if not isinstance(numbers, range):
             return (self._existing(kind, scope, number, entry.place) for number in numbers)
         there = self._there(kind, scope)
-        found = [n for n in (numbers if len(numbers) <= len(there) else sorted(there)) if n in there and n in numbers]
-        if len(found) < len(numbers):
-            absent = f"{len(numbers) - len(found)} of the {len(numbers)} numbers {numbers[0]} to {numbers[-1]}"
+        numbers_there = [
+            n for n in (numbers if len(numbers) <= len(there) else sorted(there)) if n in there and n in numbers
+        ]
+        if len(numbers_there) < len(numbers):
+            absent = f"{len(numbers) - len(numbers_there)} of the {len(numbers)} numbers {numbers[0]} to {numbers[-1]}"
             self.content.note(entry.place, f"{absent} are no {kind}s and left out")
-        return (there[n] for n in found)
+        return (there[n] for n in numbers_there)
 
     def _named(self, kind: str, scope: str, entry: Members) -> Iterable[Any]:
         if not scope and any(entry.name.upper().startswith(name) for name in self.content.instances):
             return self.members(kind, entry.name, entry.place)
         part, name = self.part(scope), folded(entry.name)
         if kind == "node" and name not in part.node_sets and name in part.element_sets:
-            return (point for own in self.members_of("element", scope, name, entry.place) for point in own.points)
+            return (
+                point for element in self.members_of("element", scope, name, entry.place) for point in element.points
+            )
         return self.members_of(kind, scope, name, entry.place, entry.name)
 
     def _there(self, kind: str, scope: str) -> Mapping[int, Any]:
@@ -156,11 +162,11 @@ class Assembled:
         return self.index.get(scope, {}) if kind == "node" else self.elements.get(scope, {})
 
     def _existing(self, kind: str, scope: str, number: int, place: Place) -> Any:
-        found = self._there(kind, scope).get(number)
-        if found is None:
+        item = self._there(kind, scope).get(number)
+        if item is None:
             where = f" in instance '{self.content.instances[scope].name}'" if scope else ""
             raise place.refuse(f"{kind} {number} is not defined{where}")
-        return found
+        return item
 
     def nodes(self, name: str, place: Place) -> list[int]:
         """Return the points of a node set or a single node; errors as for `members`."""
@@ -172,10 +178,10 @@ class Assembled:
 
     def node(self, name: str, place: Place) -> int:
         """Return the only point of a node set, or of a number; errors as for `keys`, or if there are several."""
-        found = self.nodes(name, place)
-        if len(found) != 1:
-            raise place.refuse(f"'{name}' holds {len(found)} nodes where one is needed")
-        return found[0]
+        nodes = self.nodes(name, place)
+        if len(nodes) != 1:
+            raise place.refuse(f"'{name}' holds {len(nodes)} nodes where one is needed")
+        return nodes[0]
 
     def faces(self, name: str, place: Place) -> list[Face]:
         """Return the elements of a surface and the place of each face among the facets of its element."""
@@ -189,15 +195,15 @@ class Assembled:
                 )
             return whole
         if (label := folded(name)) not in self.surfaces:
-            found: dict[Face, None] = {}
+            faces: dict[Face, None] = {}
             for face in definition.faces:
-                own = self.elements_of(face.of if not scope else f"{scope}.{face.of}", face.place)
+                members = self.elements_of(face.of if not scope else f"{scope}.{face.of}", face.place)
                 if face.label:
-                    entries = [(element, self.facet(element, int(face.label[1:]), face.place)) for element in own]
+                    entries = [(element, self.facet(element, int(face.label[1:]), face.place)) for element in members]
                 else:
-                    entries = [entry for element in own for entry in self._free_faces(element, face.place)]
-                found.update(dict.fromkeys(entries))
-            self.surfaces[label] = list(found)
+                    entries = [entry for element in members for entry in self._free_faces(element, face.place)]
+                faces.update(dict.fromkeys(entries))
+            self.surfaces[label] = list(faces)
         return self.surfaces[label]
 
     def surface(self, name: str, place: Place) -> tuple[SurfaceDefinition, str]:
@@ -234,14 +240,14 @@ class Assembled:
     def free(self) -> dict[str, Mask]:
         """Which faces (n_elements, n_faces), by label, of the solids of each kind no other solid shares."""
         corners, shapes = [], {}
-        for name, own in self.by_kind.items():
-            points = np.array([element.points for element in own], np.int32)
-            faces = own[0].solid.faces
-            shapes[name] = len(own), len(faces)
-            found = np.full((len(own), len(faces), 4), -1, np.int32)
+        for name, members in self.by_kind.items():
+            points = np.array([element.points for element in members], np.int32)
+            faces = members[0].solid.faces
+            shapes[name] = len(members), len(faces)
+            neighbours = np.full((len(members), len(faces), 4), -1, np.int32)
             for label, face in enumerate(faces):
-                found[:, label, : len(face)] = np.sort(points[:, list(face)], axis=1)
-            corners.append(found.reshape(-1, 4))
+                neighbours[:, label, : len(face)] = np.sort(points[:, list(face)], axis=1)
+            corners.append(neighbours.reshape(-1, 4))
         _, inverse, count = np.unique(np.concatenate(corners), axis=0, return_inverse=True, return_counts=True)
         ends = np.cumsum([n * m for n, m in shapes.values()])
         parts = np.split(count[inverse.ravel()] == 1, ends[:-1])
@@ -250,23 +256,23 @@ class Assembled:
     @cached_property
     def by_kind(self) -> dict[str, list[Element]]:
         """The solids by the element that they become, each at its `row`."""
-        found: dict[str, list[Element]] = {}
+        elements: dict[str, list[Element]] = {}
         for element in self.solids:
-            found.setdefault(element.solid.element, []).append(element)
-        return found
+            elements.setdefault(element.solid.element, []).append(element)
+        return elements
 
     @cached_property
     def outer(self) -> dict[int, list[tuple[Face, frozenset[int]]]]:
         """Which outer faces the points have, each with its corners."""
-        found: dict[int, list[tuple[Face, frozenset[int]]]] = {}
-        for name, own in self.by_kind.items():
-            facets, faces = matching(name), own[0].solid.faces
+        by_part: dict[int, list[tuple[Face, frozenset[int]]]] = {}
+        for name, members in self.by_kind.items():
+            facets, faces = matching(name), members[0].solid.faces
             for row, label in np.argwhere(self.free[name]).tolist():
-                face = own[row], facets[label]
-                corners = frozenset(own[row].points[i] for i in faces[label])
+                face = members[row], facets[label]
+                corners = frozenset(members[row].points[i] for i in faces[label])
                 for point in facet_points(*face):
-                    found.setdefault(point, []).append((face, corners))
-        return found
+                    by_part.setdefault(point, []).append((face, corners))
+        return by_part
 
     def faces_within(self, points: set[int]) -> list[Face]:
         """Return the outer faces all of whose corners are among points."""
@@ -330,7 +336,7 @@ def assembled(content: Content) -> Assembled:
         places.append(_placed(part, content.instances.get(scope)))
         index = made.index[scope] = dict(zip(part.nodes, range(total, total + len(part.nodes)), strict=True))
         total += len(index)
-        found = made.elements[scope] = {}
+        elements = made.elements[scope] = {}
         for number, cell in part.cells.items():
             points = tuple(index.get(node, -1) for node in cell.nodes)
             if -1 in points:
@@ -341,7 +347,7 @@ def assembled(content: Content) -> Assembled:
             row = -1 if kind is None else counts.setdefault(kind.element, 0)
             if kind is not None:
                 counts[kind.element] += 1
-            found[number] = Element(scope, number, cell, kind, points, row)
+            elements[number] = Element(scope, number, cell, kind, points, row)
     made.points = np.concatenate(places)
     return made
 

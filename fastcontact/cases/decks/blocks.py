@@ -105,9 +105,9 @@ class Block:
     def choice(self, name: str, known: tuple[str, ...]) -> str:
         """Return the value of a parameter in upper case, the first of `known` by default; CaseError if it is another."""
         value = self.get(name, known[0]).upper()
-        for one in known:
-            if value.replace(" ", "") == one.replace(" ", ""):
-                return one
+        for option in known:
+            if value.replace(" ", "") == option.replace(" ", ""):
+                return option
         raise self.place.refuse(f"{name}={value[:LONGEST_QUOTED]} is not supported; known are {', '.join(known)}")
 
     def required(self, name: str) -> str:
@@ -257,15 +257,15 @@ def _parts(line: str) -> list[str]:
 
 
 def _parameters(place: Place, line: str) -> dict[str, str | None]:
-    found: dict[str, str | None] = {}
+    parameters: dict[str, str | None] = {}
     for part in _parts(line)[1:]:
         key, equal, value = part.partition("=")
         key = " ".join(key.upper().split())
-        if key in found:
+        if key in parameters:
             raise place.refuse(f"the parameter {key} stands there twice")
         if key:
-            found[key] = unquoted(value.strip()) if equal else None
-    return found
+            parameters[key] = unquoted(value.strip()) if equal else None
+    return parameters
 
 
 def _row(place: Place, line: str) -> Row:
@@ -293,6 +293,6 @@ def _included(block: Block, name: str, source: Source) -> Iterator[Block]:
     if not there:
         raise block.place.refuse(f"file '{shown}' not found beside the deck, in '{source.folder}'")
     if target in source.open:
-        what = "the deck" if target == source.open[0] else f"'{shown}'"
-        raise block.place.refuse(f"{what} includes itself")
+        target_name = "the deck" if target == source.open[0] else f"'{shown}'"
+        raise block.place.refuse(f"{target_name} includes itself")
     yield from _blocks(target, given, source)

@@ -99,12 +99,12 @@ class Building:
             for section in self.made.part(scope).sections:
                 self._material(section)
                 if self.found.dim == 2 and self.found.kinematics != "axisymmetric":
-                    own = 1.0 if section.thickness is None else section.thickness
-                    if thickness is not None and own != thickness:
+                    section_thickness = 1.0 if section.thickness is None else section.thickness
+                    if thickness is not None and section_thickness != thickness:
                         raise section.place.refuse(
-                            f"thickness {own:g} after {thickness:g}: plane models have one thickness"
+                            f"thickness {section_thickness:g} after {thickness:g}: plane models have one thickness"
                         )
-                    thickness = own
+                    thickness = section_thickness
                 name = f"{scope}.{section.elements}" if scope else section.elements
                 for element in self.made.elements_of(name, section.place):
                     if element.section not in (None, section):
@@ -118,19 +118,19 @@ class Building:
             given = element.given_section
             key = (folded(given.material), folded(given.orientation), element.solid.modes)
             by_material.setdefault(key, []).append(element)
-        found = []
+        materials = []
         for (name, turned, modes), members in by_material.items():
             material = self.content.materials[name]
             axes = self._axes(members[0].section)
             group = f"material {material.name}" + (f" along {turned.lower()}" if turned else "")
             group += " with incompatible modes" if modes else ""
-            found.append(
+            materials.append(
                 (
                     _law(self.content, material, axes, modes),
                     self.found.add_solids(group, members),
                 )
             )
-        return found, thickness or 1.0
+        return materials, thickness or 1.0
 
     def _axes(self, section: Section) -> Any:
         """Return the axes of the material of a section, None for those of the mesh."""
@@ -306,7 +306,7 @@ class Building:
 
     def _check_discrete(self, kind: str, given: Mapping[str, Any], needed: str) -> None:
         """Refuse springs and gap elements without properties."""
-        with_one = {own for name, entry in given.items() for own in self.made.elements_of(name, entry[0])}
+        with_one = {member for name, entry in given.items() for member in self.made.elements_of(name, entry[0])}
         for element in self.made.discrete:
             if element.cell.type == kind and element not in with_one:
                 raise element.cell.place.refuse(f"element {element.number} of type {kind} has no {needed}")
@@ -379,13 +379,13 @@ class Building:
 
     def _gap_groups(self) -> dict[str, tuple[str, list[tuple[int, int]]]]:
         """Make groups of the facets behind gap elements; return their names, with the points of each element."""
-        found = {}
+        groups = {}
         self._check_discrete("GAPUNI", self.content.gaps, "*GAP")
         for name, (place, _, _) in self.content.gaps.items():
-            own = self.made.elements_of(name, place)
-            if any(element.cell.type != "GAPUNI" for element in own):
+            elements = self.made.elements_of(name, place)
+            if any(element.cell.type != "GAPUNI" for element in elements):
                 raise place.refuse("acts on elements of type GAPUNI only")
-            ends = [element.points for element in own]
+            ends = [element.points for element in elements]
             chosen = {pair[0] for pair in ends}
             faces = self.made.faces_within(chosen)
             shown = self.content.root.set_names.get(name, name)
@@ -395,8 +395,8 @@ class Building:
                 raise place.refuse(
                     "gap elements are supported on all nodes of whole faces only, from the body to nodes that are held"
                 )
-            found[name] = (group, [(pair[0], pair[1]) for pair in ends])
-        return found
+            groups[name] = (group, [(pair[0], pair[1]) for pair in ends])
+        return groups
 
     def _gaps(self, groups: Mapping[str, Any], conditions: Conditions) -> dict[str, dict[int, int]]:
         """Make contact with a rigid plane from gap elements to nodes that are held at rest."""
@@ -516,10 +516,10 @@ def nodal_gaps(model: Model, secondary: str, primary: str, without: Sequence[int
     from fastcontact.model.contact_pair import ContactPair
 
     pair = ContactPair("gaps", secondary, primary, "continuous", {})
-    found, places = model.bind(pair), model.mesh.points
-    gaps, _ = found.nodal_gap(Configuration.undeformed(places))
-    faced = np.isfinite(gaps) & ~np.isin(found.secondary.points, without)
-    return (gaps[faced], places[found.secondary.points[faced]]) if faced.any() else (np.zeros(1), places[:1])
+    formulation, places = model.bind(pair), model.mesh.points
+    gaps, _ = formulation.nodal_gap(Configuration.undeformed(places))
+    faced = np.isfinite(gaps) & ~np.isin(formulation.secondary.points, without)
+    return (gaps[faced], places[formulation.secondary.points[faced]]) if faced.any() else (np.zeros(1), places[:1])
 
 
 def _by_shape(alike: Mapping[tuple[int, Table], list[int]]) -> Iterator[tuple[int, list[int], Any, Table]]:

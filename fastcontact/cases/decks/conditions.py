@@ -205,9 +205,9 @@ class Conditions:
                 raise row.place.refuse(f"load {label[:40]} on a surface is not supported, only P")
             faces, value = self.made.faces(row.text(0), row.place), row.number(2)
             return [(Distributed(keyword, "P", face), value) for face in faces]
-        own = self.made.elements_of(row.text(0), row.place) if row.text(0) else self.made.solids
+        elements = self.made.elements_of(row.text(0), row.place) if row.text(0) else self.made.solids
         if label[:1] == "P" and label[1:].isdigit():
-            facets = [(element, self.made.facet(element, int(label[1:]), row.place)) for element in own]
+            facets = [(element, self.made.facet(element, int(label[1:]), row.place)) for element in elements]
             return [(Distributed(keyword, "P", face), row.number(2)) for face in facets]
         size = {"GRAV": 3, "CENTRIF": 6, "BX": 0, "BY": 0, "BZ": 0}.get(label)
         if size is None:
@@ -217,4 +217,4 @@ class Conditions:
         vector = tuple(row.number(3 + i, 0.0) for i in range(size))
         if size and not any(vector[-3:]):
             raise row.place.refuse(f"the direction of {label} is missing")
-        return [(Distributed(keyword, label, None, tuple(own), vector), row.number(2))]
+        return [(Distributed(keyword, label, None, tuple(elements), vector), row.number(2))]

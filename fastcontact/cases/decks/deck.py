@@ -146,13 +146,13 @@ class Deck:
 
     def _largest_strain(self, step: StepResult) -> float:
         """Return the largest equivalent strain of the solid cells, from their nodal stresses [-]."""
-        field, found = self.model.material_field(), 0.0
+        field, largest = self.model.material_field(), 0.0
         for name, block in self.model.mesh.solids.items():
             strains = np.einsum("cij,cnj->cni", field.compliance[field.rows[name]], step.stress[block])
-            found = max(
-                found, float(recovery.equivalent_strain(strains.reshape(-1, strains.shape[2])).max(initial=0.0))
+            largest = max(
+                largest, float(recovery.equivalent_strain(strains.reshape(-1, strains.shape[2])).max(initial=0.0))
             )
-        return found
+        return largest
 
     def _tell_nonlinear(self, step: StepResult) -> None:
         """Warn with the largest strain and rotation where the deck asks for large ones."""
@@ -201,14 +201,14 @@ def read_deck(path: PathLike) -> Deck:
     >>> steps = deck.solve()                                   # doctest: +SKIP
     >>> steps[-1].reaction[deck.points_of("FLOOR")].sum(axis=0)  # doctest: +SKIP
     """
-    found = existing_file(path)
-    content = read_content(read_blocks(found))
+    file = existing_file(path)
+    content = read_content(read_blocks(file))
     if not content.steps:
-        raise Place(found.name, 1, "STEP").refuse("the deck has no step, so nothing is loaded")
+        raise Place(file.name, 1, "STEP").refuse("the deck has no step, so nothing is loaded")
     try:
-        building = Building(content, _text(found))
+        building = Building(content, _text(file))
     except (ModelError, MeshError, ContactError) as error:
-        raise type(error)(f"{found.name}: {error}") from error
+        raise type(error)(f"{file.name}: {error}") from error
     if building.linearised:
         step = next(step for step in content.steps if step.nonlinear)
         warn(
@@ -216,8 +216,8 @@ def read_deck(path: PathLike) -> Deck:
             "only while they stay small, and a warning after the solution tells how large they are"
         )
     return Deck(
-        path=found,
-        title=content.title or found.stem,
+        path=file,
+        title=content.title or file.stem,
         model=building.model,
         ramp=building.ramp,
         criteria=Criteria(),

@@ -36,10 +36,10 @@ def nodes(content: Content, part: Part, block: Block) -> None:
 
 def cells(content: Content, part: Part, block: Block) -> None:
     """*ELEMENT: numbers and nodes of elements of one type."""
-    name, own = block.required("TYPE").upper(), block.get("ELSET")
+    name, element_set = block.required("TYPE").upper(), block.get("ELSET")
     kind = element_type(name)
     if kind is None and name not in DISCRETE:
-        where = f" in set '{own}'" if own else ""
+        where = f" in set '{element_set}'" if element_set else ""
         count = sum(1 for _ in _joined(block, 0))
         raise block.place.refuse(
             f"element type {name[:40]}{described(name)} is not supported; {count} element{'s' * (count != 1)}{where}"
@@ -51,15 +51,17 @@ def cells(content: Content, part: Part, block: Block) -> None:
     for row, entries in _joined(block, needed):
         number = row.whole(0)
         whole = Row(row.place, entries)
-        found = array("q", (whole.whole(i) for i in range(1, len(entries)) if entries[i]))
-        if len(found) != needed:
-            raise row.place.refuse(f"element {number} of type {name} has {len(found)} nodes, {needed} are needed")
+        connectivity = array("q", (whole.whole(i) for i in range(1, len(entries)) if entries[i]))
+        if len(connectivity) != needed:
+            raise row.place.refuse(
+                f"element {number} of type {name} has {len(connectivity)} nodes, {needed} are needed"
+            )
         if number in part.cells:
             raise row.place.refuse(f"element {number} is defined twice, first in line {part.cells[number].place.line}")
-        part.cells[number] = Cell(name, found, block.place, row.place.line, own)
+        part.cells[number] = Cell(name, connectivity, block.place, row.place.line, element_set)
         members.append(number)
-    if own:
-        part.add("element", own, [Members(block.place, members)])
+    if element_set:
+        part.add("element", element_set, [Members(block.place, members)])
 
 
 def _joined(block: Block, needed: int) -> Iterator[tuple[Row, tuple[str, ...]]]:
@@ -92,20 +94,20 @@ def element_set(content: Content, part: Part, block: Block) -> None:
 def _members(block: Block) -> list[Members]:
     """Return the entries of a set."""
     instance = folded(block.get("INSTANCE"))
-    found = []
+    members = []
     for row in block.each():
         if "GENERATE" in block.parameters:
             first, last, increment = row.whole(0), row.whole(1), row.whole(2, 1)
             if increment < 1 or last < first:
                 raise row.place.refuse(f"the range {first} to {last} by {increment} is empty: it must ascend")
-            found.append(Members(row.place, range(first, last + 1, increment), instance=instance))
+            members.append(Members(row.place, range(first, last + 1, increment), instance=instance))
             continue
         for numbers, group in groupby(row.entries, lambda entry: entry.isdecimal() and len(entry) < 19):
             if numbers:
-                found.append(Members(row.place, array("q", map(int, group)), instance=instance))
+                members.append(Members(row.place, array("q", map(int, group)), instance=instance))
             else:
-                found += [Members(row.place, name=entry, instance=instance) for entry in group if entry]
-    return found
+                members += [Members(row.place, name=entry, instance=instance) for entry in group if entry]
+    return members
 
 
 def surface(content: Content, part: Part, block: Block) -> None:

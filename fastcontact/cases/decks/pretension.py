@@ -32,15 +32,17 @@ def pretension_section(content: Content, block: Block) -> None:
 def section_points(made: Assembled) -> dict[int, PretensionSection]:
     """Return the sections by the points of their nodes; CaseError where such a point belongs to a body or to another one."""
     used = {point for solid in made.solids for point in solid.points}
-    found: dict[int, PretensionSection] = {}
+    sections: dict[int, PretensionSection] = {}
     for section in made.content.pretensions:
         point = made.node(section.node, section.place)
         if point in used:
             raise section.place.refuse(f"node {section.node} belongs to an element: a section needs one of its own")
-        if point in found:
-            raise section.place.refuse(f"node {section.node} has a section already, in line {found[point].place.line}")
-        found[point] = section
-    return found
+        if point in sections:
+            raise section.place.refuse(
+                f"node {section.node} has a section already, in line {sections[point].place.line}"
+            )
+        sections[point] = section
+    return sections
 
 
 class Locks:

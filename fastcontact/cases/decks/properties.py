@@ -33,12 +33,12 @@ def material(content: Content, block: Block) -> Material:
 def elastic(content: Content, current: Material, block: Block) -> None:
     """*ELASTIC: constants of one temperature."""
     kind = " ".join(block.get("TYPE", "ISOTROPIC").upper().split())
-    found = [known for known in CONSTANTS if len(kind) >= 3 and known.startswith(kind)]
-    if not found:
+    kinds = [known for known in CONSTANTS if len(kind) >= 3 and known.startswith(kind)]
+    if not kinds:
         known = ", ".join(CONSTANTS)
         raise block.place.refuse(f"material '{current.name}': TYPE={kind[:40]} is not supported; known are {known}")
-    if found[0] != "ISOTROPIC":
-        _with_axes(current, block, found[0])
+    if kinds[0] != "ISOTROPIC":
+        _with_axes(current, block, kinds[0])
         return
     row = _only(block, "temperatures" if len(block.rows) > 1 else "")
     E, nu = row.number(0), row.number(1, 0.0)
@@ -136,7 +136,7 @@ def changed_interaction(content: Content, block: Block) -> Interaction:
     """*CHANGE FRICTION: begins what holds from the current step on, by the *FRICTION below it."""
     name = block.required("INTERACTION")
     if folded(name) not in content.interactions:
-        known = ", ".join(own.name for own in content.interactions.values()) or "none"
+        known = ", ".join(interaction.name for interaction in content.interactions.values()) or "none"
         raise block.place.refuse(f"surface interaction '{name}' is not defined; interactions: {known}")
     changed = Interaction(name, block.place, friction=-1.0)  # which it has to say
     content.interactions[folded(name)].changes.append((len(content.steps) - 1, changed))
@@ -225,10 +225,10 @@ def spring(content: Content, block: Block) -> None:
     content.springs[folded(block.required("ELSET"))] = (block.place, _positive(rows[0], 0, "stiffness"))
 
 
-def _positive(row: Row, index: int, what: str) -> float:
+def _positive(row: Row, index: int, name: str) -> float:
     value = row.number(index)
     if not value > 0:
-        raise row.place.refuse(f"the {what} {value:g} must be positive")
+        raise row.place.refuse(f"the {name} {value:g} must be positive")
     return value
 
 

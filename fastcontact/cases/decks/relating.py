@@ -37,7 +37,7 @@ def relations_of(found: DeckMesh, mesh: Mesh) -> list[MultiPointConstraint]:
     axes = local_directions(found.made)
     rows = [_equation(found, equation, axes) for equation in content.equations]
     rows += [row for pin in content.pins for row in _pinned(found, pin)]
-    rows += [row for own in content.multi_points for row in multi_point_rows(found, own)]
+    rows += [row for constraint in content.multi_points for row in multi_point_rows(found, constraint)]
     made = [relation("the equations of the deck", rows, mesh.points.shape)] if rows else []
     for link in content.links:
         rows = _distributing(found, mesh, link) if link.distributing else _rigid(found, link)
@@ -78,8 +78,8 @@ def _points(found: DeckMesh, link: Link) -> list[int]:
     if link.kind == "nodes":
         points = made.nodes(link.group, link.place)
     elif link.kind == "elements":
-        own = made.elements_of(link.group, link.place)
-        points = [p for element in own if element.type is not None for p in element.points]
+        elements = made.elements_of(link.group, link.place)
+        points = [p for element in elements if element.type is not None for p in element.points]
     else:
         definition, scope = made.surface(link.group, link.place)
         if definition.of_nodes:

@@ -90,8 +90,8 @@ def add_temperatures(model: Model, histories: Histories[int]) -> None:
         for shape, members in by_shape.items():
             _add(model, members, shape)
         return
-    for place, time in enumerate(times):  # histories that differ from node to node: one field for each corner of them
-        around = sorted({times[0], *times[max(place - 1, 0) : place + 2], times[-1]})
+    for k, time in enumerate(times):  # histories that differ from node to node: one field for each corner of them
+        around = sorted({times[0], *times[max(k - 1, 0) : k + 2], times[-1]})
         hat = tuple((other, float(other == time)) for other in around)
         _add(model, [(point, value) for table, points in rises if (value := _at(table, time)) for point in points], hat)
 

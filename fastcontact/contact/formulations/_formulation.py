@@ -166,63 +166,67 @@ class Formulation(ABC):
         """
         if self.tied is not None:
             return self.tied.constraints()
-        part = self.unilateral(at)
+        constraints = self.unilateral(at)
         if self.options.cohesion is None:
-            part = self._softened(part, at)
-        if part.friction is not None and at.friction_factor != 1.0:
-            part = replace(part, friction=at.friction_factor * part.friction)
+            constraints = self._softened(constraints, at)
+        if constraints.friction is not None and at.friction_factor != 1.0:
+            constraints = replace(constraints, friction=at.friction_factor * constraints.friction)
         if self.options.gap_only:
-            return part.without(np.ones(len(part), bool))
+            return constraints.without(np.ones(len(constraints), bool))
         if self.options.search_distance is not None:
             # Also as the step begins: what this iterate lets through by itself is not out of reach.
-            away = np.minimum(np.abs(part.gaps(at.displacement)), np.abs(part.gaps(at.start)))
-            part = part.without(away > self.options.search_distance)
+            away = np.minimum(np.abs(constraints.gaps(at.displacement)), np.abs(constraints.gaps(at.start)))
+            constraints = constraints.without(away > self.options.search_distance)
         if self.options.cohesion is not None:
-            return bonded(self.options.cohesion, part, at, _at_places(self._gaps_as_they_lie, part.positions))
-        part = replace(part, equality=self.never_opening(part.positions, at))
+            return bonded(
+                self.options.cohesion, constraints, at, _at_places(self._gaps_as_they_lie, constraints.positions)
+            )
+        constraints = replace(constraints, equality=self.never_opening(constraints.positions, at))
         if self.options.source is None:
-            return part
+            return constraints
         from fastcontact.contact.fluid_pressure import wetted
 
-        return wetted(part, at, self.secondary, self.options.source[self.secondary.points], self.points)
+        return wetted(constraints, at, self.secondary, self.options.source[self.secondary.points], self.points)
 
-    def _softened(self, part: Constraints, at: Configuration) -> Constraints:
+    def _softened(self, constraints: Constraints, at: Configuration) -> Constraints:
         """Return constraints with the compliance of normal and tangential penalties, if any."""
-        normal, tangential, areas = self.options.penalty, self.options.tangential_penalty, part.areas
+        normal, tangential, areas = self.options.penalty, self.options.tangential_penalty, constraints.areas
         if normal is None and tangential is None:
-            return part
+            return constraints
         if areas is None:
             raise ContactError(f"formulation '{self.name}' knows no penalty: leave out the option")
         if isinstance(normal, OverclosureLaw):
-            slope, without = normal.line(-part.gaps(at.displacement))
-            part = replace(part, gap0=part.gap0 + without, softness=1.0 / (slope * areas), law=normal)
+            slope, without = normal.line(-constraints.gaps(at.displacement))
+            constraints = replace(
+                constraints, gap0=constraints.gap0 + without, softness=1.0 / (slope * areas), law=normal
+            )
         elif normal is not None:
-            part = replace(part, softness=np.asarray(1.0 / (normal * areas)))
-        if tangential is None or not part.tangents:
-            return part
-        give, elastic = 1.0 / tangential(part.positions), np.zeros((len(part.tangents), len(part)))
+            constraints = replace(constraints, softness=np.asarray(1.0 / (normal * areas)))
+        if tangential is None or not constraints.tangents:
+            return constraints
+        give, elastic = 1.0 / tangential(constraints.positions), np.zeros((len(constraints.tangents), len(constraints)))
         if at.traction is not None:
-            before = _at_places(at.traction, part.positions)
-            elastic = np.stack([-give * np.einsum("md,md->m", t, before) for t in part.directions])
-        return replace(part, tangential_softness=give / areas, elastic_slip=elastic)
+            before = _at_places(at.traction, constraints.positions)
+            elastic = np.stack([-give * np.einsum("md,md->m", t, before) for t in constraints.directions])
+        return replace(constraints, tangential_softness=give / areas, elastic_slip=elastic)
 
     @cached_property
     def _gaps_as_they_lie(self) -> tuple[Array, Array]:
         """Places (m, dim) of constraints on the bodies before any load, and their gaps (m,) [length]."""
-        part = self.unilateral(Configuration.undeformed(self.points))
-        return part.positions, part.gap0
+        constraints = self.unilateral(Configuration.undeformed(self.points))
+        return constraints.positions, constraints.gap0
 
     @cached_property
     def tied(self) -> TiedPair | None:
         """The equations of a tied pair, on the bodies as they lie before any load."""
         if not self.options.tied:
             return None
-        part = self.unilateral(Configuration.undeformed(self.points))
-        if isinstance(self.primary, Surface) and part.tangents:
+        constraints = self.unilateral(Configuration.undeformed(self.points))
+        if isinstance(self.primary, Surface) and constraints.tangents:
             smooth = self.normals if self.normals != "secondary" and self.normals is not None else "facet"
-            pairing = pair(part.positions, self.primary, self.points, np.inf, smooth)
-            part = with_arms(part, pairing, self.primary, self.points)
-        return tied(part)
+            pairing = pair(constraints.positions, self.primary, self.points, np.inf, smooth)
+            constraints = with_arms(constraints, pairing, self.primary, self.points)
+        return tied(constraints)
 
     def never_opening(self, positions: Array, at: Configuration) -> Mask | None:
         """Return which constraints, by reference position (m, dim) [length], do not separate (m,); None if all may."""

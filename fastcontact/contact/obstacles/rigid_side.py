@@ -60,14 +60,14 @@ class RigidSide:
 
     def _distance(self, points: Array) -> tuple[Array, Array]:
         """Return gap (n,) [length] and normals (n, dim) [-] of `points` (n, dim) [length] from the obstacle at rest."""
-        found = self.obstacle.distance(points)
-        if is_masked(found):
+        distance_and_normal = self.obstacle.distance(points)
+        if is_masked(distance_and_normal):
             raise ContactError(
                 f"the distance from a rigid obstacle {REFUSAL}; a gap that is infinite leaves a point out"
             )
-        if any(np.iscomplexobj(part) for part in found):
+        if any(np.iscomplexobj(part) for part in distance_and_normal):
             raise ContactError("the distance from a rigid obstacle must be real numbers, not complex ones")
-        return found
+        return distance_and_normal
 
     def turning(self, positions: Array, before: Array, now: Pose, then: Pose) -> Array | None:
         """Return how far the rotation alone carries points of the obstacle's surface (n, dim) [length]; None without any.

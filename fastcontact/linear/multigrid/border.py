@@ -42,10 +42,10 @@ class Border:
         """Factorise the preconditioner of the multipliers, given the diagonal (n,) of A [force / length]."""
         yielding = np.divide(1.0, diagonal, out=np.zeros(len(diagonal)), where=diagonal > 0.0)
         S = self.compliance + SOFTER * (self.rows @ diags_array(yielding) @ self.rows.T)
-        own = S.diagonal()
+        diagonal_of_S = S.diagonal()
         # Residuals of these equations become forces.
-        self.stiffness = 1.0 / own
-        self._factors = splu(csc_array(S + diags_array(REPEATED * own)))
+        self.stiffness = 1.0 / diagonal_of_S
+        self._factors = splu(csc_array(S + diags_array(REPEATED * diagonal_of_S)))
 
     def multiply(self, multiply: Multiply, move_forces: Callable[[Array], None]) -> Multiply:
         """Return the product with the bordered matrix, from that with A; forces (n,) move from eliminated unknowns."""

@@ -149,15 +149,15 @@ class LoadedMultigrid(LoadedIteration):
             return _Parts(np.ones(len(c), bool), elimination, None)
         diagonal = self._solver.diagonal()
         yielding = np.divide(1.0, diagonal, out=np.zeros(len(diagonal)), where=diagonal > 0.0)
-        own = B.multiply(B) @ yielding
+        softness = B.multiply(B) @ yielding
         for least in (STIFF, STIFF_COUPLED):
-            stiff = own > least * C
+            stiff = softness > least * C
             try:
-                found = _Parts.of(B, c, C, stiff, nodes, size, through, self._functions)
+                parts = _Parts.of(B, c, C, stiff, nodes, size, through, self._functions)
             except RepeatedError:
                 continue
-            if not found.coupled or least == STIFF_COUPLED:
-                return found
+            if not parts.coupled or least == STIFF_COUPLED:
+                return parts
         return _Parts.of(B, c, C, C == 0.0, nodes, size, through, self._functions)
 
 
@@ -212,10 +212,10 @@ class _Parts:
         """Return all multipliers (m,), given those of the equations eliminated."""
         if self.springs is None:
             return of_stiff
-        found = np.empty(len(c))
-        found[self.stiff] = of_stiff
-        found[~self.stiff] = self.springs.stiffness * (c[~self.stiff] - self.springs.rows @ u)
-        return found
+        multiplier = np.empty(len(c))
+        multiplier[self.stiff] = of_stiff
+        multiplier[~self.stiff] = self.springs.stiffness * (c[~self.stiff] - self.springs.rows @ u)
+        return multiplier
 
 
 @dataclass(frozen=True, eq=False)

@@ -144,13 +144,13 @@ class _Excess:
         return u
 
     def reduce(self, x: Array, r: Array, sign: float) -> None:
-        own = self._elimination.multiplier(r[self._pivots]) + sign * self._stiffness * x[self._pivots]
+        multiplier = self._elimination.multiplier(r[self._pivots]) + sign * self._stiffness * x[self._pivots]
         self._elimination.move_forces(r)
-        r[self._pivots] = np.where(self._gives, own, 0.0)
+        r[self._pivots] = np.where(self._gives, multiplier, 0.0)
 
     def precondition(self, r: Array, norm: float, z: Array, cycle: Callable[[Array, float, Array], None]) -> None:
-        own = r[self._pivots]
+        residual = r[self._pivots]
         r[self._pivots] = 0.0
         cycle(r, norm, z)
-        r[self._pivots] = own
-        z[self._pivots] = self._inverse * own
+        r[self._pivots] = residual
+        z[self._pivots] = self._inverse * residual

@@ -124,20 +124,20 @@ class ModelBase:
         """Return the solid cells of groups, or all."""
         if groups is None:
             return Cells(self.mesh, {name: np.arange(len(block)) for name, block in self.mesh.solids.items()})
-        found = self.mesh.split(np.unique(np.concatenate([self.mesh.cell_groups[name] for name in groups])))
-        return Cells(self.mesh, {name: found[name] for name in self.mesh.solids if name in found})
+        cells = self.mesh.split(np.unique(np.concatenate([self.mesh.cell_groups[name] for name in groups])))
+        return Cells(self.mesh, {name: cells[name] for name in self.mesh.solids if name in cells})
 
     def _points_of_cells(self, groups: Sequence[str] | None) -> Indices:
         """Return the points of the solid cells of groups, or of all."""
         cells = self._cells_of(groups)
         return np.unique(np.concatenate([self.mesh.cells[name][rows].ravel() for name, rows in cells.rows.items()]))
 
-    def _nodes(self, place: str | int) -> AnyArray:
-        if isinstance(place, str):
-            return self.mesh.points_of(place)
-        if place != int(place) or not 0 <= place < self.mesh.n_points:
-            raise ModelError(f"point {place} is not in the mesh of {self.mesh.n_points} points (numbers from 0)")
-        return np.array([place])
+    def _nodes(self, point: str | int) -> AnyArray:
+        if isinstance(point, str):
+            return self.mesh.points_of(point)
+        if point != int(point) or not 0 <= point < self.mesh.n_points:
+            raise ModelError(f"point {point} is not in the mesh of {self.mesh.n_points} points (numbers from 0)")
+        return np.array([point])
 
     def _direction(
         self, name: str, along: Mapping[str, float], joined: bool, direction: Sequence[float] | None

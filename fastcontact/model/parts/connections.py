@@ -67,14 +67,16 @@ class ModelConnections(ModelInitialStates):
         if name in {other.label for other in self.pretensions}:
             raise ModelError(f"there is already a pretension '{name}': names must differ")
         table = table_of(ramp, f"the ramp of pretension '{name}'")
-        own = pretension(self.mesh, name, section, opposite, normal, (force, shortening, locked_from), table)
+        section_of_bolt = pretension(
+            self.mesh, name, section, opposite, normal, (force, shortening, locked_from), table
+        )
         for other in self.pretensions:
-            if np.isin(own.nodes, [other.nodes, other.opposite]).any():
-                raise ModelError(f"{own.name} and {other.name} are in one section, which has one force")
-        self.pretensions.append(own)
-        self.relations.extend(own.relations(self.n_dofs))
+            if np.isin(section_of_bolt.nodes, [other.nodes, other.opposite]).any():
+                raise ModelError(f"{section_of_bolt.name} and {other.name} are in one section, which has one force")
+        self.pretensions.append(section_of_bolt)
+        self.relations.extend(section_of_bolt.relations(self.n_dofs))
         if force is not None:
-            self._add(PretensionForce(own))
+            self._add(PretensionForce(section_of_bolt))
 
     @typed(ModelError)
     def couple(self, group: str, component: str) -> None:
@@ -135,9 +137,9 @@ class ModelConnections(ModelInitialStates):
             axes_of(name, dict.fromkeys(component, 1.0), self.mesh.dim)
         sides = [directions_of(self.mesh, group, component) for group in (first, second)]
         for (nodes, ours), (opposite, theirs) in zip(*sides, strict=True):
-            place = matched(self.mesh, (first, nodes), (second, opposite), translation)
+            match = matched(self.mesh, (first, nodes), (second, opposite), translation)
             rows = coefficients[0] * along(nodes, ours, self.n_dofs)
-            rows = csr_array(rows + coefficients[1] * along(opposite[place], theirs[place], self.n_dofs))
+            rows = csr_array(rows + coefficients[1] * along(opposite[match], theirs[match], self.n_dofs))
             rows.eliminate_zeros()
             self.relations.append(
                 MultiPointConstraint(
@@ -231,14 +233,20 @@ class ModelConnections(ModelInitialStates):
         name = f"the cyclic symmetry of '{first}' and '{second}'"
         if self.kinematics == "axisymmetric":
             raise ModelError(f"{name}: an axisymmetric model is the whole ring already")
-        place = (0.0,) * self.mesh.dim if origin is None else tuple(origin)
+        origin_given = (0.0,) * self.mesh.dim if origin is None else tuple(origin)
         along = (0.0, 0.0, 1.0) if self.mesh.dim == 2 else tuple(direction)
-        if sectors < 2 or sectors != int(sectors) or len(place) != self.mesh.dim or len(along) != 3 or not any(along):
+        if (
+            sectors < 2
+            or sectors != int(sectors)
+            or len(origin_given) != self.mesh.dim
+            or len(along) != 3
+            or not any(along)
+        ):
             raise ModelError(
                 f"{name} needs two sectors at least, a whole number, an origin of {self.mesh.dim} numbers and a direction of "
-                f"three, not {sectors}, {place} and {along}"
+                f"three, not {sectors}, {origin_given} and {along}"
             )
-        relations, interface = cyclic(self.mesh, (first, second), sectors, place, along)
+        relations, interface = cyclic(self.mesh, (first, second), sectors, origin_given, along)
         self.relations.extend(relations)
         self.periodic_interfaces.append(interface)
 
@@ -257,13 +265,13 @@ class ModelConnections(ModelInitialStates):
             [length times the unit of the coefficients].
         """
         row: dict[int, float] = {}
-        listed = [(place, component, coefficient) for place, component, coefficient in terms]
-        name = "the relation of " + ", ".join(f"{component} of '{place}'" for place, component, _ in listed)
+        listed = [(point, component, coefficient) for point, component, coefficient in terms]
+        name = "the relation of " + ", ".join(f"{component} of '{point}'" for point, component, _ in listed)
         check_number(f"the value of {name}", value)
-        for place, component, coefficient in listed:
+        for point, component, coefficient in listed:
             check_number(f"a coefficient of {name}", coefficient)
             (axis,) = axes_of(name, {component: coefficient}, self.mesh.dim)
-            for node in self._nodes(place):
+            for node in self._nodes(point):
                 dof = int(node) * self.mesh.dim + axis
                 row[dof] = row.get(dof, 0.0) + float(coefficient)
         row = {dof: coefficient for dof, coefficient in row.items() if coefficient}
@@ -352,8 +360,8 @@ class ModelConnections(ModelInitialStates):
         """
         name = f"the spring on '{group}'" if to is None else f"the spring between '{group}' and '{to}'"
         given = {"x": x, "y": y, "z": z}
-        own = {"axial": axial, "transverse": transverse}
-        along = {key: value for key, value in own.items() if value is not None}
+        stiffness = {"axial": axial, "transverse": transverse}
+        along = {key: value for key, value in stiffness.items() if value is not None}
         vector = self._direction(name, along, to is not None, direction)
         axes = {} if along and set(given.values()) == {None} else axes_of(name, given, self.mesh.dim)
         for value in [*axes.values(), *along.values()]:
@@ -370,8 +378,8 @@ class ModelConnections(ModelInitialStates):
         if not len(opposite):
             raise ModelError(f"group '{to}' is empty: no spring can be there")
         if len(nodes) > 1 < len(opposite):
-            place = matched(self.mesh, (str(group), nodes), (str(to), opposite), translation)
-            opposite = opposite[place]
+            match = matched(self.mesh, (str(group), nodes), (str(to), opposite), translation)
+            opposite = opposite[match]
         elif translation is not None:
             raise ModelError(f"{name} joins all nodes with a single one: leave out the translation")
         first, second = np.broadcast_arrays(nodes, opposite)

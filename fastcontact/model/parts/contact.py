@@ -145,13 +145,13 @@ class ModelContact(ModelConnections):
         """
         moduli = None
         if self.materials:
-            own = np.array([material.contact_modulus for material, _ in self.materials])
-            moduli = {name: own[rows] for name, rows in self.material_of_cells().items()}
-        found = find_contacts(self.mesh, distance=distance, angle=angle, groups=groups, moduli=moduli)
-        if not found.pairs:
+            stiffness = np.array([material.contact_modulus for material, _ in self.materials])
+            moduli = {name: stiffness[rows] for name, rows in self.material_of_cells().items()}
+        contacts = find_contacts(self.mesh, distance=distance, angle=angle, groups=groups, moduli=moduli)
+        if not contacts.pairs:
             raise ContactError(nothing_found(self.mesh, distance, angle, groups))
-        self.mesh, added = found.mesh, []
-        for pair in found:
+        self.mesh, added = contacts.mesh, []
+        for pair in contacts:
             sides = {"secondary": pair.secondary, "primary": pair.primary}
             ends = [self.mesh.points_of(group) for group in sides.values()]
             if any(np.isin(side, [cut.nodes, cut.opposite]).all() for cut in self.pretensions for side in ends):
@@ -190,10 +190,10 @@ class ModelContact(ModelConnections):
         if contact not in names:
             raise ModelError(unknown("contact", contact, names))
         fluid = FluidPressure(float(pressure), source, table_of(ramp, f"the ramp of the fluid in contact '{contact}'"))
-        place = names.index(contact)
-        changed = dataclasses.replace(self.contact[place], fluid=fluid)
+        index = names.index(contact)
+        changed = dataclasses.replace(self.contact[index], fluid=fluid)
         self.bind(changed)
-        self.contact[place] = changed
+        self.contact[index] = changed
 
     @typed(ModelError)
     def add_obstacle(
@@ -336,8 +336,8 @@ class ModelContact(ModelConnections):
         for option in pair.options:
             if option not in known:
                 raise ContactError(unknown(f"option of {pair.formulation}", option, known))
-        own = {key: value for key, value in pair.options.items() if key not in SHARED_OPTIONS}
-        check_fields(f"contact '{pair.name}'", own, kind, ContactError)
+        specific = {key: value for key, value in pair.options.items() if key not in SHARED_OPTIONS}
+        check_fields(f"contact '{pair.name}'", specific, kind, ContactError)
         secondary = surface(self.mesh, pair.secondary)
         options = pair_options(
             pair.name, pair.options, self.mesh, secondary, against_obstacle=pair.obstacle is not None
@@ -349,7 +349,7 @@ class ModelContact(ModelConnections):
                     f"contact '{pair.name}': mortar in the plane needs multipliers='dual' at an obstacle"
                 )
             primary = RigidSide(pair.obstacle, np.array(pair.motion), pair.rotation)
-            own.setdefault("surface_smoothing", False)
+            specific.setdefault("surface_smoothing", False)
         else:
             primary = surface(self.mesh, pair.primary)
             check_sides(self.mesh, pair.name, secondary, primary, options.excluded)
@@ -363,4 +363,4 @@ class ModelContact(ModelConnections):
             same_place=same_place(interfaces, self.mesh.n_points),
             source=self._source(pair, secondary, options),
         )
-        return kind(secondary, primary, self.mesh.points, axisymmetric, modulus, options=options, held=held, **own)
+        return kind(secondary, primary, self.mesh.points, axisymmetric, modulus, options=options, held=held, **specific)

@@ -89,19 +89,19 @@ class ModelSupports(ModelContact):
             raise ModelError(f"group '{group}' is empty: no displacement can be prescribed on it")
         places = self.mesh.points[nodes]
         try:
-            own = frames(checked_axes(axes), places, self.kinematics)
+            frame = frames(checked_axes(axes), places, self.kinematics)
         except ModelError as error:
             raise ModelError(str(error).replace("a material", name).replace("a point of a cell", "a node")) from None
         for axis, value in axes_of(f"prescribe('{group}')", components, dim).items():
-            what = f"the displacement {'xyz'[axis]} prescribed on '{group}'"
-            check_value(what, value)
-            direction = own[:, axis]
+            caption = f"the displacement {'xyz'[axis]} prescribed on '{group}'"
+            check_value(caption, value)
+            direction = frame[:, axis]
             if dim == 2 and np.abs(direction[:, 2]).max() > ON_AXIS:
                 raise ModelError(f"{name}: its axes leave the plane, where nothing moves")
             rows = along(nodes, np.ascontiguousarray(direction[:, :dim]), self.n_dofs)
-            table = table_of(ramp, f"the ramp of {what}")
-            values = evaluated(value, places, what)
-            self._related_support(group, MultiPointConstraint(f"{what} along axes", rows, values, table))
+            table = table_of(ramp, f"the ramp of {caption}")
+            values = evaluated(value, places, caption)
+            self._related_support(group, MultiPointConstraint(f"{caption} along axes", rows, values, table))
 
     def _related_support(self, group: str, relation: MultiPointConstraint) -> None:
         self.relations.append(relation)
