@@ -165,7 +165,7 @@ class _Closed:
     def kept(self) -> Array:
         """Part of the raw pressures (m,) that closed nodes keep; tractions are scaled alike.
 
-        At most all where a field undershoots: next to nothing of it may then be left at a node, and its shear anything.
+        At most one, where a field undershoots: hardly any of it may then be left at a node, and its shear is arbitrary.
         """
         fraction = np.divide(self.pressure, self.own, out=np.ones_like(self.pressure), where=self.own > 0.0)
         return np.where(self.nodes, np.minimum(fraction, 1.0) if self.own.min() < 0.0 else fraction, 0.0)

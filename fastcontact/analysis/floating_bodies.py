@@ -34,7 +34,7 @@ WORTH_A_STEP = 1e-10
 MAX_POSITIONS = 100
 # Lengths tried along one step.
 TRIALS = 20
-# A step that leaves more than this part of the elongations meets nothing yet; the next length is so many times as long.
+# A step that leaves more than this part of the elongations meets no resistance yet; the next one is longer by a factor.
 UNCHANGED = 0.9
 FARTHER = 10.0
 # A motion that resists less than this fraction of its spring does not resist.

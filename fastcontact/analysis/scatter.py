@@ -2,7 +2,7 @@
 
 How much round-off there is depends on the condition of the stiffness and of the constraints, which nothing tells beforehand;
 the last displacements show it. An iteration that still converges, however slowly, goes on in one direction: over a window
-its displacements lie as far apart as all changes together. Round-off goes to and fro: they lie hardly farther apart than one
+its displacements lie as far apart as all changes together. Round-off oscillates: they lie hardly farther apart than one
 change. So does what iterative linear solutions leave, of which is known how large it may be.
 """
 

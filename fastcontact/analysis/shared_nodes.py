@@ -4,7 +4,7 @@ A node of several pairs behaves as that of one pair over all their facets. Its c
 the sum of their forces alone, and equations that repeat each other cannot be eliminated: their mean is solved for. It stands
 for the area of all, so that penalties add up, and has the mean of their coefficients of friction. Each pair then carries the
 part that its area is of all their areas, so that the pressure is the same. Of several clearances at one place the smallest
-alone can close. What gives way along the normal by penalties and different clearances repeats nothing.
+alone can close. Constraints with a normal compliance or with different clearances are independent.
 
 Two nodes at the ends of a part that repeats itself are one node, too: its gap, weighted over the facets at both ends, is the
 mean of theirs by area. Tangents at the second end are turned to the first one before they are compared.
@@ -203,7 +203,7 @@ def _stiffness(softness: Array) -> Array:
 def _parts(constraints: StackedConstraints, representative: Indices) -> tuple[Array, Array]:
     """Return the parts (m,) of normal and tangential forces of places (m,) that constraints carry [-].
 
-    Normal forces by stiffness where all give way, by area among those that do not. Tangential forces as far as friction
+    Normal forces by stiffness where all are compliant, by area among exact ones. Tangential forces as far as friction
     can carry them: what slides then slides in each pair.
     """
     m = len(representative)
@@ -241,7 +241,7 @@ def _alike(constraints: StackedConstraints) -> tuple[Indices, Indices, Indices]:
     """Return constraints (k,) of a pair, those of other pairs (k,) that repeat them, and others that lie behind some.
 
     The latter face the same place along the same normal, with a larger clearance: what is in front of them holds their node,
-    unless it gives way.
+    unless it is compliant.
     """
     first, second = _of_one_node(constraints)
     if not len(first):

@@ -88,7 +88,7 @@ def _check_material(where: str, entry: dict[str, Any]) -> None:
     law = _material_law(entry)
     for key in entry:
         if key not in ("groups", "law") and key not in inspect.signature(law).parameters:
-            raise CaseError(f"the key '{where}.{key}' is none of a material that is {_LAWS[law]}")
+            raise CaseError(f"the key '{where}.{key}' does not belong to a material that is {_LAWS[law]}")
 
 
 # Nonlinear laws by their names in case files.

@@ -1,4 +1,4 @@
-"""A cohesive layer between the sides of a contact pair: equations that give way by lines of its law.
+"""A cohesive layer between the sides of a contact pair: equations whose compliance follows its law.
 
 In each pairing the traction is a line: through zero where the layer has not been stretched as far before, and level where it
 falls. Matrices so stay positive definite, and pairings approach every state that is stable under prescribed displacements.
@@ -71,10 +71,10 @@ class Layer:
 
 
 def bonded(law: CohesiveLaw, constraints: Constraints, at: Configuration, lying: Array) -> Constraints:
-    """Return constraints `constraints`, with tangents, as a cohesive layer: equations that give way by lines of its law.
+    """Return constraints `constraints`, with tangents, as a cohesive layer: equations whose compliance follows its law.
 
     `lying` (m,) are the gaps of the bodies as they lie [length]: cohesive layers have no traction there, adhesion acts across
-    them. What is broken may close again, and gives way by the full stiffness then.
+    them. What is broken may close again, with the full stiffness then.
     """
     assert constraints.areas is not None
     m, u, start = len(constraints), at.displacement.ravel(), at.start.ravel()

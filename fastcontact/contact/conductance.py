@@ -27,7 +27,7 @@ TABLES = ("pressure", "gap")
 class Conductance:
     """The heat that crosses a contact by area and difference of temperatures.
 
-    ContactError if it is none.
+    ContactError if it is not one.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class Conductance:
     def __call__(self, pressure: Array, gap: Array) -> Array:
         """Return conductances (m,) at pressures (m,) [pressure] and gaps (m,), zero where the sides touch [length].
 
-        ContactError if a function returns what is none.
+        ContactError if a function returns anything else.
         """
         touching = gap == 0.0
         if self._number is not None:

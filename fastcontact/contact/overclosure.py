@@ -14,7 +14,7 @@ from fastcontact.errors import ContactError
 class OverclosureLaw:
     """A piecewise linear pressure, zero up to the first overclosure, and going on beyond the last with its slope.
 
-    ContactError if the table is none.
+    ContactError if it is not such a table.
 
     Parameters
     ----------

@@ -53,9 +53,9 @@ class PairOptions:
     friction_heat : float
         What part of the work of friction becomes heat [-].
     cohesion : CohesiveLaw, optional
-        Of tension between the sides; None: there is none.
+        Of tension between the sides; None without.
     source : ndarray of bool (n_points,), optional
-        Nodes that fluid comes from; None: there is none.
+        Nodes that fluid comes from; None without.
     same_place : ndarray of int (n_points,), optional
         For each node, the one whose multiplier it has, too, where the model repeats itself; None where it does not.
     """

@@ -79,7 +79,7 @@ def unrolled(surface: Surface, coordinates: Array, middle: Array | None) -> Unro
 
 
 def _loop(surface: Surface) -> list[int] | None:
-    """Return the nodes of a surface, as rows of its points, in order around one closed line; None if it is none."""
+    """Return the nodes of a surface, as rows of its points, in order around one closed line; None if it is open."""
     following: dict[int, int] = {}
     for block in surface.blocks:
         middles = block.local[:, 2:]

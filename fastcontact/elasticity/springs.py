@@ -16,7 +16,7 @@ from scipy.sparse import bsr_array, csr_array, diags_array, vstack
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 
-# Springs between nodes that are so many times stiffer than the bodies there: told, and refused.
+# Ratio of the stiffness of a spring between nodes to that of the bodies there: warned about, and refused.
 STIFF, STIFFEST = 1e5, 1e12
 DIGITS = 16  # of the numbers that are computed with
 
@@ -80,7 +80,9 @@ def between(
     and have no line between them.
     """
     if first == second:
-        raise ModelError(f"{name}: both ends are point {first}; without a second node a spring hangs on the ground")
+        raise ModelError(
+            f"{name}: both ends are point {first}; without a second node a spring is attached to the ground"
+        )
     dim = points.shape[1]
     if along and direction is None:
         direction = _line(name, points, first, second)

@@ -40,7 +40,7 @@ class RigidParts:
     hinge_part: Indices
 
     def hinges_of(self, number: int) -> Indices:
-        """Return the nodes at which a part hangs on others, ascending."""
+        """Return the nodes at which a part is attached to others, ascending."""
         return self.hinge_node[self.hinge_part == number]
 
     def nodes_of(self, number: int) -> Indices:

@@ -103,7 +103,7 @@ def distributing_rows(reference: ReferencePoint, points: Indices, places: Array,
 
 
 def reference_of(mesh: Mesh, name: str) -> ReferencePoint:
-    """Return a reference point by the name of its group; ModelError if it is none."""
+    """Return a reference point by the name of its group; ModelError if it is not one."""
     if name + ROTATION not in mesh.point_groups:
         raise ModelError(
             f"'{name}' is no reference point: make the model of fc.generate.with_reference_points(mesh, {{'{name}': (...)}})"

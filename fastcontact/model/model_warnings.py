@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 # Young's moduli that differ by more: steel against soft rubber is 200 000, MPa against Pa a million.
 MODULI = 3e5
-# A prescribed displacement of more than so many times the size of the model, and strains by the loads above and below these
+# A prescribed displacement beyond this multiple of the size of the model, and strains by the loads above and below these
 # bounds, are probably mistakes.
 DISPLACED, STRAINED, UNSTRAINED = 1.0, 1.0, 1e-12
 # Solids: aerogel to diamond [Pa]. Only here units of the user matter, and only where a case names them.

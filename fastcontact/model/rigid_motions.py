@@ -29,11 +29,11 @@ MODE_NAMES = {
 }
 # Relative to the motions, whose largest displacement is about 1.
 ZERO = 1e-8
-# A motion that contact does not stop within so many times the size of the model is not stopped at all.
+# A motion that contact does not stop within this multiple of the size of the model is not stopped at all.
 FAR = 1e3
 # Of the pyramid that stands for Coulomb's cone in space: forces up to 8 % outside of the cone are left to the solution.
 EDGES = 8
-# So much more friction is as good as none that could hold a body.
+# A coefficient of friction larger by this factor counts as none that could hold a body.
 MOST_FRICTION = 100.0
 # A mesh of more motions of parts between hinges is no structure that anybody meant.
 MANY = 1500
@@ -176,7 +176,7 @@ def node_at(mesh: Mesh, node: int) -> str:
 
 
 def _part_name(mesh: Mesh, rigid: RigidParts, number: int) -> str:
-    """Return the name of a body, or of a part of one and the first node at which it hangs on others."""
+    """Return the name of a body, or of a part of one and the first node at which it is attached to others."""
     _, body = bodies(mesh)
     members, hinges = rigid.nodes_of(number), rigid.hinges_of(number)
     name = f"body {body_name(mesh, body, int(body[members[0]]))}"

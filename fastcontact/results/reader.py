@@ -115,7 +115,7 @@ class Results(Sequence[StepResult]):
     def _checked(self) -> Any:
         """Return our group in the file, if it is one of ours and of a known schema."""
         if self._file.userblock_size or self._file.id.get_create_plist().get_sizes() != (8, 8):
-            raise ValueError("its addresses are none of ours")
+            raise ValueError("its addresses are not ours")
         check_contents(self._file, self.path)
         if "fastcontact" not in self._file:
             raise FileError(f"'{self.path}' holds no fastcontact results: name a file that fastcontact wrote (.vtkhdf)")

@@ -221,7 +221,7 @@ class ContactResult:
 
     @property
     def cancels(self) -> bool:
-        """Whether the resultant is next to nothing beside the normal forces, as all round a press fit."""
+        """Whether the resultant is negligible beside the normal forces, as in a press fit."""
         return bool(np.linalg.norm(self.force) < CANCELLED * self.normal_force)
 
     @property

@@ -27,9 +27,9 @@ from fastcontact.linear.springs import Springs
 # Bound of the tangential stiffness across a slip, which is unbounded as the slip vanishes, in units of the stiffness of the
 # constraint. The solution does not depend on it, since nothing slips across there.
 STIFFEST = 100.0
-# Constraints are taken for so much softer than the unknowns that they act on are by themselves, for neighbours give way, too.
+# Constraints are taken for so much softer than the unknowns that they act on are by themselves, since their neighbours deform.
 # Nearly incompressible cells resist a single node far more than a surface (`LinearSolver.contrast`): beyond MILD, constraints
-# are softer still, with its root, or Newton's method turns a few slips to and fro (nu = 0.4999, 161 442 unknowns: 588
+# are softer still, with its root, or Newton's method reverses a few slips again and again (nu = 0.4999, 161 442 unknowns: 588
 # iterations, where it did not settle; nu = 0.499 did not care).
 SOFTER, MILD = 0.2, 10.0
 # The residual of the friction law that is small enough, in units of that of the linear solutions; and that which will do

@@ -1,4 +1,4 @@
-"""Slip directions left free by supports: tangents are aligned with them, the others are idle.
+"""Slip directions left free by supports: tangents are aligned with them, the others are held.
 
 All of it looks at the compliance of each constraint by itself: `own` (1 + k, 1 + k, m), its normal part first.
 """
@@ -11,9 +11,9 @@ from scipy.sparse import block_array, csr_array, diags_array
 from fastcontact.analysis.friction import slip_directions_kernels
 from fastcontact.arrays import Array, Mask
 
-# A direction of slip in which a constraint gives less than this, relative to its gap, is none.
+# A direction of slip whose compliance, relative to that of the gap, is less than this is held.
 IDLE = 1e-10
-# What a prescribed slip gives way, relative to its gap: next to nothing, but sticking has an equation so, which no force in
+# Compliance of a prescribed slip relative to that of its gap: negligible, but sticking has an equation so, which no force in
 # the cone obeys.
 GIVING = 1e-8
 

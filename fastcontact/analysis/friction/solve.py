@@ -103,7 +103,7 @@ def _among(
     R = csr_array(vstack([matrix[rows] for matrix in (constraints.B, *constraints.tangents)], format="csr"))
     at_rest = constraints.gaps_at_rest()
     free, F = loaded.delassus(R)
-    if constraints.tangential_softness is not None:  # before idle slips are looked for: what gives way is not idle
+    if constraints.tangential_softness is not None:  # before held slips are sought: compliant ones are not held
         slips = np.arange(len(rows), len(F))
         F[slips, slips] += np.tile(constraints.tangential_softness[rows], k)
     Q = aligning(own_compliance(F, 3)) if k == 2 else None

@@ -35,7 +35,7 @@ class HeldContact:
     nodes : ndarray of int (m,)
         The secondary node of each.
     springs : list of (csr_array (m, n_dofs), ndarray (m, m))
-        Rows [-] that give way, and by how much [length / force].
+        Compliant rows [-], and their compliance [length / force].
     """
 
     rows: csr_array

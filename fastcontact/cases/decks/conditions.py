@@ -133,7 +133,7 @@ class Conditions:
             last = first if named else row.whole(2, first)
             value = 0.0 if named else row.number(3, 0.0)
             if not 1 <= first <= last <= 6:
-                raise row.place.refuse(f"components {row.text(1)} to {row.text(2)} are none of 1 to 6")
+                raise row.place.refuse(f"components {row.text(1)} to {row.text(2)} are not within 1 to 6")
             if before and value:
                 self.made.content.note(row.place, "a displacement before the first step is reached in that step")
             components = named or tuple(range(first, last + 1))

@@ -124,7 +124,7 @@ def coupling(content: Content, block: Block, inner: Block) -> None:
     for row in inner.rows:
         first, last = row.whole(0), row.whole(1, row.whole(0))
         if not 1 <= first <= last <= 6:
-            raise row.place.refuse(f"the components {first} to {last} are none of 1 to 6")
+            raise row.place.refuse(f"the components {first} to {last} are not within 1 to 6")
         components.update(range(first, last + 1))
     chosen = tuple(sorted(components)) or (1, 2, 3, 4, 5, 6)
     distributing = inner.keyword == "DISTRIBUTING"

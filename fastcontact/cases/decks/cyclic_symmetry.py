@@ -11,7 +11,7 @@ from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.errors import ModelError
 from fastcontact.model.model import Model
 
-# A sector of more than this many is next to nothing of the whole.
+# Most sectors: beyond, one is a negligible part of the whole.
 MOST_SECTORS = 100_000
 
 

@@ -51,7 +51,7 @@ def _equation(found: DeckMesh, equation: Equation, axes: Mapping[int, Array]) ->
     for name, component, coefficient in equation.terms:
         point = found.made.node(name, equation.place)
         if not 1 <= component <= found.dim:
-            raise equation.place.refuse(f"component {component} of '{name}' is none of 1 to {found.dim}")
+            raise equation.place.refuse(f"component {component} of '{name}' is not within 1 to {found.dim}")
         along = axes.get(point, np.eye(3))[component - 1]
         terms += [(point, axis, coefficient * along[axis]) for axis in np.flatnonzero(along[: found.dim]).tolist()]
     if not any(coefficient for _, _, coefficient in terms):

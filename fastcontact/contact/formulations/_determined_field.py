@@ -1,6 +1,6 @@
 r"""Pressure fields that remain determined by their integration points on partly covered facets.
 
-The points of a facet that faces the other side with a strip of itself determine next to nothing of a field over all of
+The points of a facet that faces the other side with a strip of itself hardly determine a field over all of
 it: on a strip of a fraction :math:`\theta` at the end of a line, what a polynomial of degree k is at the other end weighs
 :math:`\theta^{2k+1}`. How well a facet determines its field says the smallest eigenvalue of its mass matrix over what takes
 part, relative to that over the whole facet. Where it is too small the field is a simpler one there: linear between the

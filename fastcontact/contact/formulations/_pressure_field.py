@@ -35,7 +35,7 @@ from fastcontact.contact.multiplier_field import Projection
 from fastcontact.contact.pairing import Candidates, Pairing, normals
 from fastcontact.errors import ContactError
 
-# The area of a node on the axis vanishes but for rounding errors; what is below this part of the largest is none.
+# The area of a node on the axis vanishes but for rounding errors; what is below this part of the largest counts as zero.
 NO_AREA = 1e-9
 # Corners of quadratic faces have next to none, or less.
 NO_SHARE = 1e-3

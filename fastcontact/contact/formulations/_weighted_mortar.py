@@ -385,7 +385,7 @@ class WeightedPressures(NodalField):
         """Return forces over the whole areas of the positive functions; see `_at_nodes`.
 
         A node may face the other side with as little as it likes, and its force goes to nothing with that: over what it
-        faces its pressure is as good as undetermined, over all that belongs to it it is not.
+        faces its pressure is nearly undetermined, over all that belongs to it it is not.
         """
         return self._at_nodes(np.divide(force, self.tested, out=np.zeros_like(force), where=self.tested > 0.0))
 

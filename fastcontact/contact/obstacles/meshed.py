@@ -77,7 +77,7 @@ class MeshedSurface:
         return f"MeshedSurface('{self.group}', {len(self._facets.beyond)} facets)"
 
     def check_apart(self, mesh: Mesh) -> None:
-        """Raise ContactError if the surface is part of `mesh` and hangs on solid cells there."""
+        """Raise ContactError if the surface is part of `mesh` and belongs to solid cells there."""
         if mesh.points is not self.mesh.points and not np.array_equal(mesh.points, self.mesh.points):
             return
         solid = np.zeros(mesh.n_points, bool)

@@ -1,7 +1,7 @@
 """Inverse of the pivot columns: small independent blocks, or a factorisation where constraints of many nodes are coupled.
 
 Gaps weighted with standard multipliers are coupled by a mass matrix of the secondary surface, whose inverse is full. Its
-factors are not: a solution costs next to nothing beside a product with the stiffness. Preconditioners need sparse weights
+factors are not: a solution is cheap beside a product with the stiffness. Preconditioners need sparse weights
 and take a sparse inverse instead, that of one block a node which does the same to translations.
 """
 

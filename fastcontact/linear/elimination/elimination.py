@@ -33,7 +33,7 @@ class Elimination:
     own_inverse : csr_array (m, m), optional
         P^-1, where it is not.
     compliance : ndarray (m,), optional
-        By how much the equations give way by themselves: ``B u + compliance * multiplier = c`` [length / force].
+        Compliance of the equations themselves: ``B u + compliance * multiplier = c`` [length / force].
     """
 
     pivots: Indices

@@ -28,7 +28,7 @@ from fastcontact.linear.springs import Springs
 SPECTRUM_CHANGED = 2.0
 # Largest eigenvalue of the finest level, beside its diagonal, from which it counts as wide; 3 to 4 on well-shaped hexahedra.
 WIDE = 6.0
-# Nodes that equations make so many times as stiff need more than the smoother and the coarser levels of K.
+# Nodes that equations stiffen by this factor need more than the smoother and the coarser levels of K.
 MUCH = 4.0
 
 

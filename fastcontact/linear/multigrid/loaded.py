@@ -1,7 +1,7 @@
 """Multigrid solution under linear constraints, some of which have a compliance of their own.
 
 An equation with a compliance of its own is a spring along its row. Springs not much stiffer than the body become part of the
-matrix and of the hierarchy; stiffer ones are eliminated like equations that do not give way, see `reduced`.
+matrix and of the hierarchy; stiffer ones are eliminated like exact equations, see `reduced`.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from fastcontact.linear.sparse_rows import scaled
 from fastcontact.linear.springs import Springs
 
 log = logging.getLogger("fastcontact")
-# Equations whose own stiffness is more than so many times that of the unknowns they act on are eliminated: as springs they
+# Equations whose own stiffness exceeds that of the unknowns they act on by this factor are eliminated: as springs they
 # take half as many iterations again there, and the root of the ratio as many beyond. The second where pivots are coupled,
 # whose weights are nearly right only.
 STIFF, STIFF_COUPLED = 10.0, 300.0

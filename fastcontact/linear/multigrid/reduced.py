@@ -30,7 +30,7 @@ class Reduced:
     springs : Springs, optional
         Added to K.
     diagonal : ndarray (n,), optional
-        That of K [force / length], where equations give way.
+        That of K [force / length], where equations have a compliance.
 
     Attributes
     ----------
@@ -122,7 +122,7 @@ class _Excess:
         self._elimination, self._pivots = elimination, elimination.pivots
         gives, self._compliance = compliance > 0.0, compliance
         self._stiffness = np.divide(1.0, compliance, out=np.zeros(len(compliance)), where=gives)
-        # Its own stiffness and that of the pivot; an equation that does not give way stays as it is.
+        # Its own stiffness and that of the pivot; an exact equation stays as it is.
         inverse = elimination.own_inverse
         if inverse is None:
             inverse = elimination.with_sparse_weights().inverse

@@ -56,7 +56,7 @@ STOOD, LONGEST_WARM = 0.2, 40
 FALLS, STANDING = 0.99, 40
 # Smaller contrasts of materials are taken for none.
 MILD = 10.0
-# Where the smoother amplifies something, its bound of the spectrum is raised by this factor, so many times.
+# Where the smoother amplifies something, its bound of the spectrum is raised by this factor, at most so often.
 RAISE, RAISES = 1.3, 4
 
 

@@ -7,7 +7,7 @@ of the other side become as stiff as that, and two things go wrong:
   corrects these by the stiffness of their body alone.
 - Aggregates that they share with softer neighbours would move the stiff body: such coarse motions cost far too much energy,
   and coarse levels correct neither side. Their corrections therefore see it the other way round: the unknowns of stiffened
-  nodes follow the pivots, ``u = S u`` (`followers`), and the pivots then follow them as ever, ``u = T u``. Coarse matrices
+  nodes follow the pivots, ``u = S u`` (`followers`), and the pivots then follow them as usual, ``u = T u``. Coarse matrices
   are Galerkin products with ``T S P`` (`composed`).
 """
 

@@ -86,7 +86,7 @@ class ModelContact(ModelConnections):
               takes its ``energy`` by area [pressure length]: a mapping of these, and of ``shear_strength``, ``shear_energy``
               (by default as in opening), ``stiffness`` (by default the strength is reached at a hundredth of the opening at
               break) [pressure / length], and ``exponent``, that of Benzeggagh and Kenane between the modes (2) [-]. It is
-              without stress as the sides lie, also across gaps, and gives way by its stiffness where it is pressed. Damage
+              without stress as the sides lie, also across gaps, and has its stiffness where it is pressed. Damage
               is in the results. ``adhesion``: attraction without memory, a mapping of ``work``, of adhesion by area,
               ``strength`` and ``stiffness``, likewise; along the sides it has no resistance.
             - ``slip``: ``"symmetric"`` (default): closing a gap along the mean of both sides' normals is no slip;

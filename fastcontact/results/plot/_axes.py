@@ -67,7 +67,7 @@ class Panels(tuple[Any, ...]):
 
 
 def drawable(ax: Any) -> Any:
-    """Return axes that were given; FastcontactError if they are none."""
+    """Return axes that were given; FastcontactError if they are not axes."""
     if not (hasattr(ax, "plot") and hasattr(ax, "figure")):
         raise FastcontactError(
             f"pictures are drawn on axes of matplotlib, not on {ax!r}: leave the argument out for new ones"
