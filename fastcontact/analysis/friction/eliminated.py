@@ -27,7 +27,7 @@ from fastcontact.linear.springs import Springs
 # Bound of the tangential stiffness across a slip, which is unbounded as the slip vanishes, in units of the stiffness of the
 # constraint. The solution does not depend on it, since nothing slips across there.
 STIFFEST = 100.0
-# Constraints are taken for so much softer than the unknowns that they act on are by themselves, since their neighbours deform.
+# Constraints are taken for so much softer than the unknowns that they act on are by themselves, since neighbours deform.
 # Nearly incompressible cells resist a single node far more than a surface (`LinearSolver.contrast`): beyond MILD, constraints
 # are softer still, with its root, or Newton's method reverses a few slips again and again (nu = 0.4999, 161 442 unknowns: 588
 # iterations, where it did not settle; nu = 0.499 did not care).
