@@ -14,7 +14,7 @@ from fastcontact.analysis.result_warnings import largest_rotation
 from fastcontact.analysis.run import solve_steps
 from fastcontact.analysis.support_forces import multipliers
 from fastcontact.arrays import Array, Numbers
-from fastcontact.cases.decks.blocks import Place, read_blocks
+from fastcontact.cases.decks.blocks import Location, read_blocks
 from fastcontact.cases.decks.building import Building
 from fastcontact.cases.decks.content import Content
 from fastcontact.cases.decks.reading import read_content
@@ -160,7 +160,7 @@ class Deck:
             strain = self._largest_strain(step)
             angle, _ = largest_rotation(self.model.mesh, step.displacement)
             warn(
-                f"{asked.place}: NLGEOM, but small strains and rotations were solved; found an equivalent strain up to "
+                f"{asked.location}: NLGEOM, but small strains and rotations were solved; found an equivalent strain up to "
                 f"{strain:.3g} and a rotation up to {angle:.3g} radian, of which linear kinematics leave out the squares"
             )
             return
@@ -204,7 +204,7 @@ def read_deck(path: PathLike) -> Deck:
     file = existing_file(path)
     content = read_content(read_blocks(file))
     if not content.steps:
-        raise Place(file.name, 1, "STEP").refuse("the deck has no step, so nothing is loaded")
+        raise Location(file.name, 1, "STEP").refuse("the deck has no step, so nothing is loaded")
     try:
         building = Building(content, _text(file))
     except (ModelError, MeshError, ContactError) as error:
@@ -212,8 +212,8 @@ def read_deck(path: PathLike) -> Deck:
     if building.linearised:
         step = next(step for step in content.steps if step.nonlinear)
         warn(
-            f"{step.place}: NLGEOM: with {building.linearised} small strains and rotations are solved; the result is valid "
-            "only while they stay small, and a warning after the solution tells how large they are"
+            f"{step.location}: NLGEOM: with {building.linearised} small strains and rotations are solved; the result is "
+            "valid only while they stay small, and a warning after the solution tells how large they are"
         )
     return Deck(
         path=file,
@@ -235,7 +235,7 @@ def _text(path: Path) -> str:
 
 def _notes(content: Content, thickness: float) -> tuple[str, ...]:
     notes = list(dict.fromkeys(content.notes))
-    requests = {place.keyword for place in content.outputs}
+    requests = {location.keyword for location in content.outputs}
     if output := sorted(requests - {"CONTROLS"}):
         kinds = ", ".join(f"*{keyword}" for keyword in output)
         notes.append(f"{kinds}: no effect, the result file holds all output of all steps")
