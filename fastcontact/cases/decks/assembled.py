@@ -190,8 +190,9 @@ class Assembled:
             whole, _, left = self.faces_of_nodes(definition, scope)
             if left:
                 raise definition.location.refuse(
-                    f"the nodes of surface '{definition.name}' make up no whole faces: {len(left)} belong to none (first: node "
-                    f"{self.number_of(left[0])}), and *{location.keyword} in line {location.line} needs faces, TYPE=ELEMENT"
+                    f"the nodes of surface '{definition.name}' make up no whole faces: {len(left)} belong to none "
+                    f"(first: node {self.number_of(left[0])}), and *{location.keyword} in line {location.line} "
+                    "needs faces, TYPE=ELEMENT"
                 )
             return whole
         if (label := folded(name)) not in self.surfaces:
