@@ -20,18 +20,18 @@ MATERIAL = "*MATERIAL, NAME=STEEL\n*ELASTIC\n210000., 0.3\n*DENSITY\n7.8E-9\n*EX
 BLOCK = "*SOLID SECTION, ELSET={}, MATERIAL=STEEL\n"
 
 
-def both(text, folder):
+def both(text, folder, asked="U, RF"):
     """Return, of every step that both end, the step here and CalculiX's displacements and forces (n, dim)."""
     path = folder / "deck.inp"
     path.write_text(text, encoding="utf-8")
     deck = fc.read_deck(path)
     numbers = list(range(1, deck.model.mesh.n_points + 1))
-    found = calculix.solved(path, folder, numbers)
+    found = calculix.solved(path, folder, numbers, asked=asked)
     dim, steps = deck.model.mesh.dim, []
     for step in deck.solve():
         for time, tables in found.items():
             if abs(time - step.load_factor) < 1e-9 and step.load_factor == round(step.load_factor):
-                theirs = [np.array([tables[name][n][:dim] for n in numbers]) for name in ("U", "RF")]
+                theirs = [np.array([tables[name][n][:dim] for n in numbers]) for name in asked.split(", ")]
                 steps.append((step, *theirs))
     assert len(steps) == round(deck.ramp.instants[-1])
     return steps
@@ -196,3 +196,48 @@ def test_a_cylinder_pressed_on_a_block(law, element, force, shape, tmp_path):
     ((step, U, RF),) = both(text, tmp_path)
     assert deviation(step, U) < shape
     assert reaction_differs(step, RF, mesh.points_of("CYLINDER_TOP"), 1) < force
+
+
+CONDUCTING = """*MATERIAL, NAME=STEEL
+*ELASTIC
+210000., 0.3
+*EXPANSION
+1.2E-5
+*CONDUCTIVITY
+50.
+"""
+
+
+EXACTLY = "*CONTROLS, PARAMETERS=FIELD\n1.E-9, 1.E-9\n"  # CalculiX's own criterion leaves 1e-4 of the temperatures
+
+
+def on_faces(text, surface, letter, values):
+    """Return data lines of a surface's faces with the labels of fluxes or films."""
+    faces = text.split(f"NAME={surface}, TYPE=ELEMENT\n")[1].split("*")[0]
+    return faces.replace("S", letter).replace("\n", f", {values}\n")
+
+
+@pytest.mark.parametrize("element", ["hex8", "hex20"])
+def test_heat_of_a_source_through_two_blocks_into_a_film(element, tmp_path):
+    mesh = stacked(element, (2, 2, 2), (2, 2, 2))
+    text = stack_deck(mesh, "*SURFACE INTERACTION, NAME=I\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n1.E9\n")
+    text = text.replace(MATERIAL, CONDUCTING).replace("1.E9\n", "1.E9\n*GAP CONDUCTANCE\n7.\n")
+    text += "*CONTACT PAIR, INTERACTION=I, TYPE=SURFACE TO SURFACE\nS_U_ZMIN, S_L_ZMAX\n"
+    text += "*BOUNDARY\nL_ZMIN, 11, 11, 100.\n*STEP\n*HEAT TRANSFER, STEADY STATE\n" + EXACTLY
+    text += "*DFLUX\nL_BOX, BF, 4.\n*FILM\n" + on_faces(text, "S_U_ZMAX", "F", "30., 2.") + "*END STEP\n"
+    ((step, NT),) = both(text, tmp_path, "NT")
+    assert abs(step.temperature - NT[:, 0]).max() < DIGITS * np.ptp(NT)
+
+
+def test_a_bar_bends_by_the_heat_that_passes(tmp_path):
+    """Of temperatures that are linear in space: CalculiX takes thermal strains of quadratic cells from their corners."""
+    mesh = bar("hex20")
+    text = deck_of(mesh, ["BOX"], ["XMIN", "ZMIN"], ["ZMAX"]) + CONDUCTING + BLOCK.format("BOX")
+    text += "*INITIAL CONDITIONS, TYPE=TEMPERATURE\n" + "".join(f"{n}, 20.\n" for n in range(1, mesh.n_points + 1))
+    text += (
+        "*BOUNDARY\nXMIN, 1, 3\nZMIN, 11, 11, 60.\n*STEP\n*UNCOUPLED TEMPERATURE-DISPLACEMENT, STEADY STATE\n1., 1.\n"
+    )
+    text += EXACTLY + "*DFLUX\n" + on_faces(text, "S_ZMAX", "S", "800.") + "*END STEP\n"
+    ((step, NT, U),) = both(text, tmp_path, "NT, U")
+    assert abs(step.temperature - NT[:, 0]).max() < DIGITS * np.ptp(NT)
+    assert deviation(step, U) < DIGITS

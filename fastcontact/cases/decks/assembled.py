@@ -81,6 +81,11 @@ class Assembled:
         return [own for elements in self.elements.values() for own in elements.values() if own.type is not None]
 
     @cached_property
+    def of_solids(self) -> set[int]:
+        """The points of all solids."""
+        return {point for own in self.solids for point in own.points}
+
+    @cached_property
     def discrete(self) -> list[Element]:
         """All gap elements and springs."""
         return [own for elements in self.elements.values() for own in elements.values() if own.type is None]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,8 @@ from fastcontact.cases.decks.blocks import Place, folded
 from fastcontact.cases.decks.conditions import Acting, Component, Conditions, Distributed
 from fastcontact.cases.decks.content import Content, Interaction, Material, Pair, Section, Step
 from fastcontact.cases.decks.cyclic_symmetry import add_sectors
-from fastcontact.cases.decks.histories import JUMP, shape_of
+from fastcontact.cases.decks.heat import HELD, conductance_of, friction_heat_of, perfect_conductance
+from fastcontact.cases.decks.histories import JUMP, Histories, by_shape
 from fastcontact.cases.decks.initial_stresses import add_initial_stresses
 from fastcontact.cases.decks.local_axes import local_axes, orientation_of
 from fastcontact.cases.decks.meshing import DeckMesh, begun, group_of_surface, secondary_group
@@ -26,7 +26,7 @@ from fastcontact.cases.decks.nonlinear import strain_of
 from fastcontact.cases.decks.pretension import add_sections, cut_sections
 from fastcontact.cases.decks.relating import make_rotations, relations_of
 from fastcontact.cases.decks.stepping import MOST_PARTS
-from fastcontact.cases.decks.temperatures import add_temperatures
+from fastcontact.cases.decks.temperatures import add_temperatures, along_axes
 from fastcontact.contact.integration import all_nodes_carry
 from fastcontact.contact.obstacles.shapes import HalfSpace
 from fastcontact.elasticity.anisotropic_materials import Orthotropic
@@ -64,22 +64,40 @@ class Building:
         self.content = content
         self.made: Assembled = assembled(content)
         self.found: DeckMesh = begun(self.made)
-        make_rotations(self.found)
+        alone = content.heat == "alone"
+        if not alone:
+            make_rotations(self.found)
         materials, self.thickness = self._materials()
         conditions = Conditions(self.found)
         self._check_pairs()
         conditions.run()
         groups = self._groups(conditions)
-        gaps = self._gap_groups()
-        mesh = cut_sections(self.found, self.found.mesh())
+        heat = conditions.heat.loads(self.thickness)
+        gaps = {} if alone else self._gap_groups()
+        mesh = self.found.mesh() if alone else cut_sections(self.found, self.found.mesh())
         strain, self.linearised = strain_of(content, [law for law, _ in materials])
-        self.model = Model(mesh, self.found.kinematics, case_text, strain=strain)
+        reference = conditions.heat.reference
+        self.model = Model(mesh, self.found.kinematics, case_text, strain=strain, reference_temperature=reference)
         for material, group in materials:
             self.model.add_material(material, group)
         self.local_supports: list[Relation] = []
+        self.links: list[Relation] = []
+        if alone:
+            self.model.fix(self._point_group("held", range(mesh.n_points)), "xyz"[: mesh.dim])
+            add_sectors(self.model, self.found)
+        else:
+            self._mechanics(conditions, groups)
+        for add in heat:
+            add(self.model)
+        self._contact()
+        self.gap_ends = self._gaps(gaps, conditions)
+        self.ramp = self._ramp(conditions)
+
+    def _mechanics(self, conditions: Conditions, groups: list[tuple[str, Table]]) -> None:
+        """Add supports, relations, loads, temperatures and springs to the model."""
         self._supports(conditions)
-        self.links = relations_of(self.found, self.model.mesh)
-        self.model.relations.extend(self.links)
+        self.links += relations_of(self.found, self.model.mesh)
+        self.model.relations += self.links
         self.links += add_sections(self.model, self.found, conditions.locks)
         self.links += add_sectors(self.model, self.found)
         self._forces(conditions)
@@ -88,9 +106,6 @@ class Building:
         add_temperatures(self.model, conditions.temperatures)
         add_initial_stresses(self.model, self.found)
         self._springs()
-        self._contact()
-        self.gap_ends = self._gaps(gaps, conditions)
-        self.ramp = self._ramp(conditions)
 
     def _materials(self) -> tuple[list[tuple[Any, str]], float]:
         """Return materials with groups of solids, and the thickness; every solid needs a section."""
@@ -147,7 +162,7 @@ class Building:
         if material is None:
             known = ", ".join(m.name for m in self.content.materials.values()) or "none"
             raise section.place.refuse(f"material '{section.material}' is not defined; materials: {known}")
-        if material.law is None:
+        if material.law is None and self.content.heat != "alone":
             raise material.place.refuse(f"material '{material.name}' has no *ELASTIC")
         return material
 
@@ -195,7 +210,7 @@ class Building:
         return name
 
     def _supports(self, conditions: Conditions) -> None:
-        mesh, alike = self.model.mesh, {}  # type: tuple[Any, dict[tuple[int, Table], list[int]]]
+        mesh, alike = self.model.mesh, {}  # type: tuple[Any, dict[int, list[tuple[Table, list[int]]]]]
         temporary = conditions.temporary()
         self._temporary_supports(conditions, temporary)
         at_times = {name for name, _ in temporary}
@@ -205,8 +220,8 @@ class Building:
                 if local:
                     self._local_support(conditions, name, table)
                 else:
-                    alike.setdefault((axis, table), []).append(point)
-        for axis, points, value, table in _by_shape(alike):
+                    alike.setdefault(axis, []).append((table, [point]))
+        for axis, points, value, table in _by_axis(alike):
             group = self._point_group("support", points)
             if callable(value) or any(factor for _, factor in table):
                 self.model.prescribe(group, ramp=table, **{"xyz"[axis]: value})
@@ -247,7 +262,7 @@ class Building:
         return csr_array((direction, (np.zeros(dim, int), columns)), shape=(1, self.model.n_dofs))
 
     def _forces(self, conditions: Conditions) -> None:
-        alike: dict[tuple[int, Table], list[int]] = {}
+        alike: dict[int, list[tuple[Table, list[int]]]] = {}
         for table, names in conditions.forces.alike():
             along: dict[tuple[int, float], list[int]] = {}
             for point, axis, local in names:
@@ -256,8 +271,8 @@ class Building:
                     along.setdefault((k, float(direction[k])), []).append(point)
             for (k, cosine), points in along.items():
                 scaled = tuple((t, v * cosine / self.thickness) for t, v in table)
-                alike.setdefault((k, scaled), []).extend(points)
-        for axis, points, value, table in _by_shape(alike):
+                alike.setdefault(k, []).append((scaled, points))
+        for axis, points, value, table in _by_axis(alike):
             if any(factor for _, factor in table):
                 group = self._point_group("force", points)
                 self.model.add_force(group, distribute=False, ramp=table, **{"xyz"[axis]: value})
@@ -314,7 +329,7 @@ class Building:
     def _contact(self) -> None:
         for pair in self.content.pairs:
             secondary, primary = (group_of_surface(self.found, name) for name in (pair.secondary, pair.primary))
-            options = {"kind": "tied"} if pair.tied else self._options(pair)
+            options = self._tied(pair) if pair.tied else self._options(pair)
             if secondary in self.found.loose:
                 options.update(self._at_nodes(pair, secondary))
             try:
@@ -335,7 +350,9 @@ class Building:
 
     def _options(self, pair: Pair) -> dict[str, Any]:
         law = self.content.interactions[folded(pair.interaction)]
-        options: dict[str, Any] = {}
+        options: dict[str, Any] = conductance_of(self.content, law) if self.content.heat else {}
+        if self.content.heat == "alone":
+            return {**options, "kind": "gap_only", **self._fitted(pair)}
         if law.kind != "unilateral":
             if law.friction or law.changes:
                 raise law.place.refuse(f"friction with {law.kind} contact is not supported")
@@ -343,12 +360,21 @@ class Building:
         if law.penalty is not None and law.kind != "tied":
             options["penalty"] = law.penalty
         options.update(_friction(law, len(self.content.steps)))
-        if pair.adjust or pair.clearance is not None:
-            options.update(self._fitted(pair))
-        return options
+        if "friction" in options and self.content.heat:
+            options.update(friction_heat_of(self.content, law))
+        return {**options, **self._fitted(pair)}
+
+    def _tied(self, pair: Pair) -> dict[str, Any]:
+        """Return the options of a tie, through which heat passes where it is computed."""
+        if not self.content.heat:
+            return {"kind": "tied"}
+        kind = "gap_only" if self.content.heat == "alone" else "tied"
+        return {"kind": kind, "conductance": perfect_conductance(self.content, self.model, pair.place)}
 
     def _fitted(self, pair: Pair) -> dict[str, Any]:
         """Return the clearance that brings the sides to where ADJUST or *CLEARANCE say; refused where no number does."""
+        if not pair.adjust and pair.clearance is None:
+            return {}
         secondary, primary = (group_of_surface(self.found, name) for name in (pair.secondary, pair.primary))
         gaps, places = nodal_gaps(self.model, secondary, primary, self.found.loose.get(secondary, []))
         size = TOUCHING * float(np.ptp(self.model.mesh.points, axis=0).max())
@@ -428,7 +454,8 @@ class Building:
         if any(pair.options.get("friction") for pair in self.model.contact):
             for number, step in enumerate(steps):
                 instants.update(number + part for part in _parts(step))
-        for histories in (conditions.supports, conditions.forces, conditions.loads, conditions.temperatures):
+        mechanical: tuple[Histories[Any], ...] = (conditions.supports, conditions.forces, conditions.loads)
+        for histories in (*mechanical, conditions.temperatures, *conditions.heat.histories):
             for track in histories.distinct():
                 instants.update(round(time, 12) for time, _ in track.points if abs(time - round(time)) > 1e-6)
         if len(instants) > LONGEST_RAMP:
@@ -458,8 +485,12 @@ def _friction(law: Interaction, n_steps: int) -> dict[str, Any]:
 
 def _law(content: Content, material: Material, axes: Any, modes: bool) -> Any:
     """Return the material of the model along axes, with its expansion and incompatible modes where elements have them."""
+    if content.heat == "alone":
+        return _with_axes(HELD, axes, conductivity=_conductivity(content, material))
     assert material.law is not None
     law, expansion = material.law(axes), material.expansion
+    if isinstance(law, NonlinearElastic) and content.heat:
+        raise material.place.refuse(f"material '{material.name}': heat is supported in elastic bodies only")
     if isinstance(law, NonlinearElastic):
         if modes:
             content.note(
@@ -469,16 +500,45 @@ def _law(content: Content, material: Material, axes: Any, modes: bool) -> Any:
         object.__setattr__(law, "density", material.density)
         return law
     law = replace(law, incompatible_modes=modes, density=material.density)
-    heated = any(given.block.keyword == "TEMPERATURE" for step in content.steps for given in step.given)
+    if content.heat or material.conductivity is not None:
+        law = _with_axes(law, axes, conductivity=_conductivity(content, material))
+    heated = content.heat or any(given.block.keyword == "TEMPERATURE" for step in content.steps for given in step.given)
     if expansion is None:
         if heated:
             content.note(material.place, f"material '{material.name}' has no *EXPANSION: temperatures do not strain it")
         return replace(law, expansion=0.0) if heated else law
     if not heated:
         content.note(material.place, f"material '{material.name}': without temperatures the expansion has no effect")
-    if isinstance(law, LinearElastic) and isinstance(expansion, tuple):
-        law = Orthotropic((law.E,) * 3, (law.nu,) * 3, (law.E / (2.0 * (1.0 + law.nu)),) * 3, axes)
-    return replace(law, expansion=expansion)
+    return _with_axes(law, axes, expansion=expansion)
+
+
+def _conductivity(content: Content, material: Material) -> float | tuple[float, ...] | None:
+    """Return the conductivity of a material; CaseError where heat is computed and there is none."""
+    block = material.conductivity
+    if content.heat:
+        if block is None:
+            raise material.place.refuse(f"material '{material.name}' has no *CONDUCTIVITY")
+        return along_axes(material, block)
+    if block is not None:
+        content.note(block.place, f"material '{material.name}': no effect, temperatures are given, not computed")
+    return None
+
+
+def _with_axes(law: Any, axes: Any, **constants: Any) -> Any:
+    """Return a material with further constants, orthotropic where these differ along the axes."""
+    if isinstance(law, LinearElastic) and any(isinstance(value, tuple) for value in constants.values()):
+        G = law.E / (2.0 * (1.0 + law.nu))
+        kept = {name: getattr(law, name) for name in ("density", "expansion", "conductivity")}
+        law = Orthotropic((law.E,) * 3, (law.nu,) * 3, (G,) * 3, axes, **kept)
+    return replace(law, **constants)
+
+
+def _by_axis(
+    alike: Mapping[int, list[tuple[Table, list[int]]]],
+) -> Iterator[tuple[int, list[int], Any, Table]]:
+    """Yield axis, points, value and history of what points have by axis, as `by_shape` does."""
+    for axis, members in alike.items():
+        yield from ((axis, *own) for own in by_shape(members))
 
 
 def _parts(step: Step) -> list[float]:
@@ -520,30 +580,3 @@ def nodal_gaps(model: Model, secondary: str, primary: str, without: Sequence[int
     gaps, _ = found.nodal_gap(Configuration.undeformed(places))
     faced = np.isfinite(gaps) & ~np.isin(found.secondary.points, without)
     return (gaps[faced], places[found.secondary.points[faced]]) if faced.any() else (np.zeros(1), places[:1])
-
-
-def _by_shape(alike: Mapping[tuple[int, Table], list[int]]) -> Iterator[tuple[int, list[int], Any, Table]]:
-    """Yield axis, points, value and history of what points have by axis and history, once for histories of one shape.
-
-    The value is 1, or a function that returns those of the points, ascending, where they differ.
-    """
-    shapes: dict[tuple[int, Table], dict[Table, float]] = {}
-    for axis, table in alike:
-        size, shape = shape_of(table)
-        shapes.setdefault((axis, shape), {})[table] = size
-    for (axis, shape), sizes in shapes.items():
-        if len(sizes) == 1:
-            table = next(iter(sizes))
-            yield axis, alike[axis, table], 1.0, table
-            continue
-        values: dict[int, float] = {}
-        for table, size in sizes.items():
-            for point in alike[axis, table]:
-                values[point] = values.get(point, 0.0) + size
-        points = sorted(values)
-        yield axis, points, partial(_given, np.array([values[point] for point in points])), shape
-
-
-def _given(values: Array, positions: Array) -> Array:
-    """Return values (n,) that nodes have whatever their positions (n, dim)."""
-    return values

@@ -105,6 +105,7 @@ class Material:
     law: Callable[[Any], Any] | None = None
     density: float | None = None
     expansion: float | tuple[float, ...] | None = None
+    conductivity: Block | None = None
 
 
 @dataclass
@@ -117,6 +118,8 @@ class Interaction:
     friction: float = 0.0
     stick: float | None = None
     kind: str = "unilateral"
+    conductance: list[Block] = field(default_factory=list)
+    friction_heat: tuple[Place, float] | None = None
     changes: list[tuple[int, Interaction]] = field(default_factory=list)  # of friction, by the number of steps before
 
 
@@ -247,6 +250,7 @@ class Step:
     increment: float = 1.0
     static: bool = False
     perturbation: bool = False
+    heat: str = ""  # "alone", "coupled" with displacements, or not computed
     modes: int = 0
     given: list[Given] = field(default_factory=list)
 
@@ -278,6 +282,7 @@ class Content:
     initial: list[Block] = field(default_factory=list)
     stresses: list[Block] = field(default_factory=list)
     steps: list[Step] = field(default_factory=list)
+    heat: str = ""  # as that of its steps
     modes: dict[str, Any] | None = None
     notes: list[str] = field(default_factory=list)
     outputs: list[Place] = field(default_factory=list)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -127,8 +127,11 @@ class Deck:
             )
             for name, c in step.contact.items()
         }  # fmt: skip
-        work = {"work": {name: t * value for name, value in step.work.items()}} if step.work else {}
-        return replace(step, reaction=t * reaction, contact=whole, iterations=step.iterations | work)
+        sums = {name: _times(t, step.iterations[name]) for name in ("work", "heat") if step.iterations.get(name)}
+        heat = None if step.heat_reaction is None else t * step.heat_reaction
+        return replace(
+            step, reaction=t * reaction, contact=whole, iterations=step.iterations | sums, heat_reaction=heat
+        )
 
     def _supports_alone(self, reaction: Array, instant: float) -> Array:
         """Return nodal forces (n_points, dim) without those of relations, found where no support acts [force]."""
@@ -226,6 +229,14 @@ def read_deck(path: PathLike) -> Deck:
         modes=content.modes,
         building=building,
     )
+
+
+def _times(factor: float, sums: Mapping[str, Any]) -> dict[str, Any]:
+    """Return sums of works or powers, also those by name, times a factor; what counts exchanges stays."""
+    return {
+        name: _times(factor, value) if isinstance(value, dict) else value if name == "exchanges" else factor * value
+        for name, value in sums.items()
+    }
 
 
 def _text(path: Path) -> str:

@@ -123,6 +123,10 @@ def begun(made: Assembled) -> DeckMesh:
             raise element.cell.place.refuse(
                 f"elements of type {element.solid.name} and {first.name} ({first.kinematics}) cannot be in one model"
             )
+        if element.solid.conducts and made.content.heat != "alone":
+            raise element.cell.place.refuse(
+                f"elements of type {element.solid.name} conduct heat alone: they need steps with *HEAT TRANSFER, all of them"
+            )
     dim, points = 3 if first.kinematics == "3d" else 2, made.points
     if dim == 2 and np.ptp(points[:, 2]) > FLAT * np.ptp(points[:, :2]):
         raise made.solids[0].cell.place.refuse(

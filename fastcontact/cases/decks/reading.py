@@ -9,6 +9,7 @@ from fastcontact.cases.decks import (
     connections,
     cyclic_symmetry,
     geometry,
+    heat,
     nonlinear,
     pretension,
     properties,
@@ -33,12 +34,14 @@ OF_MATERIALS: dict[str, Callable[[Content, Material, Block], None]] = {
     "HYPERELASTIC": nonlinear.hyperelastic,
     "DENSITY": properties.density,
     "EXPANSION": temperatures.expansion,
-    "CONDUCTIVITY": temperatures.without_effect,
-    "SPECIFIC HEAT": temperatures.without_effect,
+    "CONDUCTIVITY": heat.conductivity,
+    "SPECIFIC HEAT": heat.specific_heat,
 }
 OF_INTERACTIONS: dict[str, Callable[[Content, Interaction, Block], None]] = {
     "SURFACE BEHAVIOR": properties.behaviour,
     "FRICTION": properties.friction,
+    "GAP CONDUCTANCE": heat.gap_conductance,
+    "GAP HEAT GENERATION": heat.gap_heat_generation,
 }
 OF_MODELS: dict[str, Callable[[Content, Block], None]] = {
     "AMPLITUDE": properties.amplitude,
@@ -56,7 +59,14 @@ OF_MODELS: dict[str, Callable[[Content, Block], None]] = {
     "RIGID BODY": connections.rigid_body,
     "TRANSFORM": connections.transform,
 }
-IN_STEPS = ("BOUNDARY", "CLOAD", "DLOAD", "DSLOAD", "TEMPERATURE")
+IN_STEPS = ("BOUNDARY", "CLOAD", "DLOAD", "DSLOAD", "TEMPERATURE", *heat.OF_HEAT)
+PROCEDURES: dict[str, Callable[[Content, Step, Block], None]] = {
+    "STATIC": stepping.static,
+    "FREQUENCY": stepping.frequency,
+    "HEAT TRANSFER": stepping.heated,
+    "COUPLED TEMPERATURE-DISPLACEMENT": stepping.heated,
+    "UNCOUPLED TEMPERATURE-DISPLACEMENT": stepping.heated,
+}
 
 
 @dataclass
@@ -105,6 +115,10 @@ class Reader:
         elif keyword in IN_STEPS:
             self._not_in_part(block)
             stepping.given(content, self.step, block)
+        elif keyword in PROCEDURES:
+            if self.step is None:
+                raise block.place.refuse("belongs into a step")
+            PROCEDURES[keyword](content, self.step, block)
         else:
             getattr(self, "_" + keyword.lower().replace(" ", "_"))(block)
 
@@ -171,16 +185,6 @@ class Reader:
         self._not_in_part(block)
         self.step = stepping.new_step(self.content, block)
 
-    def _static(self, block: Block) -> None:
-        if self.step is None:
-            raise block.place.refuse("belongs into a step")
-        stepping.static(self.content, self.step, block)
-
-    def _frequency(self, block: Block) -> None:
-        if self.step is None:
-            raise block.place.refuse("belongs into a step")
-        stepping.frequency(self.step, block)
-
     def _end_step(self, block: Block) -> None:
         if self.step is None:
             raise block.place.refuse("there is no step to end")
@@ -197,4 +201,5 @@ def read_content(blocks: Iterable[Block]) -> Content:
         raise reader.step.place.refuse("the step has no *END STEP: the deck is cut off, or the line is missing")
     if reader.coupling is not None:
         raise reader.coupling.place.refuse("*KINEMATIC or *DISTRIBUTING must follow")
+    heat.check_steps(reader.content)
     return reader.content

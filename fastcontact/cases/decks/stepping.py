@@ -43,7 +43,17 @@ def static(content: Content, step: Step, block: Block) -> None:
             raise row.place.refuse("the increment and the length of the step must be positive")
 
 
-def frequency(step: Step, block: Block) -> None:
+def heated(content: Content, step: Step, block: Block) -> None:
+    """*HEAT TRANSFER, *COUPLED and *UNCOUPLED TEMPERATURE-DISPLACEMENT: as *STATIC, of steady heat."""
+    if "STEADY STATE" not in block.parameters:
+        raise block.place.refuse("only STEADY STATE is supported: heat is not followed in time")
+    static(content, step, block)
+    step.heat = "alone" if block.keyword == "HEAT TRANSFER" else "coupled"
+    if block.keyword[:2] == "UN":
+        content.note(block.place, "temperatures and displacements are solved together")
+
+
+def frequency(content: Content, step: Step, block: Block) -> None:
     """*FREQUENCY: how many modes."""
     if step.static or step.modes:
         raise block.place.refuse("a step has either *STATIC or one *FREQUENCY")
@@ -57,7 +67,7 @@ def end_step(content: Content, step: Step) -> None:
     """*END STEP: what a step with *FREQUENCY asks for is kept, and no load step."""
     if not step.modes:
         if not step.static:
-            raise step.place.refuse("the step has no *STATIC, so it is unknown what to solve")
+            raise step.place.refuse("the step has no *STATIC or other procedure, so it is unknown what to solve")
         return
     if step.given:
         raise step.given[0].block.place.refuse(

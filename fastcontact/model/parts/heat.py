@@ -55,8 +55,8 @@ class ModelHeat(ModelMaterials):
         self._heat(HeatSource(group_names(groups), value, table_of(ramp, "the ramp of the heat source")))
 
     @typed(ModelError)
-    def add_nodal_heat(self, group: str, value: float, *, ramp: History = None) -> None:
-        """Heat every node of a group by `value` [power]; in axisymmetry over the full circle."""
+    def add_nodal_heat(self, group: str, value: Value, *, ramp: History = None) -> None:
+        """Heat every node of a group by `value` [power], in axisymmetry over the full circle; as in `fix_temperature`."""
         self._heat(NodalHeat(group, value, table_of(ramp, f"the ramp of the heat at nodes of '{group}'")))
 
     @typed(ModelError)
