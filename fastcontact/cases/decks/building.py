@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import Assembled, Element, assembled, facet_points
 from fastcontact.cases.decks.blocks import Place, folded
+from fastcontact.cases.decks.cohesive import cohesion_of
 from fastcontact.cases.decks.conditions import Acting, Component, Conditions, Distributed
 from fastcontact.cases.decks.content import Content, Interaction, Material, Pair, Section, Step
 from fastcontact.cases.decks.cyclic_symmetry import add_sectors
@@ -353,6 +354,8 @@ class Building:
         options: dict[str, Any] = conductance_of(self.content, law) if self.content.heat else {}
         if self.content.heat == "alone":
             return {**options, "kind": "gap_only", **self._fitted(pair)}
+        if law.cohesion:
+            return {**options, **cohesion_of(self.content, law), **self._fitted(pair, glued=True)}
         if law.kind != "unilateral":
             if law.friction or law.changes:
                 raise law.place.refuse(f"friction with {law.kind} contact is not supported")
@@ -371,13 +374,22 @@ class Building:
         kind = "gap_only" if self.content.heat == "alone" else "tied"
         return {"kind": kind, "conductance": perfect_conductance(self.content, self.model, pair.place)}
 
-    def _fitted(self, pair: Pair) -> dict[str, Any]:
-        """Return the clearance that brings the sides to where ADJUST or *CLEARANCE say; refused where no number does."""
-        if not pair.adjust and pair.clearance is None:
+    def _fitted(self, pair: Pair, glued: bool = False) -> dict[str, Any]:
+        """Return the clearance that brings the sides to where ADJUST or *CLEARANCE say; refused where no number does.
+
+        CaseError where sides that are `glued` are apart, which they would not be where they do not touch.
+        """
+        if not (pair.adjust or glued) and pair.clearance is None:
             return {}
         secondary, primary = (group_of_surface(self.found, name) for name in (pair.secondary, pair.primary))
         gaps, places = nodal_gaps(self.model, secondary, primary, self.found.loose.get(secondary, []))
         size = TOUCHING * float(np.ptp(self.model.mesh.points, axis=0).max())
+        if glued:
+            if gaps.max() > size or pair.clearance is not None:
+                raise pair.place.refuse(
+                    f"a cohesive layer between sides that are {gaps.max():.6g} apart is not supported"
+                )
+            return {}
         if pair.clearance is not None:
             if np.ptp(gaps) > size:
                 raise pair.place.refuse(
@@ -451,7 +463,7 @@ class Building:
         """Return the ends of all steps, of the increments of steps with friction, and the corners of all histories."""
         steps = self.content.steps
         instants = {float(number) for number in range(1, len(steps) + 1)}
-        if any(pair.options.get("friction") for pair in self.model.contact):
+        if any(pair.options.get("friction") or "cohesion" in pair.options for pair in self.model.contact):
             for number, step in enumerate(steps):
                 instants.update(number + part for part in _parts(step))
         mechanical: tuple[Histories[Any], ...] = (conditions.supports, conditions.forces, conditions.loads)

@@ -118,6 +118,7 @@ class Interaction:
     friction: float = 0.0
     stick: float | None = None
     kind: str = "unilateral"
+    cohesion: dict[str, Block] = field(default_factory=dict)
     conductance: list[Block] = field(default_factory=list)
     friction_heat: tuple[Place, float] | None = None
     changes: list[tuple[int, Interaction]] = field(default_factory=list)  # of friction, by the number of steps before

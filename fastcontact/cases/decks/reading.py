@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 from fastcontact.cases.decks import (
+    cohesive,
     connections,
     cyclic_symmetry,
     geometry,
@@ -40,6 +41,10 @@ OF_MATERIALS: dict[str, Callable[[Content, Material, Block], None]] = {
 OF_INTERACTIONS: dict[str, Callable[[Content, Interaction, Block], None]] = {
     "SURFACE BEHAVIOR": properties.behaviour,
     "FRICTION": properties.friction,
+    "COHESIVE BEHAVIOR": cohesive.keep,
+    "DAMAGE INITIATION": cohesive.keep,
+    "DAMAGE EVOLUTION": cohesive.keep,
+    "DAMAGE STABILIZATION": cohesive.stabilization,
     "GAP CONDUCTANCE": heat.gap_conductance,
     "GAP HEAT GENERATION": heat.gap_heat_generation,
 }
@@ -59,6 +64,7 @@ OF_MODELS: dict[str, Callable[[Content, Block], None]] = {
     "RIGID BODY": connections.rigid_body,
     "TRANSFORM": connections.transform,
 }
+IN_LAYERS = ("DAMAGE INITIATION", "DAMAGE EVOLUTION", "DAMAGE STABILIZATION")
 IN_STEPS = ("BOUNDARY", "CLOAD", "DLOAD", "DSLOAD", "TEMPERATURE", *heat.OF_HEAT)
 PROCEDURES: dict[str, Callable[[Content, Step, Block], None]] = {
     "STATIC": stepping.static,
@@ -95,6 +101,11 @@ class Reader:
                 raise block.place.refuse("belongs below *MATERIAL")
             OF_MATERIALS[keyword](content, self.material, block)
             return
+        if self.material is not None and keyword in IN_LAYERS:
+            name = self.material.name
+            raise block.place.refuse(
+                f"material '{name}': damage of bodies is outside of fastcontact, that of layers is not"
+            )
         self.material = None
         if keyword in OF_INTERACTIONS:
             if self.interaction is None:
