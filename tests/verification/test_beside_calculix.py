@@ -177,6 +177,33 @@ def test_a_sector_of_a_wheel(element, tmp_path):
     assert found[0][0].reaction[held, 1] == pytest.approx(-300.0 * lever, rel=5e-3)
 
 
+@pytest.mark.parametrize(("element", "differ"), [("hex8", 2e-3), ("hex20", 2e-3)])
+def test_a_sector_whose_ends_have_other_meshes(element, differ, tmp_path):
+    """Nodes of one end follow the facets of the other one; CalculiX interpolates between their triangles.
+
+    Free expansion, linear in space, is exact here; what the pressure does differs by the interpolation.
+    """
+    sectors, mesh = 12, box((1.0, 1.0, 0.4), (4, 3, 2), element)
+    s, t, z = mesh.points.T
+    radius, angle = 20.0 + 20.0 * (t + 0.3 * s * t * (1.0 - t)), (0.5 - s) * 2.0 * np.pi / sectors
+    mesh = mesh.replace(points=np.column_stack([radius * np.cos(angle), radius * np.sin(angle), 10.0 * z]))
+    inside = mesh.points_of("YMIN")
+    held = int(inside[np.abs(mesh.points[inside, 1]).argmin()])
+    text = deck_of(mesh, ["BOX"], ["ZMIN"], ["XMIN", "XMAX", "YMIN"]) + MATERIAL + BLOCK.format("BOX")
+    text += "*TIE, NAME=ROUND, CYCLIC SYMMETRY, POSITION TOLERANCE=0.1\nS_XMIN, S_XMAX\n"
+    text += f"*CYCLIC SYMMETRY MODEL, N={sectors}, NGRAPH=1, TIE=ROUND\n0., 0., 0., 0., 0., 1.\n"
+    free = np.setdiff1d(mesh.points_of("ZMIN"), [*mesh.points_of("XMIN"), *mesh.points_of("XMAX")])
+    text += "*BOUNDARY\n" + "".join(f"{node + 1}, 3\n" for node in free) + f"{held + 1}, 2\n"
+    text += f"*NSET, NSET=ALL, GENERATE\n1, {mesh.n_points}\n"
+    steps = "*STEP\n*STATIC\n*DSLOAD\nS_YMIN, P, 50.\n*END STEP\n"
+    ((step, U, _),) = both(text + steps, tmp_path)
+    assert deviation(step, U) < differ
+    heated = "*STEP\n*STATIC\n*TEMPERATURE\nALL, 100.\n*END STEP\n"
+    (tmp_path / "heated.inp").write_text(text + heated, encoding="utf-8")
+    (step,) = fc.read_deck(tmp_path / "heated.inp").solve()
+    assert step.displacement == pytest.approx(1.2e-3 * mesh.points, abs=1e-12)
+
+
 @pytest.mark.parametrize(
     ("law", "element", "force", "shape"), [("HARD", "quad4", 3e-3, 1e-2), ("LINEAR", "quad8", 1e-3, 4e-3)]
 )

@@ -102,6 +102,7 @@ class ModelBase:
         self.related_supports: list[tuple[str, Relation]] = []  # those of the relations that support a group
         self.springs: list[Springs] = []
         self.pretensions: list[Pretension] = []
+        self.interpolated: list[str] = []  # cyclic symmetries whose nodes follow facets
         self.seams: list[Seam] = []  # nodes that are one place of a part that repeats itself
         self.contact: list[ContactPair] = []
 

@@ -212,7 +212,8 @@ class ModelConnections(ModelInitialStates):
         Parameters
         ----------
         first, second : str
-            The ends: groups whose nodes lie upon each other after the turn, either way.
+            The ends: groups whose nodes lie upon each other after the turn, either way. Where meshes differ, groups of facets
+            that do: nodes of the end with more of them then follow the facets of the other one.
         sectors : int
             How many make the whole.
         origin : sequence of float (dim,), optional
@@ -223,7 +224,7 @@ class ModelConnections(ModelInitialStates):
         Raises
         ------
         MeshError, ModelError
-            If there are no such groups, their nodes do not lie upon each other (the largest distance is told), or
+            If there are no such groups, they do not lie upon each other (the largest distance is told), or
             kinematics are axisymmetric.
         """
         name = f"the cyclic symmetry of '{first}' and '{second}'"
@@ -238,7 +239,10 @@ class ModelConnections(ModelInitialStates):
             )
         relations, seam = cyclic(self.mesh, (first, second), sectors, place, along)
         self.relations.extend(relations)
-        self.seams.append(seam)
+        if seam is None:
+            self.interpolated.append(name)
+        else:
+            self.seams.append(seam)
 
     @typed(ModelError)
     def relate(

@@ -144,6 +144,10 @@ class ModelHeat(ModelMaterials):
                 "temperatures are both given by add_temperature and conducted: prescribe them by fix_temperature"
             )
         self.refuse_nonlinear("conduction of heat is")
+        if self.interpolated:
+            raise ModelError(
+                f"{self.interpolated[0]} joins meshes that differ, which no heat crosses: mesh its ends alike"
+            )
         self.conduction().check()
         lacking = [material for material, _ in self.materials if material.expansion is None]
         if self.expands and lacking:
