@@ -94,6 +94,10 @@ class Assembled:
         """Return the part of an instance, or what belongs to none."""
         return self.content.instances[scope].part if scope else self.content.root
 
+    def turned(self, scope: str) -> bool:
+        """Whether an instance is turned."""
+        return bool(scope and self.content.instances[scope].rotation)
+
     @cached_property
     def scopes(self) -> list[str]:
         """Names of all instances as they are looked up, and the empty one."""

@@ -21,7 +21,7 @@ from fastcontact.cases.decks.cyclic_symmetry import add_sectors
 from fastcontact.cases.decks.heat import HELD, conductance_of, friction_heat_of, perfect_conductance
 from fastcontact.cases.decks.histories import JUMP, Histories, by_shape
 from fastcontact.cases.decks.initial_stresses import add_initial_stresses
-from fastcontact.cases.decks.local_axes import local_axes, orientation_of
+from fastcontact.cases.decks.local_axes import axes_by_cell, local_axes, orientation_of
 from fastcontact.cases.decks.meshing import DeckMesh, begun, group_of_surface, secondary_group
 from fastcontact.cases.decks.nonlinear import strain_of
 from fastcontact.cases.decks.pretension import add_sections, cut_sections
@@ -137,7 +137,7 @@ class Building:
         found = []
         for (name, turned, modes), members in by_material.items():
             material = self.content.materials[name]
-            axes = self._axes(members[0].section)
+            axes = self._axes(members[0].given_section, members)
             group = f"material {material.name}" + (f" along {turned.lower()}" if turned else "")
             group += " with incompatible modes" if modes else ""
             found.append(
@@ -148,11 +148,18 @@ class Building:
             )
         return found, thickness or 1.0
 
-    def _axes(self, section: Section) -> Any:
-        """Return the axes of the material of a section, None for those of the mesh."""
+    def _axes(self, section: Section, members: Sequence[Element]) -> Any:
+        """Return the axes of the material of a section with its elements, None for those of the mesh."""
         if not section.orientation:
             return None
         axes = orientation_of(self.content, section.orientation, section.place)
+        for element in members:
+            if axes.part is not self.content.root and self.made.turned(element.scope):
+                raise axes.place.refuse(
+                    "axes of a part whose instance is turned are not supported: give them in the assembly"
+                )
+        if axes.distribution:
+            return axes_by_cell(self.made, axes, members)
         if axes.cylindrical:
             a, b = np.array(axes.points[:3]), np.array(axes.points[3:])
             return CylindricalAxes(tuple(a.tolist()), tuple((b - a).tolist()))

@@ -220,6 +220,8 @@ class Axes:
     nodes: str
     cylindrical: bool
     points: tuple[float, ...]
+    distribution: str = ""  # of material axes by cell, in place of points
+    part: Part | None = None  # where those of materials are defined
 
 
 @dataclass(frozen=True)
@@ -276,6 +278,7 @@ class Content:
     axes: list[Axes] = field(default_factory=list)
     pretensions: list[PretensionSection] = field(default_factory=list)
     orientations: dict[str, Axes] = field(default_factory=dict)
+    distributions: dict[str, Block] = field(default_factory=dict)
     amplitudes: dict[str, Amplitude] = field(default_factory=dict)
     gaps: dict[str, tuple[Place, float, tuple[float, ...]]] = field(default_factory=dict)
     springs: dict[str, tuple[Place, float]] = field(default_factory=dict)

@@ -86,18 +86,55 @@ def _moduli(values: list[float]) -> Array:
     return D[np.ix_(order, order)]
 
 
-def orientation(content: Content, block: Block) -> None:
+def distribution_table(content: Content, part: Part, block: Block) -> None:
+    """*DISTRIBUTION TABLE: what distributions hold, which axes of cells alone do here."""
+    kinds = [entry.upper() for row in block.rows for entry in row.entries if entry]
+    if kinds != ["COORD3D", "COORD3D"]:
+        raise block.place.refuse(
+            f"a distribution of {', '.join(kinds)[:80]} is not supported, only COORD3D, COORD3D of axes"
+        )
+
+
+def distribution(content: Content, part: Part, block: Block) -> None:
+    """*DISTRIBUTION: two points for the axes of each cell, seen from 0, 0, 0, by default those of the line without a cell."""
+    name = block.required("NAME")
+    block.choice("LOCATION", ("ELEMENT",))
+    if folded(name) in content.distributions:
+        raise block.place.refuse(f"distribution '{name}' is defined twice")
+    content.distributions[folded(name)] = block
+
+
+def orientation(content: Content, part: Part, block: Block) -> None:
     """*ORIENTATION: axes of materials."""
     name, system = block.required("NAME"), block.choice("SYSTEM", ("RECTANGULAR", "CYLINDRICAL"))
-    rows = block.rows
+    block.choice("DEFINITION", ("COORDINATES",))
+    rows, key = block.rows, folded(name)
+    if key in content.orientations:
+        raise block.place.refuse(
+            f"orientation '{name}' is defined twice, first in line {content.orientations[key].place.line}"
+        )
     if not rows:
         raise block.place.refuse("a data line with six coordinates is needed")
+    given = rows[0].text(0)
+    if folded(given) in content.distributions or (not given[:1].isdigit() and given[:1] not in ("-", "+", ".", "")):
+        if folded(given) not in content.distributions or system == "CYLINDRICAL":
+            raise rows[0].place.refuse(
+                f"distribution '{given[:80]}' is not defined above this line, or SYSTEM is not RECTANGULAR"
+            )
+        _not_turned(rows)
+        content.orientations[key] = Axes(block.place, "", False, (), folded(given), part)
+        return
     points = tuple(rows[0].number(i) for i in range(6))
     if any(rows[0].entries[6:]) and any(rows[0].number(6 + i, 0.0) for i in range(3)):
         raise rows[0].place.refuse("an origin of the axes is not supported: give points seen from 0, 0, 0")
+    _not_turned(rows)
+    content.orientations[key] = Axes(block.place, "", system == "CYLINDRICAL", points, part=part)
+
+
+def _not_turned(rows: list[Row]) -> None:
+    """Refuse a further rotation about an axis in the second line of an *ORIENTATION."""
     if len(rows) > 1 and rows[1].number(1, 0.0):
         raise rows[1].place.refuse("a further rotation of the axes is not supported: turn the points of the first line")
-    content.orientations[folded(name)] = Axes(block.place, "", system == "CYLINDRICAL", points)
 
 
 def density(content: Content, current: Material, block: Block) -> None:

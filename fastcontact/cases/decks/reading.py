@@ -28,6 +28,9 @@ IN_PARTS: dict[str, Callable[[Content, Part, Block], None]] = {
     "ELSET": geometry.element_set,
     "SURFACE": geometry.surface,
     "SOLID SECTION": properties.section,
+    "ORIENTATION": properties.orientation,
+    "DISTRIBUTION": properties.distribution,
+    "DISTRIBUTION TABLE": properties.distribution_table,
 }
 OF_MATERIALS: dict[str, Callable[[Content, Material, Block], None]] = {
     "ELASTIC": properties.elastic,
@@ -52,7 +55,6 @@ OF_MODELS: dict[str, Callable[[Content, Block], None]] = {
     "AMPLITUDE": properties.amplitude,
     "GAP": properties.gap,
     "INITIAL CONDITIONS": temperatures.initial_conditions,
-    "ORIENTATION": properties.orientation,
     "PRE-TENSION SECTION": pretension.pretension_section,
     "SPRING": properties.spring,
     "CONTACT PAIR": connections.contact_pair,
