@@ -85,9 +85,9 @@ def test_axes_of_cells_from_python():
     model.fix("XMIN", "x")
     model.fix("YMIN", "y")
     model.fix("ZMIN", "z")
-    model.add_pressure("XMAX", -1.0)
+    model.add_pressure("XMAX", -0.01)
     (step,) = fc.solve(model, 1)
-    assert step.displacement[mesh.points_of("XMAX"), 0] == pytest.approx(1.0 / 8.0 + 1.0)
+    assert step.displacement[mesh.points_of("XMAX"), 0] == pytest.approx(0.01 / 8.0 + 0.01)
     with pytest.raises(fc.ModelError, match="not unit vectors at right angles"):
         fc.Orthotropic((8.0, 1.0, 1.0), (0.0,) * 3, (1.0,) * 3, axes=2.0 * turned)
     wrong = fc.Model(mesh, "3d")
