@@ -12,12 +12,13 @@ from scipy.sparse import csr_array, vstack
 from scipy.spatial import cKDTree
 
 from fastcontact.arrays import Array
-from fastcontact.cases.decks.assembled import Assembled, Element, assembled, facet_points
+from fastcontact.cases.decks.assembled import Assembled, Element, assembled
 from fastcontact.cases.decks.blocks import Place, folded
 from fastcontact.cases.decks.cohesive import cohesion_of
 from fastcontact.cases.decks.conditions import Acting, Component, Conditions, Distributed
 from fastcontact.cases.decks.content import Content, Interaction, Material, Pair, Section, Step
 from fastcontact.cases.decks.cyclic_symmetry import add_sectors
+from fastcontact.cases.decks.gaps import add_gap, check_discrete, gap_groups
 from fastcontact.cases.decks.heat import HELD, conductance_of, friction_heat_of, perfect_conductance
 from fastcontact.cases.decks.histories import JUMP, Histories, by_shape
 from fastcontact.cases.decks.initial_stresses import add_initial_stresses
@@ -29,7 +30,6 @@ from fastcontact.cases.decks.relating import make_rotations, relations_of
 from fastcontact.cases.decks.stepping import MOST_PARTS
 from fastcontact.cases.decks.temperatures import add_temperatures, along_axes
 from fastcontact.contact.integration import all_nodes_carry
-from fastcontact.contact.obstacles.shapes import HalfSpace
 from fastcontact.elasticity.anisotropic_materials import Orthotropic
 from fastcontact.elasticity.material_axes import CylindricalAxes
 from fastcontact.elasticity.materials import LinearElastic
@@ -57,6 +57,8 @@ class Building:
         Relations that are supports: those along local axes, and those that come or go between steps.
     linearised : str
         Why small strains are solved although a step has NLGEOM; empty where not.
+    driven : dict of (int, int) to Table
+        Motions of the nodes of gap elements that belong to no solid, by point and component [length].
     gap_ends : dict of str to dict of int to int
         By the name of a contact made of gap elements: its nodes, and the nodes behind the gaps.
     """
@@ -74,7 +76,7 @@ class Building:
         conditions.run()
         groups = self._groups(conditions)
         heat = conditions.heat.loads(self.thickness)
-        gaps = {} if alone else self._gap_groups()
+        gaps = [] if alone else gap_groups(self.found)
         mesh = self.found.mesh() if alone else cut_sections(self.found, self.found.mesh())
         strain, self.linearised = strain_of(content, [law for law, _ in materials])
         reference = conditions.heat.reference
@@ -82,6 +84,7 @@ class Building:
         for material, group in materials:
             self.model.add_material(material, group)
         self.local_supports: list[Relation] = []
+        self.driven: dict[tuple[int, int], Table] = {}
         self.links: list[Relation] = []
         if alone:
             self.model.fix(self._point_group("held", range(mesh.n_points)), "xyz"[: mesh.dim])
@@ -91,7 +94,9 @@ class Building:
         for add in heat:
             add(self.model)
         self._contact()
-        self.gap_ends = self._gaps(gaps, conditions)
+        self.gap_ends: dict[str, dict[int, int]] = {}
+        for own in gaps:
+            self.gap_ends.update(add_gap(self.model, self.found, own, conditions))
         self.ramp = self._ramp(conditions)
 
     def _mechanics(self, conditions: Conditions, groups: list[tuple[str, Table]]) -> None:
@@ -222,10 +227,13 @@ class Building:
         temporary = conditions.temporary()
         self._temporary_supports(conditions, temporary)
         at_times = {name for name, _ in temporary}
+        alone = {e.points[1] for e in self.made.discrete if e.cell.type == "GAPUNI"} - self.made.of_solids
         for table, names in conditions.supports.alike():
             for name in (name for name in names if name not in at_times):
                 point, axis, local = name
-                if local:
+                if point in alone:
+                    self.driven[point, axis] = table
+                elif local:
                     self._local_support(conditions, name, table)
                 else:
                     alike.setdefault(axis, []).append((table, [point]))
@@ -325,14 +333,7 @@ class Building:
                 if element.cell.type != "SPRINGA":
                     raise place.refuse(f"element {element.number} is no spring of type SPRINGA")
                 self.model.add_spring(element.points[0], element.points[1], axial=stiffness / self.thickness)
-        self._check_discrete("SPRINGA", self.content.springs, "*SPRING")
-
-    def _check_discrete(self, kind: str, given: Mapping[str, Any], needed: str) -> None:
-        """Refuse springs and gap elements without properties."""
-        with_one = {own for name, entry in given.items() for own in self.made.elements_of(name, entry[0])}
-        for element in self.made.discrete:
-            if element.cell.type == kind and element not in with_one:
-                raise element.cell.place.refuse(f"element {element.number} of type {kind} has no {needed}")
+        check_discrete(self.made, "SPRINGA", self.content.springs, "*SPRING")
 
     def _contact(self) -> None:
         for pair in self.content.pairs:
@@ -421,50 +422,6 @@ class Building:
             return {"clearance": -float(gaps.mean())}
         nodes, closing = cKDTree(places), -np.where(gaps <= within, gaps, 0.0)
         return {"clearance": lambda points: closing[nodes.query(points)[1]]}
-
-    def _gap_groups(self) -> dict[str, tuple[str, list[tuple[int, int]]]]:
-        """Make groups of the facets behind gap elements; return their names, with the points of each element."""
-        found = {}
-        self._check_discrete("GAPUNI", self.content.gaps, "*GAP")
-        for name, (place, _, _) in self.content.gaps.items():
-            own = self.made.elements_of(name, place)
-            if any(element.cell.type != "GAPUNI" for element in own):
-                raise place.refuse("acts on elements of type GAPUNI only")
-            ends = [element.points for element in own]
-            chosen = {pair[0] for pair in ends}
-            faces = self.made.faces_within(chosen)
-            shown = self.content.root.set_names.get(name, name)
-            group = self.found.add_facets(f"{shown} facets", faces)
-            covered = {p for face in faces for p in facet_points(*face)}
-            if covered != chosen:
-                raise place.refuse(
-                    "gap elements are supported on all nodes of whole faces only, from the body to nodes that are held"
-                )
-            found[name] = (group, [(pair[0], pair[1]) for pair in ends])
-        return found
-
-    def _gaps(self, groups: Mapping[str, Any], conditions: Conditions) -> dict[str, dict[int, int]]:
-        """Make contact with a rigid plane from gap elements to nodes that are held at rest."""
-        ends = {}
-        dim = self.found.dim
-        for name, (group, pairs) in groups.items():
-            place, clearance, vector = self.content.gaps[name]
-            direction = np.array(vector)[:dim] / np.linalg.norm(vector)
-            for _, end in pairs:
-                tracks = [
-                    conditions.supports.tracks.get((end, axis, False)) for axis in np.flatnonzero(direction).tolist()
-                ]
-                if any(track is None or any(v for _, v in track.points) for track in tracks):
-                    raise place.refuse("gap elements are supported to nodes that are held at rest only")
-            places = self.model.mesh.points[[first for first, _ in pairs]] @ direction
-            if np.ptp(places) > TOUCHING * float(np.ptp(self.model.mesh.points, axis=0).max()):
-                raise place.refuse("gap elements are supported where their nodes lie in a plane across their direction")
-            point = tuple((places.mean() + clearance) * direction)
-            shown = self.content.root.set_names.get(name, name)
-            wall = HalfSpace(point=point, normal=tuple(-direction))
-            self.model.add_obstacle(shown, secondary=group, obstacle=wall, formulation="node_to_segment")
-            ends[shown] = dict(pairs)
-        return ends
 
     def _ramp(self, conditions: Conditions) -> Ramp:
         """Return the ends of all steps, of the increments of steps with friction, and the corners of all histories."""

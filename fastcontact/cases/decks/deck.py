@@ -24,7 +24,7 @@ from fastcontact.errors import ContactError, FileError, MeshError, ModelError, w
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.files.paths import PathLike, existing_file
 from fastcontact.model.model import Model
-from fastcontact.model.ramp import Ramp
+from fastcontact.model.ramp import Ramp, table_value
 from fastcontact.results.step import StepResult
 
 
@@ -115,6 +115,10 @@ class Deck:
             contact = step.contact[name]
             for point, force in zip(contact.points.tolist(), contact.force_vectors, strict=True):
                 reaction[ends[point]] += force
+        displacement = step.displacement.copy()
+        for at, table in self.building.driven.items():
+            displacement[at] = table_value(table, step.load_factor)
+        step = replace(step, displacement=displacement)
         if self.building.content.steps and step.load_factor == self.ramp.instants[-1]:
             self._tell_nonlinear(step)
         t = self.thickness
