@@ -28,7 +28,7 @@ from fastcontact.cases.decks.nonlinear import strain_of
 from fastcontact.cases.decks.pretension import add_sections, cut_sections
 from fastcontact.cases.decks.relating import make_rotations, relations_of
 from fastcontact.cases.decks.stepping import MOST_PARTS
-from fastcontact.cases.decks.temperatures import add_temperatures, along_axes
+from fastcontact.cases.decks.temperatures import add_temperatures, conductivity_of
 from fastcontact.contact.integration import all_nodes_carry
 from fastcontact.elasticity.anisotropic_materials import Orthotropic
 from fastcontact.elasticity.material_axes import CylindricalAxes
@@ -494,7 +494,7 @@ def _conductivity(content: Content, material: Material) -> float | tuple[float, 
     if content.heat:
         if block is None:
             raise material.place.refuse(f"material '{material.name}' has no *CONDUCTIVITY")
-        return along_axes(material, block)
+        return conductivity_of(material, block)
     if block is not None:
         content.note(block.place, f"material '{material.name}': no effect, temperatures are given, not computed")
     return None

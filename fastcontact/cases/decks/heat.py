@@ -41,6 +41,11 @@ def specific_heat(content: Content, current: Material, block: Block) -> None:
     content.note(block.place, f"material '{current.name}': no effect, heat is steady, or temperatures are given")
 
 
+def physical_constants(content: Content, block: Block) -> None:
+    """*PHYSICAL CONSTANTS: those of radiation, without effect."""
+    content.note(block.place, "no effect: there is no radiation")
+
+
 def gap_conductance(content: Content, current: Interaction, block: Block) -> None:
     """*GAP CONDUCTANCE: kept until it is known whether heat is computed."""
     current.conductance.append(block)
@@ -208,6 +213,8 @@ class HeatConditions:
                     self.powers.give(point, row.number(2), given.amplitude, row.place)
                 continue
             film = history is self.films
+            if film and row.number(3) < 0.0:
+                raise row.place.refuse(f"the coefficient {row.number(3):g} of the film must not be negative")
             for name in self._places(keyword, row, row.number(3) if film else None):
                 if film:
                     self.rest[name] = self.reference

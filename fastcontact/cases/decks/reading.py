@@ -55,6 +55,7 @@ OF_MODELS: dict[str, Callable[[Content, Block], None]] = {
     "AMPLITUDE": properties.amplitude,
     "GAP": properties.gap,
     "INITIAL CONDITIONS": temperatures.initial_conditions,
+    "PHYSICAL CONSTANTS": heat.physical_constants,
     "PRE-TENSION SECTION": pretension.pretension_section,
     "SPRING": properties.spring,
     "CONTACT PAIR": connections.contact_pair,

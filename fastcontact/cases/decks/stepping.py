@@ -76,6 +76,8 @@ def end_step(content: Content, step: Step) -> None:
     content.steps.pop()
     if not content.steps:
         raise step.place.refuse("*FREQUENCY needs a step with *STATIC before: modes are those about its end")
+    if content.steps[-1].heat == "alone":
+        raise step.place.refuse("*FREQUENCY behind *HEAT TRANSFER is not supported: bodies are at rest there")
     stiffening = step.perturbation or any(own.nonlinear for own in content.steps)
     content.modes = {"n": step.modes, "stress_stiffening": stiffening}
     content.note(

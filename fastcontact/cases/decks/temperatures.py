@@ -41,6 +41,14 @@ def along_axes(current: Material, block: Block) -> float | tuple[float, ...]:
     return values[0] if kind == "ISO" else values
 
 
+def conductivity_of(material: Material, block: Block) -> float | tuple[float, ...]:
+    """Return the conductivity of a material, one or three along its axes; CaseError if one is not positive."""
+    found = along_axes(material, block)
+    if not np.min(found) > 0.0:
+        raise block.place.refuse(f"material '{material.name}': the conductivity {np.min(found):g} must be positive")
+    return found
+
+
 def initial_conditions(content: Content, block: Block) -> None:
     """*INITIAL CONDITIONS: temperatures of nodes, or stresses of elements, before the first step."""
     kind = " ".join(block.required("TYPE").upper().split())

@@ -171,6 +171,9 @@ def test_a_static_step_before_and_heat_of_friction_by_time(tmp_path):
     ("old", "new", "said"),
     [
         (", STEADY STATE", "", r"line 63, \*HEAT TRANSFER: only STEADY STATE"),
+        ("*CONDUCTIVITY\n50.\n", "*CONDUCTIVITY\n0.\n", r"\*CONDUCTIVITY: material 'A': the conductivity 0 must be"),
+        ("STATE\n", "STATE\n*FILM\nup, F2, 20., -3.\n", r"\*FILM: the coefficient -3 of the film"),
+        ("*END STEP\n", "*END STEP\n*STEP\n*FREQUENCY\n3\n*END STEP\n", r"\*STEP: \*FREQUENCY behind \*HEAT TRANSFER"),
         ("*CONDUCTIVITY\n50.\n", "", r"\*MATERIAL: material 'A' has no \*CONDUCTIVITY"),
         ("*CONDUCTIVITY\n50.\n", "*CONDUCTIVITY\n50., 0.\n60., 100.\n", r"material 'A': 2 data lines where one"),
         ("STATE\n", "STATE\n*CLOAD\nHOT, 1, 2.\n", r"\*CLOAD: is no load of heat"),
