@@ -39,7 +39,9 @@ def axes_by_cell(made: Assembled, axes: Axes, members: Sequence[Element]) -> Arr
 
     Others have those of the mesh. CaseError if an element has none, and there is no line for all.
     """
-    block = made.content.distributions[axes.distribution]
+    block = made.content.distributions.get(folded(axes.distribution))
+    if block is None:
+        raise axes.place.refuse(f"distribution '{axes.distribution[:80]}' is not defined")
     scopes = [scope for scope in made.scopes if made.part(scope) is axes.part]
     default, given = None, {}  # type: Array | None, dict[int, Array]
     for row in block.each():

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact.arrays import Array
-from fastcontact.cases.decks.blocks import Block, Row, folded
+from fastcontact.cases.decks.blocks import Block, Row, folded, unquoted
 from fastcontact.cases.decks.content import Amplitude, Axes, Content, Interaction, Material, Part, Section
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
@@ -116,13 +116,11 @@ def orientation(content: Content, part: Part, block: Block) -> None:
     if not rows:
         raise block.place.refuse("a data line with six coordinates is needed")
     given = rows[0].text(0)
-    if folded(given) in content.distributions or (not given[:1].isdigit() and given[:1] not in ("-", "+", ".", "")):
-        if folded(given) not in content.distributions or system == "CYLINDRICAL":
-            raise rows[0].place.refuse(
-                f"distribution '{given[:80]}' is not defined above this line, or SYSTEM is not RECTANGULAR"
-            )
+    if given[:1].isalpha() or given[:1] == "_":
+        if system == "CYLINDRICAL":
+            raise block.place.refuse("a distribution of axes is supported with SYSTEM=RECTANGULAR only")
         _not_turned(rows)
-        content.orientations[key] = Axes(block.place, "", False, (), folded(given), part)
+        content.orientations[key] = Axes(block.place, "", False, (), unquoted(given), part)
         return
     points = tuple(rows[0].number(i) for i in range(6))
     if any(rows[0].entries[6:]) and any(rows[0].number(6 + i, 0.0) for i in range(3)):

@@ -43,6 +43,9 @@ def test_axes_by_cell_are_those_of_sections(tmp_path, wanted):
     assert len(deck.model.materials) == 1
     (step,) = deck.solve()
     assert step.displacement == pytest.approx(wanted.displacement, abs=1e-12)
+    before, after = BY_CELL.split("*Orientation")  # in any order
+    other = deck_of(tmp_path, NODES + CELLS + SETS + PLY + "*Orientation" + after + before + SECTION + STEP)
+    assert other.solve()[0].displacement == pytest.approx(wanted.displacement, abs=1e-12)
     assert np.abs(wanted.displacement[:, 1]).max() > 1e-3  # the axes matter
 
 
