@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from fastcontact.cases.decks.blocks import Block, Row, as_number
+from fastcontact.cases.decks.blocks import Block, as_number
 from fastcontact.cases.decks.content import Content, Interaction
 from fastcontact.contact.cohesion import ELASTIC
 
@@ -71,11 +71,11 @@ def _stiffness(block: Block) -> float | None:
     block.choice("ELIGIBILITY", ("CURRENT CONTACTS", "ORIGINAL CONTACTS"))
     if not block.rows:
         return None
-    row = _only(block)
+    row = block.only("modes or fields")
     values = {row.number(index, row.number(0)) for index in range(3)}
     if len(values) > 1:
         raise row.place.refuse("a layer has one stiffness here, the same for opening and for sliding")
-    return _positive(row, 0)
+    return row.positive(0, "stiffness")
 
 
 def _evolution(block: Block, given: dict[str, Any], stiffness: float | None) -> dict[str, Any]:
@@ -90,7 +90,7 @@ def _evolution(block: Block, given: dict[str, Any], stiffness: float | None) -> 
         return {"energy": energy, "shear_energy": shear, "mixed_mode": MODES[mode], "exponent": power}
     if mode in MODES:
         raise block.place.refuse(f"MIXED MODE BEHAVIOR={mode} is that of TYPE=ENERGY")
-    value = _positive(_only(block), 0)
+    value = block.only("modes or fields").positive(0, "number")
     if kind == "ENERGY":
         return {"energy": value, "shear_energy": value}
     strength = given["strength"]
@@ -104,26 +104,10 @@ def _evolution(block: Block, given: dict[str, Any], stiffness: float | None) -> 
 
 def _in_modes(block: Block, what: str) -> tuple[float, float]:
     """Return numbers for opening and for sliding, which is the same along both directions."""
-    row = _only(block)
-    values = [_positive(row, index) for index in range(3)]
+    row = block.only("modes or fields")
+    values = [row.positive(index, "number") for index in range(3)]
     if values[1] != values[2]:
         raise row.place.refuse(
             f"the {what} along both shear directions must be the same, not {values[1]:g} and {values[2]:g}"
         )
     return values[0], values[1]
-
-
-def _only(block: Block) -> Row:
-    rows = block.rows
-    if len(rows) != 1 or any(rows[0].entries[3:]):
-        raise block.place.refuse(
-            "one data line is needed, of up to three numbers: they depend neither on modes nor on fields"
-        )
-    return rows[0]
-
-
-def _positive(row: Row, index: int) -> float:
-    value = row.number(index)
-    if not value > 0.0:
-        raise row.place.refuse(f"{value:g} must be positive")
-    return value

@@ -40,7 +40,7 @@ def elastic(content: Content, current: Material, block: Block) -> None:
     if found[0] != "ISOTROPIC":
         _with_axes(current, block, found[0])
         return
-    row = _only(block, "temperatures" if len(block.rows) > 1 else "")
+    row = block.only("temperatures" if len(block.rows) > 1 else "")
     E, nu = row.number(0), row.number(1, 0.0)
     if row.text(2):
         content.note(row.place, "the temperature of the constants has no effect: there is one set of them")
@@ -137,7 +137,7 @@ def _not_turned(rows: list[Row]) -> None:
 
 def density(content: Content, current: Material, block: Block) -> None:
     """*DENSITY."""
-    current.density = _only(block).number(0)
+    current.density = block.only().number(0)
     if not current.density > 0:
         raise block.place.refuse(f"material '{current.name}': the density {current.density:g} must be positive")
 
@@ -182,9 +182,9 @@ def behaviour(content: Content, current: Interaction, block: Block) -> None:
     """*SURFACE BEHAVIOR: hard, or soft with a slope, a table or an exponential law."""
     law = block.choice("PRESSURE-OVERCLOSURE", ("HARD", "LINEAR", "EXPONENTIAL", "TABULAR", "TIED"))
     if law == "LINEAR":
-        current.penalty = _positive(_only(block), 0, "slope")
+        current.penalty = block.only().positive(0, "slope")
     elif law == "EXPONENTIAL":
-        current.penalty = _exponential(_positive(_only(block), 0, "clearance"), _positive(_only(block), 1, "pressure"))
+        current.penalty = _exponential(block.only().positive(0, "clearance"), block.only().positive(1, "pressure"))
     elif law == "TABULAR":
         current.penalty = _table(block)
     elif law == "TIED":
@@ -215,12 +215,12 @@ def _exponential(clearance: float, pressure: float) -> list[tuple[float, float]]
 
 def friction(content: Content, current: Interaction, block: Block) -> None:
     """*FRICTION: coefficient, and in CalculiX the stick slope."""
-    row = _only(block)
+    row = block.only()
     current.friction = row.number(0)
     if current.friction < 0:
         raise row.place.refuse(f"the coefficient of friction {current.friction:g} is negative")
     if row.text(1) and row.number(1):
-        current.stick = _positive(row, 1, "stick slope")
+        current.stick = row.positive(1, "stick slope")
         content.note(row.place, f"{current.stick:g} is taken for the stick slope, as in CalculiX (shear by slip)")
     if len(row.entries) > 2 and any(row.entries[2:]):
         raise row.place.refuse(
@@ -243,7 +243,7 @@ def amplitude(content: Content, block: Block) -> None:
 
 def gap(content: Content, block: Block) -> None:
     """*GAP: clearance and direction of gap elements."""
-    row = _only(block)
+    row = block.only()
     direction = tuple(row.number(i, 0.0) for i in (1, 2, 3))
     if not any(direction):
         raise row.place.refuse("the direction of the gap elements is missing")
@@ -257,20 +257,4 @@ def spring(content: Content, block: Block) -> None:
         raise block.place.refuse("linear springs along their line need an empty line and then one with the stiffness")
     if rows[0].text(1):
         raise rows[0].place.refuse("only linear springs are supported: one stiffness")
-    content.springs[folded(block.required("ELSET"))] = (block.place, _positive(rows[0], 0, "stiffness"))
-
-
-def _positive(row: Row, index: int, what: str) -> float:
-    value = row.number(index)
-    if not value > 0:
-        raise row.place.refuse(f"the {what} {value:g} must be positive")
-    return value
-
-
-def _only(block: Block, why: str = "") -> Row:
-    """Return the only data line of a block."""
-    rows = block.rows
-    if len(rows) != 1:
-        text = f"{len(rows)} data lines where one is needed"
-        raise block.place.refuse(text + (f": constants that depend on {why} are not supported" if why else ""))
-    return rows[0]
+    content.springs[folded(block.required("ELSET"))] = (block.place, rows[0].positive(0, "stiffness"))
