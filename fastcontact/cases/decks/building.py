@@ -35,7 +35,7 @@ from fastcontact.elasticity.material_axes import CylindricalAxes
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.elasticity.nonlinear_materials import NonlinearElastic
 from fastcontact.elasticity.relations import Relation, TemporaryRelation
-from fastcontact.errors import FastcontactError
+from fastcontact.errors import ContactError, MeshError, ModelError
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, Table
 
@@ -338,12 +338,12 @@ class Building:
     def _contact(self) -> None:
         for pair in self.content.pairs:
             secondary, primary = (group_of_surface(self.found, name) for name in (pair.secondary, pair.primary))
-            options = self._tied(pair) if pair.tied else self._options(pair)
-            if secondary in self.found.loose:
-                options.update(self._at_nodes(pair, secondary))
             try:
+                options = self._tied(pair) if pair.tied else self._options(pair)
+                if secondary in self.found.loose:
+                    options.update(self._at_nodes(pair, secondary))
                 self.model.add_contact(f"{secondary}/{primary}", secondary=secondary, primary=primary, **options)
-            except FastcontactError as error:
+            except (ModelError, MeshError, ContactError) as error:
                 raise pair.place.refuse(str(error)) from error
 
     def _at_nodes(self, pair: Pair, secondary: str) -> dict[str, Any]:

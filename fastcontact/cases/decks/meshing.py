@@ -10,7 +10,6 @@ import numpy as np
 from fastcontact.cases.decks.assembled import Assembled, Element, Face, facet_points
 from fastcontact.cases.decks.blocks import Place, folded
 from fastcontact.cases.decks.content import SurfaceDefinition
-from fastcontact.errors import CaseError
 from fastcontact.mesh import topology
 from fastcontact.mesh.mesh import Mesh
 
@@ -116,7 +115,7 @@ def begun(made: Assembled) -> DeckMesh:
     CaseError if there are no solids, if elements of several kinematics are mixed, or if a plane model is not flat.
     """
     if not made.solids:
-        raise CaseError("the deck has no solid elements")
+        raise made.content.steps[0].place.refuse("the deck has no solid elements")
     first = made.solids[0].solid
     for element in made.solids:
         if element.solid.kinematics != first.kinematics:
