@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import Assembled, Element, assembled
-from fastcontact.cases.decks.blocks import Place, folded
+from fastcontact.cases.decks.blocks import Location, folded
 from fastcontact.cases.decks.cohesive import cohesion_of
 from fastcontact.cases.decks.conditions import Acting, Component, Conditions, Distributed
 from fastcontact.cases.decks.content import Content, Interaction, Material, Pair, Section, Step
@@ -33,8 +33,8 @@ from fastcontact.contact.integration import all_nodes_carry
 from fastcontact.elasticity.anisotropic_materials import Orthotropic
 from fastcontact.elasticity.material_axes import CylindricalAxes
 from fastcontact.elasticity.materials import LinearElastic
+from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, TemporaryConstraint
 from fastcontact.elasticity.nonlinear_materials import NonlinearElastic
-from fastcontact.elasticity.relations import Relation, TemporaryRelation
 from fastcontact.errors import ContactError, MeshError, ModelError
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, Table
@@ -53,7 +53,7 @@ class Building:
     model : Model
     thickness : float
         Of a plane model; forces of the model are those of a unit of it [length].
-    local_supports : list of Relation
+    local_supports : list of MultiPointConstraint
         Relations that are supports: those along local axes, and those that come or go between steps.
     linearised : str
         Why small strains are solved although a step has NLGEOM; empty where not.
@@ -83,9 +83,9 @@ class Building:
         self.model = Model(mesh, self.found.kinematics, case_text, strain=strain, reference_temperature=reference)
         for material, group in materials:
             self.model.add_material(material, group)
-        self.local_supports: list[Relation] = []
+        self.local_supports: list[MultiPointConstraint] = []
         self.driven: dict[tuple[int, int], Table] = {}
-        self.links: list[Relation] = []
+        self.links: list[MultiPointConstraint] = []
         if alone:
             self.model.fix(self._point_group("held", range(mesh.n_points)), "xyz"[: mesh.dim])
             add_sectors(self.model, self.found)
@@ -120,17 +120,17 @@ class Building:
             for section in self.made.part(scope).sections:
                 self._material(section)
                 if self.found.dim == 2 and self.found.kinematics != "axisymmetric":
-                    own = 1.0 if section.thickness is None else section.thickness
-                    if thickness is not None and own != thickness:
-                        raise section.place.refuse(
-                            f"thickness {own:g} after {thickness:g}: plane models have one thickness"
+                    section_thickness = 1.0 if section.thickness is None else section.thickness
+                    if thickness is not None and section_thickness != thickness:
+                        raise section.location.refuse(
+                            f"thickness {section_thickness:g} after {thickness:g}: plane models have one thickness"
                         )
-                    thickness = own
+                    thickness = section_thickness
                 name = f"{scope}.{section.elements}" if scope else section.elements
-                for element in self.made.elements_of(name, section.place):
+                for element in self.made.elements_of(name, section.location):
                     if element.section not in (None, section):
-                        raise section.place.refuse(
-                            f"element {element.number} has a section already, in line {element.section.place.line}"
+                        raise section.location.refuse(
+                            f"element {element.number} has a section already, in line {element.section.location.line}"
                         )
                     element.section = section
         self._check_sections()
@@ -139,28 +139,28 @@ class Building:
             given = element.given_section
             key = (folded(given.material), folded(given.orientation), element.solid.modes)
             by_material.setdefault(key, []).append(element)
-        found = []
+        materials = []
         for (name, turned, modes), members in by_material.items():
             material = self.content.materials[name]
             axes = self._axes(members[0].given_section, members)
             group = f"material {material.name}" + (f" along {turned.lower()}" if turned else "")
             group += " with incompatible modes" if modes else ""
-            found.append(
+            materials.append(
                 (
                     _law(self.content, material, axes, modes),
                     self.found.add_solids(group, members),
                 )
             )
-        return found, thickness or 1.0
+        return materials, thickness or 1.0
 
     def _axes(self, section: Section, members: Sequence[Element]) -> Any:
         """Return the axes of the material of a section with its elements, None for those of the mesh."""
         if not section.orientation:
             return None
-        axes = orientation_of(self.content, section.orientation, section.place)
+        axes = orientation_of(self.content, section.orientation, section.location)
         for element in members:
             if axes.part is not self.content.root and self.made.turned(element.scope):
-                raise axes.place.refuse(
+                raise axes.location.refuse(
                     "axes of a part whose instance is turned are not supported: give them in the assembly"
                 )
         if axes.distribution:
@@ -174,9 +174,9 @@ class Building:
         material = self.content.materials.get(folded(section.material))
         if material is None:
             known = ", ".join(m.name for m in self.content.materials.values()) or "none"
-            raise section.place.refuse(f"material '{section.material}' is not defined; materials: {known}")
+            raise section.location.refuse(f"material '{section.material}' is not defined; materials: {known}")
         if material.law is None and self.content.heat != "alone":
-            raise material.place.refuse(f"material '{material.name}' has no *ELASTIC")
+            raise material.location.refuse(f"material '{material.name}' has no *ELASTIC")
         return material
 
     def _check_sections(self) -> None:
@@ -185,21 +185,21 @@ class Building:
             cell = without[0].cell
             many = "1 element" if len(without) == 1 else f"{len(without)} elements"
             named = f" of set '{cell.set}'" if cell.set else ""
-            raise cell.place.refuse(f"{many} ({without[0].number}){named} has no section, so no material")
+            raise cell.location.refuse(f"{many} ({without[0].number}){named} has no section, so no material")
 
     def _check_pairs(self) -> None:
         """Refuse pairs whose surfaces or interaction are not there."""
         seen: set[str] = set()
         for pair in self.content.pairs:
-            secondary_group(self.found, pair.secondary, pair.place)
-            self.made.faces(pair.primary, pair.place)
+            secondary_group(self.found, pair.secondary, pair.location)
+            self.made.faces(pair.primary, pair.location)
             if not pair.tied and folded(pair.interaction) not in self.content.interactions:
                 known = ", ".join(i.name for i in self.content.interactions.values()) or "none"
-                raise pair.place.refuse(
+                raise pair.location.refuse(
                     f"surface interaction '{pair.interaction}' is not defined; interactions: {known}"
                 )
             if folded(pair.name) in seen:
-                raise pair.place.refuse(f"the pair {pair.name} stands there twice")
+                raise pair.location.refuse(f"the pair {pair.name} stands there twice")
             seen.add(folded(pair.name))
 
     def _groups(self, conditions: Conditions) -> list[tuple[str, Table]]:
@@ -253,19 +253,17 @@ class Building:
             alike.setdefault((acting, conditions.supports.table(name)), []).append(name)
         for (acting, table), names in alike.items():
             ends = "" if acting.ends == np.inf else f" to {acting.ends:g}"
-            label = (
-                f"the support of {conditions.named(names[0])}, line {acting.place.line}, from {acting.begins:g}{ends}"
-            )
+            label = f"the support of {conditions.named(names[0])}, line {acting.location.line}, from {acting.begins:g}{ends}"
             rows = csr_array(vstack([self._support_row(conditions, name) for name in names]))
             self._relate_support(
-                TemporaryRelation(label, rows, 1.0, table, acting.begins, acting.ends, keeps=acting.keeps)
+                TemporaryConstraint(label, rows, 1.0, table, acting.begins, acting.ends, keeps=acting.keeps)
             )
 
     def _local_support(self, conditions: Conditions, name: Component, table: Table) -> None:
         label = f"the support of {conditions.named(name)} on local axes"
-        self._relate_support(Relation(label, self._support_row(conditions, name), 1.0, table))
+        self._relate_support(MultiPointConstraint(label, self._support_row(conditions, name), 1.0, table))
 
-    def _relate_support(self, made: Relation) -> None:
+    def _relate_support(self, made: MultiPointConstraint) -> None:
         self.local_supports.append(made)
         self.model.relations.append(made)
 
@@ -306,19 +304,19 @@ class Building:
             by_density: dict[float, list[Any]] = {}
             for element in name.elements:
                 if element.type is not None:
-                    by_density.setdefault(self._density(element, name, track.place), []).append(element)
+                    by_density.setdefault(self._density(element, name, track.location), []).append(element)
             for density, members in by_density.items():
                 group = self.found.add_solids(f"load {number} of density {density:g}", members)
                 self._name_solids(group)
                 values = _body_force(name, density, self.found.dim)
                 self.model.add_body_force(group, ramp=conditions.loads.table(name), **values)
 
-    def _density(self, element: Element, name: Distributed, place: Place) -> float:
+    def _density(self, element: Element, name: Distributed, location: Location) -> float:
         if name.kind[0] == "B":
             return 1.0
         material = self._material(element.given_section)
         if material.density is None:
-            raise place.refuse(f"material '{material.name}' has no *DENSITY, so {name.kind} is no force")
+            raise location.refuse(f"material '{material.name}' has no *DENSITY, so {name.kind} is no force")
         return material.density
 
     def _name_solids(self, group: str) -> None:
@@ -328,10 +326,10 @@ class Building:
         self.model.mesh = self.model.mesh.with_groups(cells={group: numbers})
 
     def _springs(self) -> None:
-        for name, (place, stiffness) in self.content.springs.items():
-            for element in self.made.elements_of(name, place):
+        for name, (location, stiffness) in self.content.springs.items():
+            for element in self.made.elements_of(name, location):
                 if element.cell.type != "SPRINGA":
-                    raise place.refuse(f"element {element.number} is no spring of type SPRINGA")
+                    raise location.refuse(f"element {element.number} is no spring of type SPRINGA")
                 self.model.add_spring(element.points[0], element.points[1], axial=stiffness / self.thickness)
         check_discrete(self.made, "SPRINGA", self.content.springs, "*SPRING")
 
@@ -344,7 +342,7 @@ class Building:
                     options.update(self._at_nodes(pair, secondary))
                 self.model.add_contact(f"{secondary}/{primary}", secondary=secondary, primary=primary, **options)
             except (ModelError, MeshError, ContactError) as error:
-                raise pair.place.refuse(str(error)) from error
+                raise pair.location.refuse(str(error)) from error
 
     def _at_nodes(self, pair: Pair, secondary: str) -> dict[str, Any]:
         """Return the options by which some nodes alone of the facets around them are in contact."""
@@ -352,7 +350,7 @@ class Building:
         if all(map(all_nodes_carry, self.found.groups[secondary])):
             options["formulation"] = "node_to_segment"
         self.content.note(
-            pair.place, f"the nodes of surface '{pair.secondary}' make up no whole faces: they alone of the facets around "
+            pair.location, f"the nodes of surface '{pair.secondary}' make up no whole faces: they alone of the facets around "
             "them are in contact"
         )  # fmt: skip
         return options
@@ -366,7 +364,7 @@ class Building:
             return {**options, **cohesion_of(self.content, law), **self._fitted(pair, glued=True)}
         if law.kind != "unilateral":
             if law.friction or law.changes:
-                raise law.place.refuse(f"friction with {law.kind} contact is not supported")
+                raise law.location.refuse(f"friction with {law.kind} contact is not supported")
             options["kind"] = law.kind
         if law.penalty is not None and law.kind != "tied":
             options["penalty"] = law.penalty
@@ -380,7 +378,7 @@ class Building:
         if not self.content.heat:
             return {"kind": "tied"}
         kind = "gap_only" if self.content.heat == "alone" else "tied"
-        return {"kind": kind, "conductance": perfect_conductance(self.content, self.model, pair.place)}
+        return {"kind": kind, "conductance": perfect_conductance(self.content, self.model, pair.location)}
 
     def _fitted(self, pair: Pair, glued: bool = False) -> dict[str, Any]:
         """Return the clearance that brings the sides to where ADJUST or *CLEARANCE say; refused where no number does.
@@ -394,13 +392,13 @@ class Building:
         size = TOUCHING * float(np.ptp(self.model.mesh.points, axis=0).max())
         if glued:
             if gaps.max() > size or pair.clearance is not None:
-                raise pair.place.refuse(
+                raise pair.location.refuse(
                     f"a cohesive layer between sides that are {gaps.max():.6g} apart is not supported"
                 )
             return {}
         if pair.clearance is not None:
             if np.ptp(gaps) > size:
-                raise pair.place.refuse(
+                raise pair.location.refuse(
                     f"*CLEARANCE is supported between sides of one distance, these are {gaps.min():.6g} to "
                     f"{gaps.max():.6g} apart"
                 )
@@ -408,7 +406,7 @@ class Building:
         try:
             within = float(pair.adjust)
         except ValueError:
-            raise pair.place.refuse(f"ADJUST={pair.adjust[:40]}: only a distance is supported") from None
+            raise pair.location.refuse(f"ADJUST={pair.adjust[:40]}: only a distance is supported") from None
         moved = gaps[(gaps <= within) & (np.abs(gaps) > size)]
         if not len(moved):
             return {}
@@ -417,7 +415,7 @@ class Building:
             if np.ptp(gaps) <= size
             else f"of {moved.min():.6g} to {moved.max():.6g} at {len(moved)} nodes"
         )
-        self.content.note(pair.place, f"ADJUST: the distance {apart} of the sides counts as none")
+        self.content.note(pair.location, f"ADJUST: the distance {apart} of the sides counts as none")
         if np.ptp(gaps) <= size:
             return {"clearance": -float(gaps.mean())}
         nodes, closing = cKDTree(places), -np.where(gaps <= within, gaps, 0.0)
@@ -435,7 +433,7 @@ class Building:
             for track in histories.distinct():
                 instants.update(round(time, 12) for time, _ in track.points if abs(time - round(time)) > 1e-6)
         if len(instants) > LONGEST_RAMP:
-            raise steps[0].place.refuse(f"the histories have {len(instants)} corners, more than {LONGEST_RAMP}")
+            raise steps[0].location.refuse(f"the histories have {len(instants)} corners, more than {LONGEST_RAMP}")
         return Ramp(tuple(sorted(instants)), ((0.0, 0.0), (float(len(steps)), 1.0)))
 
 
@@ -444,14 +442,14 @@ def _friction(law: Interaction, n_steps: int) -> dict[str, Any]:
     table, sticks = [(0.0, law.friction)], {law.stick} if law.friction else set()
     for before, changed in law.changes:
         if changed.friction < 0.0 or changed.penalty is not None or changed.kind != law.kind:
-            raise changed.place.refuse("one *FRICTION must follow, and nothing else of the interaction changes")
+            raise changed.location.refuse("one *FRICTION must follow, and nothing else of the interaction changes")
         table += [(float(before), table[-1][1]), (before + JUMP, changed.friction)]
         sticks |= {changed.stick} if changed.friction else set()
     largest = max(value for _, value in table)
     if not largest:
         return {}
     if len(sticks) > 1:
-        raise law.changes[0][1].place.refuse("a stick slope that changes is not supported: give the same one")
+        raise law.changes[0][1].location.refuse("a stick slope that changes is not supported: give the same one")
     options: dict[str, Any] = {"friction": largest, "tangential_penalty": sticks.pop()}
     if law.changes:
         points = {**dict(table), float(n_steps): table[-1][1]}
@@ -466,11 +464,11 @@ def _law(content: Content, material: Material, axes: Any, modes: bool) -> Any:
     assert material.law is not None
     law, expansion = material.law(axes), material.expansion
     if isinstance(law, NonlinearElastic) and content.heat:
-        raise material.place.refuse(f"material '{material.name}': heat is supported in elastic bodies only")
+        raise material.location.refuse(f"material '{material.name}': heat is supported in elastic bodies only")
     if isinstance(law, NonlinearElastic):
         if modes:
             content.note(
-                material.place, f"material '{material.name}': incompatible modes are left out, since it is nonlinear"
+                material.location, f"material '{material.name}': incompatible modes are left out, since it is nonlinear"
             )
         law = copy.copy(law)
         object.__setattr__(law, "density", material.density)
@@ -481,10 +479,12 @@ def _law(content: Content, material: Material, axes: Any, modes: bool) -> Any:
     heated = content.heat or any(given.block.keyword == "TEMPERATURE" for step in content.steps for given in step.given)
     if expansion is None:
         if heated:
-            content.note(material.place, f"material '{material.name}' has no *EXPANSION: temperatures do not strain it")
+            content.note(
+                material.location, f"material '{material.name}' has no *EXPANSION: temperatures do not strain it"
+            )
         return replace(law, expansion=0.0) if heated else law
     if not heated:
-        content.note(material.place, f"material '{material.name}': without temperatures the expansion has no effect")
+        content.note(material.location, f"material '{material.name}': without temperatures the expansion has no effect")
     return _with_axes(law, axes, expansion=expansion)
 
 
@@ -493,10 +493,10 @@ def _conductivity(content: Content, material: Material) -> float | tuple[float, 
     block = material.conductivity
     if content.heat:
         if block is None:
-            raise material.place.refuse(f"material '{material.name}' has no *CONDUCTIVITY")
+            raise material.location.refuse(f"material '{material.name}' has no *CONDUCTIVITY")
         return conductivity_of(material, block)
     if block is not None:
-        content.note(block.place, f"material '{material.name}': no effect, temperatures are given, not computed")
+        content.note(block.location, f"material '{material.name}': no effect, temperatures are given, not computed")
     return None
 
 
@@ -552,7 +552,7 @@ def nodal_gaps(model: Model, secondary: str, primary: str, without: Sequence[int
     from fastcontact.model.contact_pair import ContactPair
 
     pair = ContactPair("gaps", secondary, primary, "continuous", {})
-    found, places = model.bind(pair), model.mesh.points
-    gaps, _ = found.nodal_gap(Configuration.undeformed(places))
-    faced = np.isfinite(gaps) & ~np.isin(found.secondary.points, without)
-    return (gaps[faced], places[found.secondary.points[faced]]) if faced.any() else (np.zeros(1), places[:1])
+    formulation, places = model.bind(pair), model.mesh.points
+    gaps, _ = formulation.nodal_gap(Configuration.undeformed(places))
+    faced = np.isfinite(gaps) & ~np.isin(formulation.secondary.points, without)
+    return (gaps[faced], places[formulation.secondary.points[faced]]) if faced.any() else (np.zeros(1), places[:1])

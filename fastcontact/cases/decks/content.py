@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from fastcontact.cases.decks.blocks import Block, Place, folded
+from fastcontact.cases.decks.blocks import Block, Location, folded
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,12 +15,12 @@ class Cell:
 
     type: str
     nodes: Sequence[int]
-    within: Place
+    within: Location
     line: int
     set: str = ""
 
     @property
-    def place(self) -> Place:
+    def location(self) -> Location:
         """Its place."""
         return replace(self.within, line=self.line)
 
@@ -29,7 +29,7 @@ class Cell:
 class Members:
     """Entries of a set: numbers, or the name of another set, in an instance (empty: where it is defined)."""
 
-    place: Place
+    location: Location
     numbers: Sequence[int] = ()
     name: str = ""
     instance: str = ""
@@ -39,7 +39,7 @@ class Members:
 class Face:
     """One entry of a surface: an element set or number, or for nodes a node set or number, and the label of the face."""
 
-    place: Place
+    location: Location
     of: str
     label: str = ""
 
@@ -49,7 +49,7 @@ class SurfaceDefinition:
     """A surface as the deck has it."""
 
     name: str
-    place: Place
+    location: Location
     of_nodes: bool
     faces: list[Face] = field(default_factory=list)
 
@@ -58,7 +58,7 @@ class SurfaceDefinition:
 class Section:
     """Which material the elements of a set have, and how thick they are (None: not given)."""
 
-    place: Place
+    location: Location
     elements: str
     material: str
     thickness: float | None = None
@@ -101,7 +101,7 @@ class Material:
     """A material of the deck; `law` makes one of the model from axes, None for those of the mesh."""
 
     name: str
-    place: Place
+    location: Location
     law: Callable[[Any], Any] | None = None
     density: float | None = None
     expansion: float | tuple[float, ...] | None = None
@@ -113,14 +113,14 @@ class Interaction:
     """How surfaces touch."""
 
     name: str
-    place: Place
+    location: Location
     penalty: float | list[tuple[float, float]] | None = None
     friction: float = 0.0
     stick: float | None = None
     kind: str = "unilateral"
     cohesion: dict[str, Block] = field(default_factory=dict)
     conductance: list[Block] = field(default_factory=list)
-    friction_heat: tuple[Place, float] | None = None
+    friction_heat: tuple[Location, float] | None = None
     changes: list[tuple[int, Interaction]] = field(default_factory=list)  # of friction, by the number of steps before
 
 
@@ -128,7 +128,7 @@ class Interaction:
 class Pair:
     """A contact pair or a tie."""
 
-    place: Place
+    location: Location
     secondary: str
     primary: str
     interaction: str = ""
@@ -147,7 +147,7 @@ class Pair:
 class SectorEnds:
     """The two ends of a sector that repeats itself round an axis: their surfaces, by the name of the tie."""
 
-    place: Place
+    location: Location
     name: str
     surfaces: tuple[str, str]
 
@@ -156,7 +156,7 @@ class SectorEnds:
 class Sectors:
     """How many sectors make the whole round an axis, by two of its points, and the name of the tie of their ends."""
 
-    place: Place
+    location: Location
     count: int
     tie: str
     points: tuple[float, ...]
@@ -166,7 +166,7 @@ class Sectors:
 class Equation:
     """A linear equation: node, component and coefficient of each term."""
 
-    place: Place
+    location: Location
     terms: tuple[tuple[str, int, float], ...]
 
 
@@ -174,7 +174,7 @@ class Equation:
 class Pin:
     """Nodes, one or those of a set, that have the displacement of a further one, or each that of one of a further set."""
 
-    place: Place
+    location: Location
     first: str
     second: str
 
@@ -183,7 +183,7 @@ class Pin:
 class MultiPoint:
     """Nodes that stay in a plane or on a line, or, with a last one for it, have a mean rotation."""
 
-    place: Place
+    location: Location
     kind: str
     nodes: tuple[str, ...]
 
@@ -192,7 +192,7 @@ class MultiPoint:
 class Link:
     """A reference node with nodes that follow it (rigid, kinematic) or whose mean motion it follows (distributing)."""
 
-    place: Place
+    location: Location
     reference: str
     group: str
     kind: str  # nodes, elements or surface
@@ -206,7 +206,7 @@ class Link:
 class PretensionSection:
     """A section through a bolt: its surface, the node that has its shortening and its force, and its normal."""
 
-    place: Place
+    location: Location
     surface: str
     node: str
     normal: tuple[float, ...] | None
@@ -216,7 +216,7 @@ class PretensionSection:
 class Axes:
     """Local axes of nodes or materials: rectangular by points of the first axis and plane, or cylindrical about a line."""
 
-    place: Place
+    location: Location
     nodes: str
     cylindrical: bool
     points: tuple[float, ...]
@@ -228,7 +228,7 @@ class Axes:
 class Amplitude:
     """Points (time, multiplier), in the time of the step or of the analysis."""
 
-    place: Place
+    location: Location
     times: tuple[float, ...]
     values: tuple[float, ...]
     total: bool
@@ -247,7 +247,7 @@ class Given:
 class Step:
     """A load step of the deck."""
 
-    place: Place
+    location: Location
     nonlinear: bool = False
     period: float = 1.0
     increment: float = 1.0
@@ -280,8 +280,8 @@ class Content:
     orientations: dict[str, Axes] = field(default_factory=dict)
     distributions: dict[str, Block] = field(default_factory=dict)
     amplitudes: dict[str, Amplitude] = field(default_factory=dict)
-    gaps: dict[str, tuple[Place, float, tuple[float, ...]]] = field(default_factory=dict)
-    springs: dict[str, tuple[Place, float]] = field(default_factory=dict)
+    gaps: dict[str, tuple[Location, float, tuple[float, ...]]] = field(default_factory=dict)
+    springs: dict[str, tuple[Location, float]] = field(default_factory=dict)
     supports: list[Given] = field(default_factory=list)
     initial: list[Block] = field(default_factory=list)
     stresses: list[Block] = field(default_factory=list)
@@ -289,8 +289,8 @@ class Content:
     heat: str = ""  # as that of its steps
     modes: dict[str, Any] | None = None
     notes: list[str] = field(default_factory=list)
-    outputs: list[Place] = field(default_factory=list)
+    outputs: list[Location] = field(default_factory=list)
 
-    def note(self, place: Place, text: str) -> None:
+    def note(self, location: Location, text: str) -> None:
         """Remember what a line means here, where that is not plain."""
-        self.notes.append(f"{place}: {text}")
+        self.notes.append(f"{location}: {text}")

@@ -10,7 +10,7 @@ import numpy as np
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.cases.decks.assembled import Assembled, facet_points
-from fastcontact.cases.decks.blocks import Place
+from fastcontact.cases.decks.blocks import Location
 from fastcontact.cases.decks.conditions import Conditions
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.contact.obstacles.shapes import HalfSpace
@@ -29,7 +29,7 @@ class GapGroup:
     Attributes
     ----------
     name : str
-    place : Place
+    location : Location
     clearance : float
         [length]
     direction : ndarray (dim,)
@@ -41,7 +41,7 @@ class GapGroup:
     """
 
     name: str
-    place: Place
+    location: Location
     clearance: float
     direction: Array
     ends: Indices
@@ -54,36 +54,36 @@ def check_discrete(made: Assembled, kind: str, given: Mapping[str, Any], needed:
     with_one = {own for name, entry in given.items() for own in made.elements_of(name, entry[0])}
     for element in made.discrete:
         if element.cell.type == kind and element not in with_one:
-            raise element.cell.place.refuse(f"element {element.number} of type {kind} has no {needed}")
+            raise element.cell.location.refuse(f"element {element.number} of type {kind} has no {needed}")
 
 
 def gap_groups(found: DeckMesh) -> list[GapGroup]:
     """Make groups of the facets around the nodes of gap elements; CaseError where these make up no whole facets."""
     made, groups = found.made, []
     check_discrete(made, "GAPUNI", made.content.gaps, "*GAP")
-    for name, (place, clearance, vector) in made.content.gaps.items():
-        own = made.elements_of(name, place)
+    for name, (location, clearance, vector) in made.content.gaps.items():
+        own = made.elements_of(name, location)
         if any(element.cell.type != "GAPUNI" for element in own):
-            raise place.refuse("acts on elements of type GAPUNI only")
+            raise location.refuse("acts on elements of type GAPUNI only")
         shown = made.content.root.set_names.get(name, name)
         ends = np.array([element.points for element in own], np.intp)
         bodies = all(point in made.of_solids for point in ends[:, 1].tolist())
         groups.append(
             GapGroup(
-                shown, place, clearance, np.array(vector)[: found.dim] / np.linalg.norm(vector), ends,
-                _whole(found, f"{shown} facets", ends[:, 0], place),
-                _whole(found, f"{shown} opposite facets", ends[:, 1], place) if bodies else "",
+                shown, location, clearance, np.array(vector)[: found.dim] / np.linalg.norm(vector), ends,
+                _whole(found, f"{shown} facets", ends[:, 0], location),
+                _whole(found, f"{shown} opposite facets", ends[:, 1], location) if bodies else "",
             )
         )  # fmt: skip
     return groups
 
 
-def _whole(found: DeckMesh, group: str, points: Indices, place: Place) -> str:
+def _whole(found: DeckMesh, group: str, points: Indices, location: Location) -> str:
     """Make a group of the facets all of whose nodes are among points; CaseError where points belong to none of them."""
     chosen = set(points.tolist())
     faces = found.made.faces_within(chosen)
     if {p for face in faces for p in facet_points(*face)} != chosen:
-        raise place.refuse(
+        raise location.refuse(
             "gap elements are supported on all nodes of whole faces only, from a body to another or to held nodes"
         )
     return found.add_facets(group, faces)
@@ -94,7 +94,7 @@ def add_gap(model: Model, found: DeckMesh, gap: GapGroup, conditions: Conditions
     first, second = model.mesh.points[gap.ends[:, 0]], model.mesh.points[gap.ends[:, 1]]
     size = TOUCHING * float(np.ptp(model.mesh.points, axis=0).max())
     if np.ptp(first @ gap.direction) > size:
-        raise gap.place.refuse("gap elements are supported where their nodes lie in a plane across their direction")
+        raise gap.location.refuse("gap elements are supported where their nodes lie in a plane across their direction")
     if gap.opposite:
         between = second - first
         along = between @ gap.direction
@@ -103,7 +103,7 @@ def add_gap(model: Model, found: DeckMesh, gap: GapGroup, conditions: Conditions
             or np.abs(between - np.outer(along, gap.direction)).max() > size
             or along.mean() < -size
         ):
-            raise gap.place.refuse(
+            raise gap.location.refuse(
                 "gap elements between bodies are supported along their direction, in planes across it only"
             )
         try:
@@ -112,7 +112,7 @@ def add_gap(model: Model, found: DeckMesh, gap: GapGroup, conditions: Conditions
                 clearance=gap.clearance - float(along.mean()),
             )  # fmt: skip
         except FastcontactError as error:
-            raise gap.place.refuse(str(error)) from error
+            raise gap.location.refuse(str(error)) from error
         return {}
     history = _motion(gap, conditions)
     wall = HalfSpace(
@@ -135,7 +135,7 @@ def _motion(gap: GapGroup, conditions: Conditions) -> Table:
         names = [(end, axis, False) for end in gap.ends[:, 1].tolist()]
         tables = {supports.table(name) for name in names if name in supports.tracks and name not in temporary}
         if len(tables) != 1 or not all(name in supports.tracks and name not in temporary for name in names):
-            raise gap.place.refuse(
+            raise gap.location.refuse(
                 "gap elements are supported to nodes that are held, or driven as one, along their direction"
             )
         by_axis.append((float(gap.direction[axis]), np.array(tables.pop())))

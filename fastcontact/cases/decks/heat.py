@@ -11,7 +11,7 @@ import numpy as np
 
 from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import Assembled, Element, Face
-from fastcontact.cases.decks.blocks import Block, Place, Row
+from fastcontact.cases.decks.blocks import Block, Location, Row
 from fastcontact.cases.decks.content import Content, Given, Interaction, Material, Step
 from fastcontact.cases.decks.histories import Histories, by_shape
 from fastcontact.cases.decks.meshing import DeckMesh
@@ -38,12 +38,12 @@ def conductivity(content: Content, current: Material, block: Block) -> None:
 
 def specific_heat(content: Content, current: Material, block: Block) -> None:
     """*SPECIFIC HEAT: a property that neither static nor steady steps use."""
-    content.note(block.place, f"material '{current.name}': no effect, heat is steady, or temperatures are given")
+    content.note(block.location, f"material '{current.name}': no effect, heat is steady, or temperatures are given")
 
 
 def physical_constants(content: Content, block: Block) -> None:
     """*PHYSICAL CONSTANTS: those of radiation, without effect."""
-    content.note(block.place, "no effect: there is no radiation")
+    content.note(block.location, "no effect: there is no radiation")
 
 
 def gap_conductance(content: Content, current: Interaction, block: Block) -> None:
@@ -53,19 +53,19 @@ def gap_conductance(content: Content, current: Interaction, block: Block) -> Non
 
 def gap_heat_generation(content: Content, current: Interaction, block: Block) -> None:
     """*GAP HEAT GENERATION: the share of the work of friction that becomes heat, the same on both sides."""
-    row = block.rows[0] if block.rows else Row(block.place, ())
+    row = block.rows[0] if block.rows else Row(block.location, ())
     share, secondary = row.number(0, 1.0), row.number(1, 0.5)
     if not 0.0 <= share <= 1.0:
-        raise row.place.refuse(
+        raise row.location.refuse(
             f"the share {share:g} of the work of friction that becomes heat must lie between 0 and 1"
         )
     if secondary != 0.5:
-        raise row.place.refuse(
+        raise row.location.refuse(
             f"{secondary:g} of the heat to the secondary side is not supported, only half of it, 0.5"
         )
     if row.number(2, 0.0) > 0.0:
-        raise row.place.refuse("a given velocity is not supported: sides slide by their displacements")
-    current.friction_heat = block.place, share
+        raise row.location.refuse("a given velocity is not supported: sides slide by their displacements")
+    current.friction_heat = block.location, share
 
 
 def conductance_of(content: Content, law: Interaction) -> dict[str, Any]:
@@ -74,9 +74,11 @@ def conductance_of(content: Content, law: Interaction) -> dict[str, Any]:
     for block in law.conductance:
         rows = [(row.number(1, 0.0), row.number(0)) for row in block.rows]
         if len({row.number(2, 0.0) for row in block.rows}) > 1:
-            raise block.place.refuse("a conductance that depends on the temperature is not supported: give one table")
+            raise block.location.refuse(
+                "a conductance that depends on the temperature is not supported: give one table"
+            )
         if not rows or any(b[0] <= a[0] for a, b in pairwise(rows)):
-            raise block.place.refuse("needs conductances with pressures or clearances that ascend")
+            raise block.location.refuse("needs conductances with pressures or clearances that ascend")
         if len(rows) == 1:
             tables["number"] = rows[0][1]
             continue
@@ -86,20 +88,22 @@ def conductance_of(content: Content, law: Interaction) -> dict[str, Any]:
             meant = (
                 "rises with: pressure, as in CalculiX" if by == "pressure" else "falls with: clearance, as in Abaqus"
             )
-            content.note(block.place, f"the conductance is by what it {meant}")
+            content.note(block.location, f"the conductance is by what it {meant}")
         end = (rows[-1][0] * BEYOND, 0.0)
         tables[by] = rows if by == "pressure" else [*rows, end]
         if by == "pressure" and content.heat == "alone":
-            content.note(block.place, "steps of heat alone have no pressures: sides that touch conduct as without any")
+            content.note(
+                block.location, "steps of heat alone have no pressures: sides that touch conduct as without any"
+            )
     given = tables.pop("number", None)
     if given is not None and tables:
-        raise law.conductance[0].place.refuse("one conductance, and a table besides: give one of them")
+        raise law.conductance[0].location.refuse("one conductance, and a table besides: give one of them")
     if given is None and not tables:
         return {}
     try:
         Conductance(law.name, tables or given)
     except ContactError as error:
-        raise law.conductance[0].place.refuse(str(error)) from None
+        raise law.conductance[0].location.refuse(str(error)) from None
     return {"conductance": tables or given}
 
 
@@ -107,20 +111,20 @@ def friction_heat_of(content: Content, law: Interaction) -> dict[str, Any]:
     """Return the option by which the work of friction heats both sides, by the time of the steps."""
     if law.friction_heat is None:
         if law.conductance:
-            content.note(law.place, "friction makes no heat without *GAP HEAT GENERATION, as in CalculiX")
+            content.note(law.location, "friction makes no heat without *GAP HEAT GENERATION, as in CalculiX")
         return {}
-    place, share = law.friction_heat
+    location, share = law.friction_heat
     periods = {step.period for step in content.steps}
     if len(periods) > 1:
-        raise place.refuse("heat of friction is supported in steps of the same length only, which is their time")
+        raise location.refuse("heat of friction is supported in steps of the same length only, which is their time")
     return {"friction_heat": share / periods.pop()}
 
 
-def perfect_conductance(content: Content, model: Model, place: Place) -> Any:
+def perfect_conductance(content: Content, model: Model, location: Location) -> Any:
     """Return the conductance of a tie, whatever pressure and gap."""
     largest = max(np.max(material.conductivity) for material, _ in model.materials)
     h = PERFECT * float(largest) / float(np.ptp(model.mesh.points, axis=0).max())
-    content.note(place, f"heat crosses by a conductance of {h:.3g}: temperatures of both sides differ by some 1e-8")
+    content.note(location, f"heat crosses by a conductance of {h:.3g}: temperatures of both sides differ by some 1e-8")
     return (lambda pressure, gap: np.full(gap.shape, h)) if content.heat == "alone" else h
 
 
@@ -130,21 +134,21 @@ def check_steps(content: Content) -> None:
     content.heat = first.heat if first else ""
     for number, step in enumerate(content.steps):
         if first and step.heat != first.heat and (first.heat == "alone" or number > content.steps.index(first)):
-            raise step.place.refuse(
+            raise step.location.refuse(
                 "steps of heat alone, of heat with displacements, and static ones after these cannot be in one deck: make "
                 "all *HEAT TRANSFER, or *COUPLED TEMPERATURE-DISPLACEMENT"
             )
         for block in (given.block for given in step.given):
             if block.keyword in OF_HEAT and not step.heat:
-                raise block.place.refuse(
+                raise block.location.refuse(
                     "heats bodies in steps with *HEAT TRANSFER or *COUPLED TEMPERATURE-DISPLACEMENT"
                 )
             if block.keyword == "TEMPERATURE" and first:
-                raise block.place.refuse(
+                raise block.location.refuse(
                     "temperatures are computed in this deck: prescribe them by *BOUNDARY, component 11"
                 )
             if block.keyword in ("CLOAD", "DLOAD", "DSLOAD") and step.heat == "alone":
-                raise block.place.refuse(
+                raise block.location.refuse(
                     "is no load of heat: use *COUPLED TEMPERATURE-DISPLACEMENT in place of *HEAT TRANSFER"
                 )
 
@@ -182,18 +186,20 @@ class HeatConditions:
     def prescribe(self, given: Given, row: Row) -> None:
         """Prescribe the temperature of nodes by a line of *BOUNDARY."""
         if not self.made.content.heat:
-            raise row.place.refuse("component 11, the temperature, is none of 1 to 6: in static steps use *TEMPERATURE")
+            raise row.location.refuse(
+                "component 11, the temperature, is none of 1 to 6: in static steps use *TEMPERATURE"
+            )
         if "FIXED" in given.block.parameters:
-            raise row.place.refuse("FIXED is not supported for temperatures: give them")
+            raise row.location.refuse("FIXED is not supported for temperatures: give them")
         for point in self._of_solids(row):
-            self.temperatures.give(point, row.number(3, 0.0), given.amplitude, row.place)
+            self.temperatures.give(point, row.number(3, 0.0), given.amplitude, row.location)
 
     def _of_solids(self, row: Row) -> list[int]:
         """Return the points of a node set in a line; CaseError if one belongs to no solid."""
-        points = self.made.nodes(row.text(0), row.place)
+        points = self.made.nodes(row.text(0), row.location)
         for point in points:
             if point not in self.made.of_solids:
-                raise row.place.refuse(
+                raise row.location.refuse(
                     f"node {self.made.number_of(point)} belongs to no solid, so it has no temperature"
                 )
         return points
@@ -208,46 +214,46 @@ class HeatConditions:
         for row in given.block.rows:
             if keyword == "CFLUX":
                 if row.whole(1, TEMPERATURE) not in (0, TEMPERATURE):
-                    raise row.place.refuse(f"component {row.text(1)} is not 11, that of heat")
+                    raise row.location.refuse(f"component {row.text(1)} is not 11, that of heat")
                 for point in self._of_solids(row):
-                    self.powers.give(point, row.number(2), given.amplitude, row.place)
+                    self.powers.give(point, row.number(2), given.amplitude, row.location)
                 continue
             film = history is self.films
             if film and row.number(3) < 0.0:
-                raise row.place.refuse(f"the coefficient {row.number(3):g} of the film must not be negative")
+                raise row.location.refuse(f"the coefficient {row.number(3):g} of the film must not be negative")
             for name in self._places(keyword, row, row.number(3) if film else None):
                 if film:
                     self.rest[name] = self.reference
-                history.give(name, row.number(2), given.amplitude, row.place)
+                history.give(name, row.number(2), given.amplitude, row.location)
 
     def _places(self, keyword: str, row: Row, coefficient: float | None) -> list[Exchange]:
         """Return where a line of fluxes or films acts."""
         label, letter = row.text(1).upper(), "S" if coefficient is None else "F"
         if keyword in ("DSFLUX", "SFILM"):
             if label != letter:
-                raise row.place.refuse(f"{label[:40]} on a surface is not supported, only {letter}")
-            return [Exchange(keyword, face, (), coefficient) for face in self.made.faces(row.text(0), row.place)]
-        own = self.made.elements_of(row.text(0), row.place)
+                raise row.location.refuse(f"{label[:40]} on a surface is not supported, only {letter}")
+            return [Exchange(keyword, face, (), coefficient) for face in self.made.faces(row.text(0), row.location)]
+        own = self.made.elements_of(row.text(0), row.location)
         if label[:1] == letter and label[1:].isdigit():
-            faces = [(element, self.made.facet(element, int(label[1:]), row.place)) for element in own]
+            faces = [(element, self.made.facet(element, int(label[1:]), row.location)) for element in own]
             return [Exchange(keyword, face, (), coefficient) for face in faces]
         if label == "BF" and keyword == "DFLUX":
             return [Exchange(keyword, None, tuple(own))]
         known = f"{letter}1, {letter}2, ..." + (", BF" if keyword == "DFLUX" else "")
-        raise row.place.refuse(f"{label[:40]} is not supported; known are {known}")
+        raise row.location.refuse(f"{label[:40]} is not supported; known are {known}")
 
     def advance(self, number: int, step: Step) -> None:
         """Go on to the end of step `number`, from 1."""
         for history, what in ((self.temperatures, "a temperature"), (self.films, "a film")):
             given: Histories[Any] = history  # type: ignore[assignment]
-            for name, (_, _, place) in given.changing.items():
+            for name, (_, _, location) in given.changing.items():
                 if self.begun and name not in given.tracks:
-                    raise place.refuse(
+                    raise location.refuse(
                         f"{what} that comes in a later step is not supported: give it from the first one on"
                     )
             for name in given.dying:
-                raise step.place.refuse(
-                    f"{what} of line {given.tracks[name].place.line} that is let go is not supported"
+                raise step.location.refuse(
+                    f"{what} of line {given.tracks[name].location.line} that is let go is not supported"
                 )
         for other in self.histories:
             other.advance(number, step)
@@ -318,13 +324,13 @@ def _reference(made: Assembled, initial: Mapping[int, float]) -> float:
     values = {initial.get(point, 0.0) for point in made.of_solids}
     if len(values) == 1:
         return values.pop()
-    place = content.initial[0].place
+    location = content.initial[0].location
     if content.heat == "coupled" and any(material.expansion for material in content.materials.values()):
-        raise place.refuse(
+        raise location.refuse(
             f"initial temperatures from {min(values):g} to {max(values):g} are not supported where computed ones expand "
             "bodies: strains count from one temperature"
         )
-    content.note(place, "no effect: initial temperatures differ, and steady ones do not depend on them")
+    content.note(location, "no effect: initial temperatures differ, and steady ones do not depend on them")
     return 0.0
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import Assembled, Element
-from fastcontact.cases.decks.blocks import Place, folded
+from fastcontact.cases.decks.blocks import Location, folded
 from fastcontact.cases.decks.content import Axes, Content
 
 ROUND_OFF = 1e-9
@@ -19,18 +19,18 @@ def local_directions(made: Assembled) -> dict[int, Array]:
     return {
         point: local_axes(axes, made.points[point])
         for axes in made.content.axes
-        for point in made.nodes(axes.nodes, axes.place)
+        for point in made.nodes(axes.nodes, axes.location)
     }
 
 
-def orientation_of(content: Content, name: str, place: Place) -> Axes:
+def orientation_of(content: Content, name: str, location: Location) -> Axes:
     """Return the axes of an *ORIENTATION; CaseError if there is none of that name."""
     axes = content.orientations.get(folded(name))
     if axes is None:
         known = ", ".join(content.orientations).lower() or "none"
-        raise place.refuse(f"orientation '{name}' is not defined; orientations: {known}")
-    if axes.distribution and place.keyword != "SOLID SECTION":
-        raise place.refuse(f"orientation '{name}' is one of cells, by a distribution: no use outside of sections")
+        raise location.refuse(f"orientation '{name}' is not defined; orientations: {known}")
+    if axes.distribution and location.keyword != "SOLID SECTION":
+        raise location.refuse(f"orientation '{name}' is one of cells, by a distribution: no use outside of sections")
     return axes
 
 
@@ -41,24 +41,24 @@ def axes_by_cell(made: Assembled, axes: Axes, members: Sequence[Element]) -> Arr
     """
     block = made.content.distributions.get(folded(axes.distribution))
     if block is None:
-        raise axes.place.refuse(f"distribution '{axes.distribution[:80]}' is not defined")
+        raise axes.location.refuse(f"distribution '{axes.distribution[:80]}' is not defined")
     scopes = [scope for scope in made.scopes if made.part(scope) is axes.part]
     default, given = None, {}  # type: Array | None, dict[int, Array]
     for row in block.each():
         points = tuple(row.number(index) for index in range(1, 7))
-        frame = local_axes(Axes(row.place, "", False, points), np.zeros(3))
+        frame = local_axes(Axes(row.location, "", False, points), np.zeros(3))
         if not row.text(0):
             default = frame
             continue
         for scope in scopes:
-            for element in made.elements_of(f"{scope}.{row.text(0)}" if scope else row.text(0), row.place):
+            for element in made.elements_of(f"{scope}.{row.text(0)}" if scope else row.text(0), row.location):
                 given[id(element)] = frame
     first = dict(zip(made.by_kind, np.cumsum([0, *map(len, made.by_kind.values())]).tolist()))
     found = np.tile(np.eye(3), (len(made.solids), 1, 1))
     for element in members:
         own = given.get(id(element), default)
         if own is None:
-            raise block.place.refuse(
+            raise block.location.refuse(
                 f"element {element.number} has no axes, and no line without an element gives those of others"
             )
         found[first[element.solid.element] + element.row] = own
@@ -76,6 +76,6 @@ def local_axes(axes: Axes, point: Array) -> Array:
         first, third = a, np.cross(a, b)
     lengths = np.linalg.norm(first), np.linalg.norm(third)
     if min(lengths) <= ROUND_OFF * max(1.0, float(np.abs(axes.points).max()) if not axes.cylindrical else 0.0):
-        raise axes.place.refuse(f"the local axes are not defined at the point {point.tolist()}")
+        raise axes.location.refuse(f"the local axes are not defined at the point {point.tolist()}")
     first, third = first / lengths[0], third / lengths[1]
     return np.array([first, np.cross(third, first), third])

@@ -25,29 +25,29 @@ def material(content: Content, block: Block) -> Material:
     """*MATERIAL: begins a material."""
     name = block.required("NAME")
     if folded(name) in content.materials:
-        raise block.place.refuse(f"material '{name}' is defined twice")
-    content.materials[folded(name)] = Material(name, block.place)
+        raise block.location.refuse(f"material '{name}' is defined twice")
+    content.materials[folded(name)] = Material(name, block.location)
     return content.materials[folded(name)]
 
 
 def elastic(content: Content, current: Material, block: Block) -> None:
     """*ELASTIC: constants of one temperature."""
     kind = " ".join(block.get("TYPE", "ISOTROPIC").upper().split())
-    found = [known for known in CONSTANTS if len(kind) >= 3 and known.startswith(kind)]
-    if not found:
+    kinds = [known for known in CONSTANTS if len(kind) >= 3 and known.startswith(kind)]
+    if not kinds:
         known = ", ".join(CONSTANTS)
-        raise block.place.refuse(f"material '{current.name}': TYPE={kind[:40]} is not supported; known are {known}")
-    if found[0] != "ISOTROPIC":
-        _with_axes(current, block, found[0])
+        raise block.location.refuse(f"material '{current.name}': TYPE={kind[:40]} is not supported; known are {known}")
+    if kinds[0] != "ISOTROPIC":
+        _with_axes(current, block, kinds[0])
         return
     row = block.only("temperatures" if len(block.rows) > 1 else "")
     E, nu = row.number(0), row.number(1, 0.0)
     if row.text(2):
-        content.note(row.place, "the temperature of the constants has no effect: there is one set of them")
+        content.note(row.location, "the temperature of the constants has no effect: there is one set of them")
     try:
         law = LinearElastic(E=E, nu=nu)
     except ModelError as error:
-        raise row.place.refuse(f"material '{current.name}': {error}") from None
+        raise row.location.refuse(f"material '{current.name}': {error}") from None
 
     current.law = lambda axes: law
 
@@ -57,7 +57,7 @@ def _with_axes(current: Material, block: Block, kind: str) -> None:
     numbers = [row.number(i) for row in block.rows for i in range(len(row.entries)) if row.entries[i]]
     count = CONSTANTS[kind]
     if not count <= len(numbers) <= count + 1:
-        raise block.place.refuse(
+        raise block.location.refuse(
             f"material '{current.name}': {len(numbers)} constants where {kind} has {count}, at one temperature"
         )
     values = numbers[:count]
@@ -70,7 +70,7 @@ def _with_axes(current: Material, block: Block, kind: str) -> None:
     try:
         law(None)
     except ModelError as error:
-        raise block.place.refuse(f"material '{current.name}': {error}") from None
+        raise block.location.refuse(f"material '{current.name}': {error}") from None
     current.law = law
 
 
@@ -90,7 +90,7 @@ def distribution_table(content: Content, part: Part, block: Block) -> None:
     """*DISTRIBUTION TABLE: what distributions hold, which axes of cells alone do here."""
     kinds = [entry.upper() for row in block.rows for entry in row.entries if entry]
     if kinds != ["COORD3D", "COORD3D"]:
-        raise block.place.refuse(
+        raise block.location.refuse(
             f"a distribution of {', '.join(kinds)[:80]} is not supported, only COORD3D, COORD3D of axes"
         )
 
@@ -100,7 +100,7 @@ def distribution(content: Content, part: Part, block: Block) -> None:
     name = block.required("NAME")
     block.choice("LOCATION", ("ELEMENT",))
     if folded(name) in content.distributions:
-        raise block.place.refuse(f"distribution '{name}' is defined twice")
+        raise block.location.refuse(f"distribution '{name}' is defined twice")
     content.distributions[folded(name)] = block
 
 
@@ -110,36 +110,38 @@ def orientation(content: Content, part: Part, block: Block) -> None:
     block.choice("DEFINITION", ("COORDINATES",))
     rows, key = block.rows, folded(name)
     if key in content.orientations:
-        raise block.place.refuse(
-            f"orientation '{name}' is defined twice, first in line {content.orientations[key].place.line}"
+        raise block.location.refuse(
+            f"orientation '{name}' is defined twice, first in line {content.orientations[key].location.line}"
         )
     if not rows:
-        raise block.place.refuse("a data line with six coordinates is needed")
+        raise block.location.refuse("a data line with six coordinates is needed")
     given = rows[0].text(0)
     if given[:1].isalpha() or given[:1] == "_":
         if system == "CYLINDRICAL":
-            raise block.place.refuse("a distribution of axes is supported with SYSTEM=RECTANGULAR only")
+            raise block.location.refuse("a distribution of axes is supported with SYSTEM=RECTANGULAR only")
         _not_turned(rows)
-        content.orientations[key] = Axes(block.place, "", False, (), unquoted(given), part)
+        content.orientations[key] = Axes(block.location, "", False, (), unquoted(given), part)
         return
     points = tuple(rows[0].number(i) for i in range(6))
     if any(rows[0].entries[6:]) and any(rows[0].number(6 + i, 0.0) for i in range(3)):
-        raise rows[0].place.refuse("an origin of the axes is not supported: give points seen from 0, 0, 0")
+        raise rows[0].location.refuse("an origin of the axes is not supported: give points seen from 0, 0, 0")
     _not_turned(rows)
-    content.orientations[key] = Axes(block.place, "", system == "CYLINDRICAL", points, part=part)
+    content.orientations[key] = Axes(block.location, "", system == "CYLINDRICAL", points, part=part)
 
 
 def _not_turned(rows: list[Row]) -> None:
     """Refuse a further rotation about an axis in the second line of an *ORIENTATION."""
     if len(rows) > 1 and rows[1].number(1, 0.0):
-        raise rows[1].place.refuse("a further rotation of the axes is not supported: turn the points of the first line")
+        raise rows[1].location.refuse(
+            "a further rotation of the axes is not supported: turn the points of the first line"
+        )
 
 
 def density(content: Content, current: Material, block: Block) -> None:
     """*DENSITY."""
     current.density = block.only().number(0)
     if not current.density > 0:
-        raise block.place.refuse(f"material '{current.name}': the density {current.density:g} must be positive")
+        raise block.location.refuse(f"material '{current.name}': the density {current.density:g} must be positive")
 
 
 def section(content: Content, part: Part, block: Block) -> None:
@@ -148,10 +150,10 @@ def section(content: Content, part: Part, block: Block) -> None:
     for row in block.rows[:1]:
         thickness = row.number(0, 1.0)
         if not thickness > 0:
-            raise row.place.refuse(f"the thickness {thickness:g} must be positive")
+            raise row.location.refuse(f"the thickness {thickness:g} must be positive")
     orientation = block.get("ORIENTATION")
     part.sections.append(
-        Section(block.place, block.required("ELSET"), block.required("MATERIAL"), thickness, orientation)
+        Section(block.location, block.required("ELSET"), block.required("MATERIAL"), thickness, orientation)
     )
 
 
@@ -159,11 +161,13 @@ def interaction(content: Content, block: Block) -> Interaction:
     """*SURFACE INTERACTION: begins the properties of contact pairs."""
     name = block.required("NAME")
     if folded(name) in content.interactions:
-        raise block.place.refuse(f"surface interaction '{name}' is defined twice")
-    content.interactions[folded(name)] = Interaction(name, block.place)
+        raise block.location.refuse(f"surface interaction '{name}' is defined twice")
+    content.interactions[folded(name)] = Interaction(name, block.location)
     if block.rows:
         block.rows[0].number(0, 1.0)
-        content.note(block.rows[0].place, "the thickness of the interaction has no effect: that of the sections counts")
+        content.note(
+            block.rows[0].location, "the thickness of the interaction has no effect: that of the sections counts"
+        )
     return content.interactions[folded(name)]
 
 
@@ -171,9 +175,9 @@ def changed_interaction(content: Content, block: Block) -> Interaction:
     """*CHANGE FRICTION: begins what holds from the current step on, by the *FRICTION below it."""
     name = block.required("INTERACTION")
     if folded(name) not in content.interactions:
-        known = ", ".join(own.name for own in content.interactions.values()) or "none"
-        raise block.place.refuse(f"surface interaction '{name}' is not defined; interactions: {known}")
-    changed = Interaction(name, block.place, friction=-1.0)  # which it has to say
+        known = ", ".join(interaction.name for interaction in content.interactions.values()) or "none"
+        raise block.location.refuse(f"surface interaction '{name}' is not defined; interactions: {known}")
+    changed = Interaction(name, block.location, friction=-1.0)  # which it has to say
     content.interactions[folded(name)].changes.append((len(content.steps) - 1, changed))
     return changed
 
@@ -199,7 +203,7 @@ def _table(block: Block) -> float | list[tuple[float, float]]:
     try:
         OverclosureLaw("", points)
     except ContactError:
-        raise block.place.refuse(
+        raise block.location.refuse(
             "TABULAR needs pressures and overclosures that both ascend, the first pressure zero"
         ) from None
     return points[1][1] / points[1][0] if len(points) == 2 and points[0][0] == 0.0 else points
@@ -218,12 +222,12 @@ def friction(content: Content, current: Interaction, block: Block) -> None:
     row = block.only()
     current.friction = row.number(0)
     if current.friction < 0:
-        raise row.place.refuse(f"the coefficient of friction {current.friction:g} is negative")
+        raise row.location.refuse(f"the coefficient of friction {current.friction:g} is negative")
     if row.text(1) and row.number(1):
         current.stick = row.positive(1, "stick slope")
-        content.note(row.place, f"{current.stick:g} is taken for the stick slope, as in CalculiX (shear by slip)")
+        content.note(row.location, f"{current.stick:g} is taken for the stick slope, as in CalculiX (shear by slip)")
     if len(row.entries) > 2 and any(row.entries[2:]):
-        raise row.place.refuse(
+        raise row.location.refuse(
             "friction that depends on pressure or temperature is not supported: give one coefficient"
         )
 
@@ -237,8 +241,8 @@ def amplitude(content: Content, block: Block) -> None:
     numbers = [row.number(i) for row in block.rows for i in range(len(row.entries)) if row.entries[i]]
     times, values = numbers[::2], numbers[1::2]
     if not times or len(times) != len(values) or any(b <= a for a, b in pairwise(times)):
-        raise block.place.refuse(f"amplitude '{name}' needs pairs of ascending times and multipliers")
-    content.amplitudes[folded(name)] = Amplitude(block.place, tuple(times), tuple(values), total)
+        raise block.location.refuse(f"amplitude '{name}' needs pairs of ascending times and multipliers")
+    content.amplitudes[folded(name)] = Amplitude(block.location, tuple(times), tuple(values), total)
 
 
 def gap(content: Content, block: Block) -> None:
@@ -246,15 +250,17 @@ def gap(content: Content, block: Block) -> None:
     row = block.only()
     direction = tuple(row.number(i, 0.0) for i in (1, 2, 3))
     if not any(direction):
-        raise row.place.refuse("the direction of the gap elements is missing")
-    content.gaps[folded(block.required("ELSET"))] = (block.place, row.number(0), direction)
+        raise row.location.refuse("the direction of the gap elements is missing")
+    content.gaps[folded(block.required("ELSET"))] = (block.location, row.number(0), direction)
 
 
 def spring(content: Content, block: Block) -> None:
     """*SPRING: stiffness of springs along their line."""
     rows = block.rows
     if len(rows) != 1:
-        raise block.place.refuse("linear springs along their line need an empty line and then one with the stiffness")
+        raise block.location.refuse(
+            "linear springs along their line need an empty line and then one with the stiffness"
+        )
     if rows[0].text(1):
-        raise rows[0].place.refuse("only linear springs are supported: one stiffness")
-    content.springs[folded(block.required("ELSET"))] = (block.place, rows[0].positive(0, "stiffness"))
+        raise rows[0].location.refuse("only linear springs are supported: one stiffness")
+    content.springs[folded(block.required("ELSET"))] = (block.location, rows[0].positive(0, "stiffness"))

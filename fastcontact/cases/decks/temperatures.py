@@ -22,7 +22,7 @@ def expansion(content: Content, current: Material, block: Block) -> None:
     current.expansion = along_axes(current, block)
     if "ZERO" in block.parameters:
         content.note(
-            block.place, "ZERO has no effect: strains count from the initial temperatures, coefficients are constant"
+            block.location, "ZERO has no effect: strains count from the initial temperatures, coefficients are constant"
         )
 
 
@@ -30,14 +30,16 @@ def along_axes(current: Material, block: Block) -> float | tuple[float, ...]:
     """Return coefficients of one temperature, one for all directions or one along each axis."""
     kind = block.choice("TYPE", tuple(COEFFICIENTS))
     if len(block.rows) != 1:
-        raise block.place.refuse(
+        raise block.location.refuse(
             f"material '{current.name}': {len(block.rows)} data lines where one is needed: coefficients that depend on "
             "temperatures are not supported"
         )
     row, count = block.rows[0], COEFFICIENTS[kind]
     values = tuple(row.number(index) for index in range(count))
     if any(row.entries[count + 1 :]):
-        raise row.place.refuse(f"material '{current.name}': TYPE={kind} has {count} coefficients, at one temperature")
+        raise row.location.refuse(
+            f"material '{current.name}': TYPE={kind} has {count} coefficients, at one temperature"
+        )
     return values[0] if kind == "ISO" else values
 
 
@@ -45,7 +47,7 @@ def conductivity_of(material: Material, block: Block) -> float | tuple[float, ..
     """Return the conductivity of a material, one or three along its axes; CaseError if one is not positive."""
     found = along_axes(material, block)
     if not np.min(found) > 0.0:
-        raise block.place.refuse(f"material '{material.name}': the conductivity {np.min(found):g} must be positive")
+        raise block.location.refuse(f"material '{material.name}': the conductivity {np.min(found):g} must be positive")
     return found
 
 
@@ -53,7 +55,7 @@ def initial_conditions(content: Content, block: Block) -> None:
     """*INITIAL CONDITIONS: temperatures of nodes, or stresses of elements, before the first step."""
     kind = " ".join(block.required("TYPE").upper().split())
     if kind not in ("TEMPERATURE", "STRESS"):
-        raise block.place.refuse(f"TYPE={kind[:40]} is not supported, only TEMPERATURE and STRESS")
+        raise block.location.refuse(f"TYPE={kind[:40]} is not supported, only TEMPERATURE and STRESS")
     (content.initial if kind == "TEMPERATURE" else content.stresses).append(block)
 
 
@@ -68,7 +70,7 @@ def give(made: Assembled, histories: Histories[int], given: Given) -> None:
         histories.forget()
     for row in given.block.rows:
         for point, value in _of_row(made, given.block, row):
-            histories.give(point, value, given.amplitude, row.place)
+            histories.give(point, value, given.amplitude, row.location)
 
 
 def _by_point(made: Assembled, block: Block) -> Iterable[tuple[int, float]]:
@@ -78,9 +80,9 @@ def _by_point(made: Assembled, block: Block) -> Iterable[tuple[int, float]]:
 
 def _of_row(made: Assembled, block: Block, row: Row) -> list[tuple[int, float]]:
     if any(row.entries[2:]):
-        raise row.place.refuse("gradients of the temperature are those of beams and shells: give one number")
+        raise row.location.refuse("gradients of the temperature are those of beams and shells: give one number")
     value = row.number(1)
-    return [(point, value) for point in made.nodes(row.text(0), row.place)]
+    return [(point, value) for point in made.nodes(row.text(0), row.location)]
 
 
 def add_temperatures(model: Model, histories: Histories[int]) -> None:
@@ -98,8 +100,8 @@ def add_temperatures(model: Model, histories: Histories[int]) -> None:
         for shape, members in by_shape.items():
             _add(model, members, shape)
         return
-    for place, time in enumerate(times):  # histories that differ from node to node: one field for each corner of them
-        around = sorted({times[0], *times[max(place - 1, 0) : place + 2], times[-1]})
+    for k, time in enumerate(times):  # histories that differ from node to node: one field for each corner of them
+        around = sorted({times[0], *times[max(k - 1, 0) : k + 2], times[-1]})
         hat = tuple((other, float(other == time)) for other in around)
         _add(model, [(point, value) for table, points in rises if (value := _at(table, time)) for point in points], hat)
 
