@@ -101,7 +101,8 @@ def settle_heat(
     for exchange in range(1, MOST_EXCHANGES + 1):
         heated = _conducted(problem, start, load, instant, equilibrium)
         change = largest_difference(heated.rise, rise)
-        if change <= enough * largest(heated.rise) or not problem.model.expands:
+        settled = change <= enough * largest(heated.rise) or not problem.model.expands
+        if settled or _pushes_little(problem, heated.rise - rise, equilibrium[2], enough):
             return replace(heated, balance={**heated.balance, "exchanges": exchange}), equilibrium
         rise = mixing.mixed(rise, heated.rise)
         equilibrium = solve(expanded(problem, load, rise), equilibrium[0])
@@ -111,6 +112,12 @@ def settle_heat(
         "zero with the pressure",
         equilibrium[0].iterate.history if equilibrium[0] is not None else (),
     )
+
+
+def _pushes_little(problem: Problem, rise: Array, balance: Balance, enough: float) -> bool:
+    """Whether the expansion by a rise of the temperature (n_points,) pushes by next to nothing [temperature]."""
+    forces = problem.model.expansion_forces(problem.field, rise)
+    return largest(forces.ravel()) <= max(enough * balance.largest, balance.noise)
 
 
 def expanded(problem: Problem, load: StepLoad, rise: Array | None) -> StepLoad:

@@ -60,7 +60,7 @@ def summarise(
         "probes": {name: _probe(last, point) for name, point in case.probes.items()},
         "von_mises_max": {"value": float(last.von_mises[top]), "at": mesh.points[top].tolist()},
         **({"cell_fields": _extremes(last)} if last.cell_fields else {}),
-        **({} if last.temperature is None else {"heat": {**last.heat, "temperature": _range(last.temperature)}}),
+        **({} if last.temperature is None else {"heat": _heat(last)}),
         "theory": {
             pair: _against_theory(last.contact[pair], case.approach.get(pair), **theories)
             for pair, theories in case.theories.items()
@@ -88,6 +88,12 @@ def _sensitivity(case: Case, last: StepResult, quantity: Asked, by: Sequence[Ask
         return {"quantity": list(quantity), "refused": str(error)}
     derivatives = [{"by": list(parameter), "value": value} for parameter, value in result.derivatives.items()]
     return {"quantity": list(quantity), "value": result.value, "margin": result.margin, "derivatives": derivatives}
+
+
+def _heat(last: StepResult) -> dict[str, Any]:
+    assert last.heat_reaction is not None
+    entering = float(np.maximum(last.heat_reaction, 0.0).sum())
+    return {**last.heat, "entering": entering, "temperature": _range(last.temperature)}
 
 
 def _modes(modes: Modes) -> dict[str, Any]:
@@ -204,7 +210,8 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
     ]
     if parts := [len(s["substeps"]) for s in steps if "substeps" in s]:
         rows.append(f"  {count(len(parts), 'load step')} did not converge as a whole and went in {sum(parts)} parts")
-    for name, contact in summary["contact"].items():
+    strained = summary["von_mises_max"]["value"] > 0.0 or "heat" not in summary
+    for name, contact in summary["contact"].items() if strained else ():
         rows += _contact_lines(name, contact, unit)
     for name, section in steps[-1].get("pretension", {}).items():
         rows.append(
@@ -214,14 +221,16 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
     top = summary["von_mises_max"]
     where = ", ".join(f"{x:.4g}" for x in top["at"])
     largest = valued(top["value"], unit, "pressure", 6)
-    rows.append(f"  largest von Mises stress {largest} at {with_unit(f'({where})', unit, 'length')}")
+    if strained:
+        rows.append(f"  largest von Mises stress {largest} at {with_unit(f'({where})', unit, 'length')}")
     for name, (low, high) in summary.get("cell_fields", {}).items():
         rows.append(f"  {name.replace('_', ' ')} of cells from {low:.4g} to {high:.4g}")
     if heat := summary.get("heat"):
-        powers = ", ".join(f"{name} {heat[name]:.4g}" for name in ("supports", "loads", "films", "friction"))
+        powers = ", ".join(f"{name} {heat[name]:.4g}" for name in ("loads", "films", "friction"))
+        ends = f"prescribed temperatures {heat['entering']:.6g} in, {heat['entering'] - heat['supports']:.6g} out"
         crossing = "".join(f"; across '{name}' {power:.6g}" for name, power in heat["contacts"].items())
         low, high = heat["temperature"]
-        rows.append(f"  temperatures from {low:.6g} to {high:.6g}; heat into the bodies by {powers}{crossing}")
+        rows.append(f"  temperatures from {low:.6g} to {high:.6g}; heat into the bodies by {ends}, {powers}{crossing}")
     if summary["regularised"]:
         rows.append(_regularised_line(summary["regularised"], unit))
     for name, theory in summary["theory"].items():

@@ -9,6 +9,7 @@ stiffness.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -31,9 +32,14 @@ class CohesiveLaw:
     stiffness : float
         Slope of the law before any damage [pressure / length].
     exponent : float
-        Of Benzeggagh and Kenane, between the modes [-].
+        Of Benzeggagh and Kenane, or of the power law, between the modes [-].
     reversible : bool
         Whether the law has no memory, and no resistance to sliding: adhesion.
+    initiation : str
+        When damage of mixed modes begins: ``"bk"``, a limit between those of the modes as for the energies; ``"quadratic"``,
+        where the squares of the tractions over their limits sum to one; ``"maximum"``, where one of them reaches its limit.
+    mixed_mode : str
+        What breaking by mixed modes takes: ``"bk"``, or ``"power"``: powers of the energies over their limits sum to one.
     """
 
     strength: float
@@ -43,14 +49,26 @@ class CohesiveLaw:
     shear_energy: float
     exponent: float = 2.0
     reversible: bool = False
+    initiation: str = "bk"
+    mixed_mode: str = "bk"
 
     def limits(self, opening: Array, sliding: Array) -> tuple[Array, Array]:
         """Return the separations (m,) at which damage begins and ends, by the ratio of opening and sliding (m,) [length]."""
         normal, shear = self.strength / self.stiffness, self.shear_strength / self.stiffness
         square = np.maximum(opening, 0.0) ** 2 + sliding**2
-        mixed = np.divide(sliding**2, square, out=np.zeros_like(square), where=square > 0.0) ** self.exponent
-        onset = np.sqrt(normal**2 + (shear**2 - normal**2) * mixed)
-        energy = self.energy + (self.shear_energy - self.energy) * mixed
+        share = np.divide(sliding**2, square, out=np.zeros_like(square), where=square > 0.0)
+        mixed = share**self.exponent
+        if self.initiation == "quadratic":
+            onset = ((1.0 - share) / normal**2 + share / shear**2) ** -0.5
+        elif self.initiation == "maximum":
+            onset = np.maximum((1.0 - share) / normal**2, share / shear**2) ** -0.5
+        else:
+            onset = np.sqrt(normal**2 + (shear**2 - normal**2) * mixed)
+        if self.mixed_mode == "power":
+            of_opening = ((1.0 - share) / self.energy) ** self.exponent
+            energy = (of_opening + (share / self.shear_energy) ** self.exponent) ** (-1.0 / self.exponent)
+        else:
+            energy = self.energy + (self.shear_energy - self.energy) * mixed
         return onset, 2.0 * energy / (self.stiffness * onset)
 
     def damage(self, opening: Array, sliding: Array, before: Array) -> Array:
@@ -67,7 +85,7 @@ class CohesiveLaw:
         return 0.5 * self.stiffness * onset * end * (separation - onset) / (end - onset)
 
 
-def cohesive_law(strength: float, energy: float, *, reversible: bool = False, **given: float) -> CohesiveLaw:
+def cohesive_law(strength: float, energy: float, *, reversible: bool = False, **given: Any) -> CohesiveLaw:
     """Return a law, with shear as opening and a stiffness that reaches its limit at a small part of the opening at break."""
     stiffness = given.pop("stiffness", strength**2 / (2.0 * ELASTIC * energy))
     shear = {"shear_strength": given.pop("shear_strength", strength), "shear_energy": given.pop("shear_energy", energy)}

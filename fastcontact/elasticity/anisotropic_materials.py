@@ -12,7 +12,7 @@ import numpy as np
 
 from fastcontact.arrays import Array
 from fastcontact.elasticity.loads import LARGEST
-from fastcontact.elasticity.material_axes import Axes, checked_axes
+from fastcontact.elasticity.material_axes import Axes, checked_axes, frames
 from fastcontact.elasticity.materials import (
     Constant,
     Material,
@@ -21,7 +21,7 @@ from fastcontact.elasticity.materials import (
     check_expansion,
     check_positive,
 )
-from fastcontact.elasticity.varying_constants import Varying, wrapped
+from fastcontact.elasticity.varying_constants import CellAxes, Varying, wrapped
 from fastcontact.errors import ModelError
 from fastcontact.mesh.argument_types import check_type
 
@@ -52,7 +52,7 @@ class Orthotropic(Material):
         The material's axes, by default those of the mesh (in axisymmetry: radius, axis, circumference). Two or three vectors
         (x, y, z) at right angles, of any length; in the plane also the first one, (x, y), alone. Or a function from
         positions (n, dim) [length] to unit vectors in rows (n, 3, 3), such as `CylindricalAxes`, taken at the quadrature
-        points of each cell.
+        points of each cell. Or an array (n_cells, 3, 3) of such vectors for each cell of the material or of the mesh.
     density : float, callable or ndarray (n,), optional
         Mass per volume [mass / length^3].
     expansion : float, callable, ndarray (n,) or three of them, optional
@@ -254,7 +254,7 @@ def _take_rest(material: Orthotropic | Anisotropic) -> None:
         if isinstance(value, np.ndarray) and value.shape == (3,):  # along the axes
             value = tuple(value.tolist())
         object.__setattr__(material, name, wrapped(value, vector=True))
-    object.__setattr__(material, "axes", checked_axes(material.axes))
+    object.__setattr__(material, "axes", _axes(material.axes))
     check_density(material.density)
     check_expansion(material.expansion, 3)
     check_conductivity(material.conductivity, 3)
@@ -262,6 +262,15 @@ def _take_rest(material: Orthotropic | Anisotropic) -> None:
         if isinstance(given := getattr(material, name), tuple):
             own = tuple(v if isinstance(v, Varying) else float(v) for v in given)
             object.__setattr__(material, name, own)
+
+
+def _axes(axes: Any) -> Any:
+    """Return the axes of a material in their form; ModelError if those of cells are not at right angles."""
+    if isinstance(axes, CellAxes):
+        return axes
+    if not isinstance(axes, np.ndarray) or axes.ndim != 3:
+        return checked_axes(axes)
+    return CellAxes(frames(lambda points: axes, np.zeros((len(axes), 3)), "3d"))
 
 
 def _check_modulus(name: str, value: Any) -> None:

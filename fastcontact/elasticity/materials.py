@@ -93,7 +93,7 @@ class Material:
     @property
     def varies(self) -> bool:
         """Whether axes, moduli or expansion depend on the position."""
-        return callable(self.axes) or self.graded or bool(varying(self.expansion))
+        return callable(self.axes) or self.graded or bool(varying(self.expansion) or varying(self.axes))
 
     @property
     def graded(self) -> bool:
@@ -111,21 +111,21 @@ class Material:
 
     def bound(self: AnyMaterial, cells: Cells) -> AnyMaterial:
         """Return the material that knows its cells, which constants that vary need; ModelError where these cannot be."""
-        names = [name for name in CONSTANTS if varying(getattr(self, name, None))]
+        names = [name for name in (*CONSTANTS, "axes") if varying(getattr(self, name, None))]
         if not names:
             return self
 
         def known(name: str) -> Any:
             label = f"the constant {name} of the material"
             return mapped(
-                getattr(self, name), lambda v: Varying(v.given, cells, label) if isinstance(v, Varying) else v
+                getattr(self, name), lambda v: type(v)(v.given, cells, label) if isinstance(v, Varying) else v
             )
 
         bound_material = copy.copy(self)
         for name in names:
             object.__setattr__(bound_material, name, known(name))
         for sample in cells.samples():
-            bound_material._check_at(names, *sample)
+            bound_material._check_at([name for name in names if name != "axes"], *sample)
         return bound_material
 
     @typed(ModelError)
@@ -138,7 +138,7 @@ class Material:
         def at(value: Any) -> Any:
             return mapped(value, lambda v: v.at(name, rows, N) if isinstance(v, Varying) else v)
 
-        return SimpleNamespace(**{key: at(getattr(self, key, None)) for key in CONSTANTS})
+        return SimpleNamespace(**{key: at(getattr(self, key, None)) for key in (*CONSTANTS, "axes")})
 
     def compliances(self, constants: Any) -> Array:
         """Return compliances (n, 6, 6) [1 / pressure] in the material's axes, of constants that may be arrays (n,)."""
@@ -224,7 +224,7 @@ class Material:
         given, along = (self if constants is None else constants).expansion, np.empty((len(points), 3))
         for axis in range(3):
             along[:, axis] = given[axis] if isinstance(given, tuple) else given
-        axes = frames(self.axes, points, kinematics)
+        axes = self._frames(points, kinematics, constants)
         tensor = np.einsum("nai,na,naj->nij", axes, along, axes)
         strain = np.stack([tensor[:, i, j] * (1.0 if i == j else 2.0) for i, j in PAIRS], axis=1)
         if np.abs(strain[:, size:]).max(initial=0.0) > ROUND_OFF * np.abs(along).max(initial=0.0):
@@ -245,7 +245,7 @@ class Material:
             along[:, axis] = given[axis] if isinstance(given, tuple) else given
         if not isinstance(given, tuple):
             return np.asarray(along[:, :1, None] * np.eye(dim))
-        axes = frames(self.axes, points, kinematics)
+        axes = self._frames(points, kinematics, constants)
         tensor = np.einsum("nai,na,naj->nij", axes, along, axes)
         if np.abs(tensor[:, :dim, dim:]).max(initial=0.0) > ROUND_OFF * along.max(initial=0.0):
             raise ModelError(
@@ -254,11 +254,15 @@ class Material:
             )
         return np.asarray(tensor[:, :dim, :dim])
 
+    def _frames(self, points: Array, kinematics: str, constants: Any) -> Array:
+        """Return the axes (n, 3, 3) at `points` (n, dim), those of cells from `constants` [-]."""
+        return frames(constants.axes if constants and varying(self.axes) else self.axes, points, kinematics)
+
     def _compliance6(self, points: Array, kinematics: str, constants: Any) -> Array:
         """Return the compliance (n, 6, 6) in the mesh's axes; ModelError where kinematics of the plane do not hold."""
         if kinematics not in KINEMATICS:
             raise ModelError(unknown("kinematics", kinematics, KINEMATICS))
-        of_stress = rotations(frames(self.axes, points, kinematics))
+        of_stress = rotations(self._frames(points, kinematics, constants))
         # Strains turn by the inverse of the transpose, which for stresses in another frame is the rotation back.
         back = np.linalg.inv(of_stress)
         local = self.local_compliance if constants is None or not self.graded else self.compliances(constants)

@@ -199,6 +199,36 @@ class Varying:
         return evaluated(self.given, positions(mesh, nodes, N), self._name).ravel()
 
 
+class CellAxes(Varying):
+    """Axes (n_cells, 3, 3) of a material that differ from cell to cell, unit vectors in rows [-].
+
+    For each cell of the material, or of the mesh.
+    """
+
+    def _place(self, given: Array, cells: Cells) -> None:
+        """Find out from its length whether an array has axes for the cells of the material or of the mesh."""
+        solids = cells.mesh.solids
+        total = sum(map(len, solids.values()))
+        if len(given) not in (cells.count, total):
+            raise ModelError(
+                f"the axes of a material are {len(given)}: they must be as many as its cells, {cells.count}, or those of the "
+                f"mesh, {total}"
+            )
+        found, first = {}, 0
+        for name, block in solids.items():
+            found[name] = np.zeros((len(block), 3, 3))
+            rows = np.arange(len(block)) if len(given) != cells.count else cells.rows.get(name, np.empty(0, np.intp))
+            found[name][rows] = given[first : first + len(rows)]
+            first += len(rows)
+        self._by_cell = found
+
+    def at(self, name: str, rows: Indices, N: Array) -> Array:
+        """Return the axes (n_rows * n, 3, 3) [-] at points of cells, see `Varying.at`."""
+        if self._by_cell is None:
+            raise ModelError("axes by cell are known in the material of a model only")
+        return np.repeat(self._by_cell[name][rows], len(N), axis=0)
+
+
 def positions(mesh: Mesh, nodes: Numbers, N: Array) -> Array:
     """Return places (n_cells * n, dim) [length] in cells with `nodes` (n_cells, n_nodes) of int, by shape values `N`.
 

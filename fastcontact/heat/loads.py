@@ -99,9 +99,9 @@ class HeatSource(VolumeLoad, Heating):
 class NodalHeat(Heating):
     """Heat [power] at every node of a group."""
 
-    KIND, CONSTANT = "the heat at nodes", True
+    KIND = "the heat at nodes"
     group: str
-    value: float
+    value: Value
     ramp: Table | None = None
 
     def _check_place(self, mesh: Mesh, kinematics: str) -> None:
@@ -109,7 +109,8 @@ class NodalHeat(Heating):
             raise ModelError(f"group '{self.group}' is empty: nothing can heat it")
 
     def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
-        forces[mesh.points_of(self.group), 0] = self.value
+        nodes = mesh.points_of(self.group)
+        forces[nodes, 0] = evaluated(self.value, mesh.points[nodes], self.name)
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from fastcontact.mesh.quality import poorest_cell
 from fastcontact.mesh.topology import outer_facets
 from fastcontact.model.hanging_nodes import hanging_nodes_warning
 from fastcontact.model.prescribed_overlap import Supports, prescribed_overlap_warnings
-from fastcontact.model.ramp import Ramp
+from fastcontact.model.ramp import Ramp, Table
 from fastcontact.model.repeated_pairs import split_side_warnings
 
 if TYPE_CHECKING:
@@ -138,15 +138,14 @@ def _named_units(model: Model) -> list[str]:
 def _proportions(model: Model) -> list[str]:
     """Compare prescribed displacements with the size of the model, and loads with its stiffness."""
     size = float(np.ptp(model.mesh.points, axis=0).max())
-    _, prescribed = model.prescribed_by_ramp()
-    moved = max((float(np.abs(values).max(initial=0.0)) for values in prescribed.values()), default=0.0)
+    moved = _pushed(model)
     texts = []
     if moved > DISPLACED * size:
         texts.append(
             f"a displacement of {moved:g} is prescribed, {moved / size:.3g} times the size of the model ({size:g}): are "
             "mesh and displacement in the same unit?"
         )
-    forces = [np.abs(force).sum() for force in model.forces_by_ramp().values()]
+    forces = [_peak(ramp) * np.abs(force).sum() for ramp, force in model.forces_by_ramp().items()]
     depth = 1.0 if model.mesh.dim == 2 and model.kinematics != "axisymmetric" else size
     stiffness = min(material.young[0] for material, _ in model.materials) * size * depth
     strain = max(forces, default=0.0) / stiffness
@@ -156,6 +155,19 @@ def _proportions(model: Model) -> list[str]:
             "lengths and E in one set of units?"
         )
     return texts
+
+
+def _pushed(model: Model) -> float:
+    """Return the largest prescribed displacement, by its history or as it is given without one [length]."""
+    _, prescribed = model.prescribed_by_ramp()
+    return max(
+        (_peak(ramp) * float(np.abs(values).max(initial=0.0)) for ramp, values in prescribed.items()), default=0.0
+    )
+
+
+def _peak(ramp: Table | None) -> float:
+    """Return the largest multiplier of a history by size [-]."""
+    return 1.0 if ramp is None else max(abs(value) for _, value in ramp)
 
 
 def _coincident(model: Model) -> list[str]:
@@ -204,7 +216,7 @@ def _friction(model: Model) -> list[str]:
 
 def _penetrating(model: Model) -> list[str]:
     """Return a warning for each contact whose sides penetrate by more than supports push before they do."""
-    pushed = max((float(np.abs(v).max(initial=0.0)) for v in model.prescribed_by_ramp()[1].values()), default=0.0)
+    pushed = _pushed(model)
     texts = []
     for pair in model.contact if pushed else ():
         bound = model.bind(pair)

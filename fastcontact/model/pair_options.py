@@ -67,9 +67,13 @@ def pair_options(
 
 # Of a cohesive layer and of adhesion: the numbers that must be given, and those that may be.
 LAWS = {
-    "cohesion": (("strength", "energy"), ("stiffness", "shear_strength", "shear_energy", "exponent")),
+    "cohesion": (
+        ("strength", "energy"),
+        ("stiffness", "shear_strength", "shear_energy", "exponent", "initiation", "mixed_mode"),
+    ),
     "adhesion": (("strength", "work"), ("stiffness",)),
 }
+CHOICES = {"initiation": ("bk", "quadratic", "maximum"), "mixed_mode": ("bk", "power")}
 
 
 def _cohesion(name: str, options: Mapping[str, Any]) -> CohesiveLaw | None:
@@ -91,20 +95,25 @@ def _cohesion(name: str, options: Mapping[str, Any]) -> CohesiveLaw | None:
     for key, value in given.items():
         if key not in needed + allowed:
             raise ContactError(unknown(f"number of the {option} of contact '{name}'", str(key), needed + allowed))
+        if key in CHOICES:
+            if value not in CHOICES[key]:
+                raise ContactError(unknown(f"{key} in the {option} of contact '{name}'", str(value), CHOICES[key]))
+            continue
         check_number(f"the {key} in the {option} of contact '{name}'", value)
         if not value > 0:
             raise ContactError(f"the {key} {value} in the {option} of contact '{name}' must be positive")
     law = cohesive_law(
         *(float(given[key]) for key in needed),
         reversible=option == "adhesion",
-        **{key: float(value) for key, value in given.items() if key in allowed},
+        **{key: value if key in CHOICES else float(value) for key, value in given.items() if key in allowed},
     )
-    for strength, energy in ((law.strength, law.energy), (law.shear_strength, law.shear_energy)):
-        if not strength**2 < 2.0 * energy * law.stiffness:
-            raise ContactError(
-                f"the {option} of contact '{name}' would break before its traction falls: its stiffness "
-                f"{law.stiffness:g} must be above {strength**2 / (2.0 * energy):g}, strength^2 / (2 energy)"
-            )
+    shares = np.linspace(0.0, 1.0, 65)
+    onset, end = law.limits(np.sqrt(1.0 - shares), np.sqrt(shares))
+    if not (onset < end).all():
+        raise ContactError(
+            f"the {option} of contact '{name}' would break before its traction falls: its stiffness {law.stiffness:g} must "
+            f"be above {law.stiffness * float((onset / end).max()):g}, strength^2 / (2 energy)"
+        )
     return law
 
 

@@ -7,17 +7,22 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_array, vstack
+from scipy.sparse import csr_array, kron, vstack
 from scipy.sparse.csgraph import connected_components
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.obstacles.rotation import Rotation
+from fastcontact.contact.projection import places
+from fastcontact.contact.search.closest import closest_of_kinds
+from fastcontact.contact.surface import surface
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.errors import ModelError
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.ramp import Table
 from fastcontact.model.relation_rows import APART, matched
 
+# How far off the facets of the other end nodes may lie, and beyond their ends, in facet sizes: chords of curved ends.
+BESIDE = 0.02
 # Part of a row of a relation that has cancelled.
 CANCELLED = 1e-12
 
@@ -86,8 +91,8 @@ def periodic(
 
 def cyclic(
     mesh: Mesh, ends: tuple[str, str], sectors: int, origin: Sequence[float], direction: Sequence[float]
-) -> tuple[list[MultiPointConstraint], PeriodicInterface]:
-    """Return the relations of the two ends of a sector, and which nodes they tie.
+) -> tuple[list[MultiPointConstraint], PeriodicInterface | None]:
+    """Return the relations of the two ends of a sector, and which nodes they tie: None where nodes follow facets.
 
     Parameters
     ----------
@@ -99,32 +104,59 @@ def cyclic(
     origin, direction : sequence of float
         A point of the axis (dim,) [length] and its direction (3,) [-].
 
-    ModelError if the nodes of one end do not lie upon those of the other one after the turn.
+    ModelError if the ends do not lie upon each other after the turn, as nodes or as surfaces.
     """
     name = f"the cyclic symmetry of '{ends[0]}' and '{ends[1]}'"
     first, second = (mesh.points_of(end).astype(np.intp) for end in ends)
-    if not len(first) or len(first) != len(second):
-        raise ModelError(
-            f"{name}: the groups have {len(first)} and {len(second)} nodes, but need as many, one at least"
-        )
+    if not len(first) or not len(second):
+        raise ModelError(f"{name}: one of the groups is empty")
     rotation = Rotation(tuple(map(float, origin)), tuple(map(float, direction)), 2.0 * math.pi / sectors)  # type: ignore[arg-type]
     turns = [_turned(mesh, first, second, rotation, sign) for sign in (1.0, -1.0)]
     distance, match, turn = min(turns, key=lambda one: float(one[0].max()))
     size = float(np.ptp(mesh.points[first], axis=0).max())
     far = int(np.argmax(distance))
-    if distance[far] > APART * size or len(np.unique(match)) < len(match):
-        raise ModelError(
-            f"{name}: point {first[far]} of '{ends[0]}', turned by 1/{sectors} of a turn, lies {distance[far]:.3g} from the "
-            f"nearest node of '{ends[1]}': the ends need nodes upon nodes; check axis and sectors, or mesh them alike"
-        )
-    interface = PeriodicInterface(first, second[match], turn)
-    # u_second = Q u_first: rows (u_second - Q u_first) along the axes of the mesh, none for what lies along the axis on it.
-    rows = csr_array(
-        vstack([_differences(interface, np.column_stack([unit, -turn.T @ unit]), mesh) for unit in np.eye(mesh.dim)])
+    if len(first) == len(second) == len(np.unique(match)) and distance[far] <= APART * size:
+        interface = PeriodicInterface(first, second[match], turn)
+        rows = [_differences(interface, np.column_stack([unit, -turn.T @ unit]), mesh) for unit in np.eye(mesh.dim)]
+        return [_without_zeros(name, csr_array(vstack(rows)))], interface
+    dependent, facets = (ends[0], ends[1]) if len(first) >= len(second) else (ends[1], ends[0])
+    if all(mesh.cells_of(end, dim=mesh.dim - 1) for end in ends):
+        for sign in (1.0, -1.0):
+            if (rows_of := _following(mesh, dependent, facets, rotation, sign)) is not None:
+                return [_without_zeros(name, rows_of)], None
+    raise ModelError(
+        f"{name}: point {first[far]} of '{ends[0]}', turned by 1/{sectors} of a turn, lies {distance[far]:.3g} from the "
+        f"nearest node of '{ends[1]}', and the groups are no facets that lie upon each other: check axis and sectors"
     )
+
+
+def _following(mesh: Mesh, dependent: str, facets: str, rotation: Rotation, sign: float) -> csr_array | None:
+    """Return rows by which the nodes of one end have the turned displacements of the facets of the other one that they face.
+
+    None where nodes, turned, do not lie on these. Linear fields meet them exactly.
+    """
+    other, nodes = surface(mesh, facets), mesh.points_of(dependent).astype(np.intp)
+    turn, centre = rotation.matrix(sign * rotation.angle), np.array(rotation.centre)
+    corners = other.corners(mesh.points)
+    near = closest_of_kinds((mesh.points[nodes] - centre) @ turn.T + centre, corners)
+    sizes = np.concatenate([np.ptp(block, axis=1).max(axis=1) for block in corners])
+    if (near.distance > BESIDE * sizes[near.facet]).any() or (near.overhang > BESIDE).any():
+        return None
+    on = places(other, near.facet, near.xi)
+    m, dim, n = len(nodes), mesh.dim, mesh.n_points
+    weights = csr_array(
+        (on.shape.ravel(), (np.repeat(np.arange(m), on.nodes.shape[1]), on.nodes.ravel())), shape=(m, n)
+    )
+    own = csr_array((np.ones(m), (np.arange(m), nodes)), shape=(m, n))
+    return csr_array(kron(own, turn) - kron(weights, np.eye(dim)))
+
+
+def _without_zeros(name: str, rows: csr_array) -> MultiPointConstraint:
+    """Return a relation without what is round-off in its rows, and without rows of nothing else: along the axis on it."""
+    rows.sum_duplicates()
     rows.data[np.abs(rows.data) < CANCELLED] = 0.0
     rows.eliminate_zeros()
-    return [MultiPointConstraint(name, csr_array(rows[np.diff(rows.indptr) > 0]))], interface
+    return MultiPointConstraint(name, csr_array(rows[np.diff(rows.indptr) > 0]))
 
 
 def _turned(

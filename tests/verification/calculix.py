@@ -14,21 +14,21 @@ CCX = shutil.which("ccx")
 needs_calculix = pytest.mark.skipif(
     CCX is None, reason="CalculiX (ccx, in Debian the package calculix-ccx) is not installed"
 )
-PRINTED = {"displacements": "U", "forces": "RF"}
+PRINTED = {"displacements": "U", "forces": "RF", "temperatures": "NT"}
 END_OF_STEP = re.compile(r"^\*end\s*step.*$", re.IGNORECASE | re.MULTILINE)
 FIRST_STEP = re.compile(r"^\*step\b.*$", re.IGNORECASE | re.MULTILINE)
 
 
-def solved(path, folder, numbers, limit=120.0):
+def solved(path, folder, numbers, limit=120.0, asked="U, RF"):
     """Run a copy of the deck `path` in `folder` with prints of the nodes `numbers` added to every step.
 
-    Returns by pseudo-time the displacements and the forces of nodes: ``{time: {"U": {node: (3,)}, "RF": ...}}``. Forces are
-    internal ones: what loads put on the same nodes is in them.
+    Returns by pseudo-time the displacements and the forces of nodes, or what is `asked` for:
+    ``{time: {"U": {node: (3,)}, "RF": ...}}``. Forces are internal ones: what loads put on the same nodes is in them.
     """
     text = path.read_text(encoding="utf-8")
     listed = "\n".join(",".join(map(str, numbers[k : k + 12])) for k in range(0, len(numbers), 12))
     text = FIRST_STEP.sub(lambda found: f"*NSET, NSET=COMPARED\n{listed}\n{found[0]}", text, count=1)
-    text = END_OF_STEP.sub(lambda found: f"*NODE PRINT, NSET=COMPARED\nU, RF\n{found[0]}", text)
+    text = END_OF_STEP.sub(lambda found: f"*NODE PRINT, NSET=COMPARED\n{asked}\n{found[0]}", text)
     for beside in path.parent.glob("*.inc"):
         shutil.copy(beside, folder)
     (folder / "run.inp").write_text(text, encoding="utf-8")
@@ -44,10 +44,10 @@ def printed(text):
     """Return what `solved` does from the text of a ``.dat`` file."""
     found, table = {}, None
     for line in text.splitlines():
-        head = re.match(r"\s*(displacements|forces) \(.*\) for set COMPARED and time\s+(\S+)", line)
+        head = re.match(r"\s*(displacements|forces|temperatures)( \(.*\))? for set COMPARED and time\s+(\S+)", line)
         if head:
-            table = found.setdefault(float(head[2]), {}).setdefault(PRINTED[head[1]], {})
-        elif table is not None and re.match(r"\s*\d+(\s+\S+){3}\s*$", line):
+            table = found.setdefault(float(head[3]), {}).setdefault(PRINTED[head[1]], {})
+        elif table is not None and re.match(r"\s*\d+(\s+\S+){1,3}\s*$", line):
             node, *values = line.split()
             table[int(node)] = np.array(values, float)
         elif line.strip():

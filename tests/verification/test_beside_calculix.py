@@ -20,18 +20,18 @@ MATERIAL = "*MATERIAL, NAME=STEEL\n*ELASTIC\n210000., 0.3\n*DENSITY\n7.8E-9\n*EX
 BLOCK = "*SOLID SECTION, ELSET={}, MATERIAL=STEEL\n"
 
 
-def both(text, folder):
+def both(text, folder, asked="U, RF"):
     """Return, of every step that both end, the step here and CalculiX's displacements and forces (n, dim)."""
     path = folder / "deck.inp"
     path.write_text(text, encoding="utf-8")
     deck = fc.read_deck(path)
     numbers = list(range(1, deck.model.mesh.n_points + 1))
-    found = calculix.solved(path, folder, numbers)
+    found = calculix.solved(path, folder, numbers, asked=asked)
     dim, steps = deck.model.mesh.dim, []
     for step in deck.solve():
         for time, tables in found.items():
             if abs(time - step.load_factor) < 1e-9 and step.load_factor == round(step.load_factor):
-                theirs = [np.array([tables[name][n][:dim] for n in numbers]) for name in ("U", "RF")]
+                theirs = [np.array([tables[name][n][:dim] for n in numbers]) for name in asked.split(", ")]
                 steps.append((step, *theirs))
     assert len(steps) == round(deck.ramp.instants[-1])
     return steps
@@ -177,6 +177,33 @@ def test_a_sector_of_a_wheel(element, tmp_path):
     assert found[0][0].reaction[held, 1] == pytest.approx(-300.0 * lever, rel=5e-3)
 
 
+@pytest.mark.parametrize(("element", "differ"), [("hex8", 2e-3), ("hex20", 2e-3)])
+def test_a_sector_whose_ends_have_other_meshes(element, differ, tmp_path):
+    """Nodes of one end follow the facets of the other one; CalculiX interpolates between their triangles.
+
+    Free expansion, linear in space, is exact here; what the pressure does differs by the interpolation.
+    """
+    sectors, mesh = 12, box((1.0, 1.0, 0.4), (4, 3, 2), element)
+    s, t, z = mesh.points.T
+    radius, angle = 20.0 + 20.0 * (t + 0.3 * s * t * (1.0 - t)), (0.5 - s) * 2.0 * np.pi / sectors
+    mesh = mesh.replace(points=np.column_stack([radius * np.cos(angle), radius * np.sin(angle), 10.0 * z]))
+    inside = mesh.points_of("YMIN")
+    held = int(inside[np.abs(mesh.points[inside, 1]).argmin()])
+    text = deck_of(mesh, ["BOX"], ["ZMIN"], ["XMIN", "XMAX", "YMIN"]) + MATERIAL + BLOCK.format("BOX")
+    text += "*TIE, NAME=ROUND, CYCLIC SYMMETRY, POSITION TOLERANCE=0.1\nS_XMIN, S_XMAX\n"
+    text += f"*CYCLIC SYMMETRY MODEL, N={sectors}, NGRAPH=1, TIE=ROUND\n0., 0., 0., 0., 0., 1.\n"
+    free = np.setdiff1d(mesh.points_of("ZMIN"), [*mesh.points_of("XMIN"), *mesh.points_of("XMAX")])
+    text += "*BOUNDARY\n" + "".join(f"{node + 1}, 3\n" for node in free) + f"{held + 1}, 2\n"
+    text += f"*NSET, NSET=ALL, GENERATE\n1, {mesh.n_points}\n"
+    steps = "*STEP\n*STATIC\n*DSLOAD\nS_YMIN, P, 50.\n*END STEP\n"
+    ((step, U, _),) = both(text + steps, tmp_path)
+    assert deviation(step, U) < differ
+    heated = "*STEP\n*STATIC\n*TEMPERATURE\nALL, 100.\n*END STEP\n"
+    (tmp_path / "heated.inp").write_text(text + heated, encoding="utf-8")
+    (step,) = fc.read_deck(tmp_path / "heated.inp").solve()
+    assert step.displacement == pytest.approx(1.2e-3 * mesh.points, abs=1e-12)
+
+
 @pytest.mark.parametrize(
     ("law", "element", "force", "shape"), [("HARD", "quad4", 3e-3, 1e-2), ("LINEAR", "quad8", 1e-3, 4e-3)]
 )
@@ -196,3 +223,48 @@ def test_a_cylinder_pressed_on_a_block(law, element, force, shape, tmp_path):
     ((step, U, RF),) = both(text, tmp_path)
     assert deviation(step, U) < shape
     assert reaction_differs(step, RF, mesh.points_of("CYLINDER_TOP"), 1) < force
+
+
+CONDUCTING = """*MATERIAL, NAME=STEEL
+*ELASTIC
+210000., 0.3
+*EXPANSION
+1.2E-5
+*CONDUCTIVITY
+50.
+"""
+
+
+EXACTLY = "*CONTROLS, PARAMETERS=FIELD\n1.E-9, 1.E-9\n"  # CalculiX's own criterion leaves 1e-4 of the temperatures
+
+
+def on_faces(text, surface, letter, values):
+    """Return data lines of a surface's faces with the labels of fluxes or films."""
+    faces = text.split(f"NAME={surface}, TYPE=ELEMENT\n")[1].split("*")[0]
+    return faces.replace("S", letter).replace("\n", f", {values}\n")
+
+
+@pytest.mark.parametrize("element", ["hex8", "hex20"])
+def test_heat_of_a_source_through_two_blocks_into_a_film(element, tmp_path):
+    mesh = stacked(element, (2, 2, 2), (2, 2, 2))
+    text = stack_deck(mesh, "*SURFACE INTERACTION, NAME=I\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n1.E9\n")
+    text = text.replace(MATERIAL, CONDUCTING).replace("1.E9\n", "1.E9\n*GAP CONDUCTANCE\n7.\n")
+    text += "*CONTACT PAIR, INTERACTION=I, TYPE=SURFACE TO SURFACE\nS_U_ZMIN, S_L_ZMAX\n"
+    text += "*BOUNDARY\nL_ZMIN, 11, 11, 100.\n*STEP\n*HEAT TRANSFER, STEADY STATE\n" + EXACTLY
+    text += "*DFLUX\nL_BOX, BF, 4.\n*FILM\n" + on_faces(text, "S_U_ZMAX", "F", "30., 2.") + "*END STEP\n"
+    ((step, NT),) = both(text, tmp_path, "NT")
+    assert abs(step.temperature - NT[:, 0]).max() < DIGITS * np.ptp(NT)
+
+
+def test_a_bar_bends_by_the_heat_that_passes(tmp_path):
+    """Of temperatures that are linear in space: CalculiX takes thermal strains of quadratic cells from their corners."""
+    mesh = bar("hex20")
+    text = deck_of(mesh, ["BOX"], ["XMIN", "ZMIN"], ["ZMAX"]) + CONDUCTING + BLOCK.format("BOX")
+    text += "*INITIAL CONDITIONS, TYPE=TEMPERATURE\n" + "".join(f"{n}, 20.\n" for n in range(1, mesh.n_points + 1))
+    text += (
+        "*BOUNDARY\nXMIN, 1, 3\nZMIN, 11, 11, 60.\n*STEP\n*UNCOUPLED TEMPERATURE-DISPLACEMENT, STEADY STATE\n1., 1.\n"
+    )
+    text += EXACTLY + "*DFLUX\n" + on_faces(text, "S_ZMAX", "S", "800.") + "*END STEP\n"
+    ((step, NT, U),) = both(text, tmp_path, "NT, U")
+    assert abs(step.temperature - NT[:, 0]).max() < DIGITS * np.ptp(NT)
+    assert deviation(step, U) < DIGITS

@@ -83,6 +83,11 @@ class Assembled:
         ]
 
     @cached_property
+    def of_solids(self) -> set[int]:
+        """The points of all solids."""
+        return {point for own in self.solids for point in own.points}
+
+    @cached_property
     def discrete(self) -> list[Element]:
         """All gap elements and springs."""
         return [element for elements in self.elements.values() for element in elements.values() if element.type is None]
@@ -90,6 +95,10 @@ class Assembled:
     def part(self, scope: str) -> Part:
         """Return the part of an instance, or what belongs to none."""
         return self.content.instances[scope].part if scope else self.content.root
+
+    def turned(self, scope: str) -> bool:
+        """Whether an instance is turned."""
+        return bool(scope and self.content.instances[scope].rotation)
 
     @cached_property
     def scopes(self) -> list[str]:

@@ -62,6 +62,13 @@ class Row:
             raise self.location.refuse(f"'{self.text(index)[:LONGEST_QUOTED]}' is no whole number")
         return int(value)
 
+    def positive(self, index: int, what: str) -> float:
+        """Return an entry as a positive number; `what` it is says the error."""
+        value = self.number(index)
+        if not value > 0:
+            raise self.location.refuse(f"the {what} {value:g} must be positive")
+        return value
+
 
 @dataclass(frozen=True, slots=True)
 class Lines:
@@ -97,6 +104,14 @@ class Block:
     def each(self) -> Iterator[Row]:
         """Yield `rows`, one at a time."""
         return (row for row in self.lines if any(row.entries))
+
+    def only(self, why: str = "") -> Row:
+        """Return the only data line; CaseError if there are others: constants that depend on `why`."""
+        rows = self.rows
+        if len(rows) != 1:
+            text = f"{len(rows)} data lines where one is needed"
+            raise self.location.refuse(text + (f": constants that depend on {why} are not supported" if why else ""))
+        return rows[0]
 
     def get(self, name: str, default: str = "") -> str:
         """Return the value of a parameter, `default` where it is not given or has none."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,28 +12,30 @@ from scipy.sparse import csr_array, vstack
 from scipy.spatial import cKDTree
 
 from fastcontact.arrays import Array
-from fastcontact.cases.decks.assembled import Assembled, Element, assembled, facet_points
+from fastcontact.cases.decks.assembled import Assembled, Element, assembled
 from fastcontact.cases.decks.blocks import Location, folded
+from fastcontact.cases.decks.cohesive import cohesion_of
 from fastcontact.cases.decks.conditions import Acting, Component, Conditions, Distributed
 from fastcontact.cases.decks.content import Content, Interaction, Material, Pair, Section, Step
 from fastcontact.cases.decks.cyclic_symmetry import add_sectors
-from fastcontact.cases.decks.histories import JUMP, shape_of
+from fastcontact.cases.decks.gaps import add_gap, check_discrete, gap_groups
+from fastcontact.cases.decks.heat import HELD, conductance_of, friction_heat_of, perfect_conductance
+from fastcontact.cases.decks.histories import JUMP, Histories, by_shape
 from fastcontact.cases.decks.initial_stresses import add_initial_stresses
-from fastcontact.cases.decks.local_axes import local_axes, orientation_of
+from fastcontact.cases.decks.local_axes import axes_by_cell, local_axes, orientation_of
 from fastcontact.cases.decks.meshing import DeckMesh, begun, group_of_surface, secondary_group
 from fastcontact.cases.decks.nonlinear import strain_of
 from fastcontact.cases.decks.pretension import add_sections, cut_sections
 from fastcontact.cases.decks.relating import make_rotations, relations_of
 from fastcontact.cases.decks.stepping import MOST_PARTS
-from fastcontact.cases.decks.temperatures import add_temperatures
+from fastcontact.cases.decks.temperatures import add_temperatures, conductivity_of
 from fastcontact.contact.integration import all_nodes_carry
-from fastcontact.contact.obstacles.shapes import HalfSpace
 from fastcontact.elasticity.anisotropic_materials import Orthotropic
 from fastcontact.elasticity.material_axes import CylindricalAxes
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, TemporaryConstraint
 from fastcontact.elasticity.nonlinear_materials import NonlinearElastic
-from fastcontact.errors import FastcontactError
+from fastcontact.errors import ContactError, MeshError, ModelError
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, Table
 
@@ -56,6 +57,8 @@ class Building:
         Relations that are supports: those along local axes, and those that come or go between steps.
     linearised : str
         Why small strains are solved although a step has NLGEOM; empty where not.
+    driven : dict of (int, int) to Table
+        Motions of the nodes of gap elements that belong to no solid, by point and component [length].
     gap_ends : dict of str to dict of int to int
         By the name of a contact made of gap elements: its nodes, and the nodes behind the gaps.
     """
@@ -64,22 +67,43 @@ class Building:
         self.content = content
         self.made: Assembled = assembled(content)
         self.found: DeckMesh = begun(self.made)
-        make_rotations(self.found)
+        alone = content.heat == "alone"
+        if not alone:
+            make_rotations(self.found)
         materials, self.thickness = self._materials()
         conditions = Conditions(self.found)
         self._check_pairs()
         conditions.run()
         groups = self._groups(conditions)
-        gaps = self._gap_groups()
-        mesh = cut_sections(self.found, self.found.mesh())
+        heat = conditions.heat.loads(self.thickness)
+        gaps = [] if alone else gap_groups(self.found)
+        mesh = self.found.mesh() if alone else cut_sections(self.found, self.found.mesh())
         strain, self.linearised = strain_of(content, [law for law, _ in materials])
-        self.model = Model(mesh, self.found.kinematics, case_text, strain=strain)
+        reference = conditions.heat.reference
+        self.model = Model(mesh, self.found.kinematics, case_text, strain=strain, reference_temperature=reference)
         for material, group in materials:
             self.model.add_material(material, group)
         self.local_supports: list[MultiPointConstraint] = []
+        self.driven: dict[tuple[int, int], Table] = {}
+        self.links: list[MultiPointConstraint] = []
+        if alone:
+            self.model.fix(self._point_group("held", range(mesh.n_points)), "xyz"[: mesh.dim])
+            add_sectors(self.model, self.found)
+        else:
+            self._mechanics(conditions, groups)
+        for add in heat:
+            add(self.model)
+        self._contact()
+        self.gap_ends: dict[str, dict[int, int]] = {}
+        for own in gaps:
+            self.gap_ends.update(add_gap(self.model, self.found, own, conditions))
+        self.ramp = self._ramp(conditions)
+
+    def _mechanics(self, conditions: Conditions, groups: list[tuple[str, Table]]) -> None:
+        """Add supports, relations, loads, temperatures and springs to the model."""
         self._supports(conditions)
-        self.links = relations_of(self.found, self.model.mesh)
-        self.model.relations.extend(self.links)
+        self.links += relations_of(self.found, self.model.mesh)
+        self.model.relations += self.links
         self.links += add_sections(self.model, self.found, conditions.locks)
         self.links += add_sectors(self.model, self.found)
         self._forces(conditions)
@@ -88,9 +112,6 @@ class Building:
         add_temperatures(self.model, conditions.temperatures)
         add_initial_stresses(self.model, self.found)
         self._springs()
-        self._contact()
-        self.gap_ends = self._gaps(gaps, conditions)
-        self.ramp = self._ramp(conditions)
 
     def _materials(self) -> tuple[list[tuple[Any, str]], float]:
         """Return materials with groups of solids, and the thickness; every solid needs a section."""
@@ -121,7 +142,7 @@ class Building:
         materials = []
         for (name, turned, modes), members in by_material.items():
             material = self.content.materials[name]
-            axes = self._axes(members[0].section)
+            axes = self._axes(members[0].given_section, members)
             group = f"material {material.name}" + (f" along {turned.lower()}" if turned else "")
             group += " with incompatible modes" if modes else ""
             materials.append(
@@ -132,11 +153,18 @@ class Building:
             )
         return materials, thickness or 1.0
 
-    def _axes(self, section: Section) -> Any:
-        """Return the axes of the material of a section, None for those of the mesh."""
+    def _axes(self, section: Section, members: Sequence[Element]) -> Any:
+        """Return the axes of the material of a section with its elements, None for those of the mesh."""
         if not section.orientation:
             return None
         axes = orientation_of(self.content, section.orientation, section.location)
+        for element in members:
+            if axes.part is not self.content.root and self.made.turned(element.scope):
+                raise axes.location.refuse(
+                    "axes of a part whose instance is turned are not supported: give them in the assembly"
+                )
+        if axes.distribution:
+            return axes_by_cell(self.made, axes, members)
         if axes.cylindrical:
             a, b = np.array(axes.points[:3]), np.array(axes.points[3:])
             return CylindricalAxes(tuple(a.tolist()), tuple((b - a).tolist()))
@@ -147,7 +175,7 @@ class Building:
         if material is None:
             known = ", ".join(m.name for m in self.content.materials.values()) or "none"
             raise section.location.refuse(f"material '{section.material}' is not defined; materials: {known}")
-        if material.law is None:
+        if material.law is None and self.content.heat != "alone":
             raise material.location.refuse(f"material '{material.name}' has no *ELASTIC")
         return material
 
@@ -195,18 +223,21 @@ class Building:
         return name
 
     def _supports(self, conditions: Conditions) -> None:
-        mesh, alike = self.model.mesh, {}  # type: tuple[Any, dict[tuple[int, Table], list[int]]]
+        mesh, alike = self.model.mesh, {}  # type: tuple[Any, dict[int, list[tuple[Table, list[int]]]]]
         temporary = conditions.temporary()
         self._temporary_supports(conditions, temporary)
         at_times = {name for name, _ in temporary}
+        alone = {e.points[1] for e in self.made.discrete if e.cell.type == "GAPUNI"} - self.made.of_solids
         for table, names in conditions.supports.alike():
             for name in (name for name in names if name not in at_times):
                 point, axis, local = name
-                if local:
+                if point in alone:
+                    self.driven[point, axis] = table
+                elif local:
                     self._local_support(conditions, name, table)
                 else:
-                    alike.setdefault((axis, table), []).append(point)
-        for axis, points, value, table in _by_shape(alike):
+                    alike.setdefault(axis, []).append((table, [point]))
+        for axis, points, value, table in _by_axis(alike):
             group = self._point_group("support", points)
             if callable(value) or any(factor for _, factor in table):
                 self.model.prescribe(group, ramp=table, **{"xyz"[axis]: value})
@@ -245,7 +276,7 @@ class Building:
         return csr_array((direction, (np.zeros(dim, int), columns)), shape=(1, self.model.n_dofs))
 
     def _forces(self, conditions: Conditions) -> None:
-        alike: dict[tuple[int, Table], list[int]] = {}
+        alike: dict[int, list[tuple[Table, list[int]]]] = {}
         for table, names in conditions.forces.alike():
             along: dict[tuple[int, float], list[int]] = {}
             for point, axis, local in names:
@@ -254,8 +285,8 @@ class Building:
                     along.setdefault((k, float(direction[k])), []).append(point)
             for (k, cosine), points in along.items():
                 scaled = tuple((t, v * cosine / self.thickness) for t, v in table)
-                alike.setdefault((k, scaled), []).extend(points)
-        for axis, points, value, table in _by_shape(alike):
+                alike.setdefault(k, []).append((scaled, points))
+        for axis, points, value, table in _by_axis(alike):
             if any(factor for _, factor in table):
                 group = self._point_group("force", points)
                 self.model.add_force(group, distribute=False, ramp=table, **{"xyz"[axis]: value})
@@ -300,24 +331,17 @@ class Building:
                 if element.cell.type != "SPRINGA":
                     raise location.refuse(f"element {element.number} is no spring of type SPRINGA")
                 self.model.add_spring(element.points[0], element.points[1], axial=stiffness / self.thickness)
-        self._check_discrete("SPRINGA", self.content.springs, "*SPRING")
-
-    def _check_discrete(self, kind: str, given: Mapping[str, Any], needed: str) -> None:
-        """Refuse springs and gap elements without properties."""
-        with_one = {member for name, entry in given.items() for member in self.made.elements_of(name, entry[0])}
-        for element in self.made.discrete:
-            if element.cell.type == kind and element not in with_one:
-                raise element.cell.location.refuse(f"element {element.number} of type {kind} has no {needed}")
+        check_discrete(self.made, "SPRINGA", self.content.springs, "*SPRING")
 
     def _contact(self) -> None:
         for pair in self.content.pairs:
             secondary, primary = (group_of_surface(self.found, name) for name in (pair.secondary, pair.primary))
-            options = {"kind": "tied"} if pair.tied else self._options(pair)
-            if secondary in self.found.loose:
-                options.update(self._at_nodes(pair, secondary))
             try:
+                options = self._tied(pair) if pair.tied else self._options(pair)
+                if secondary in self.found.loose:
+                    options.update(self._at_nodes(pair, secondary))
                 self.model.add_contact(f"{secondary}/{primary}", secondary=secondary, primary=primary, **options)
-            except FastcontactError as error:
+            except (ModelError, MeshError, ContactError) as error:
                 raise pair.location.refuse(str(error)) from error
 
     def _at_nodes(self, pair: Pair, secondary: str) -> dict[str, Any]:
@@ -333,7 +357,11 @@ class Building:
 
     def _options(self, pair: Pair) -> dict[str, Any]:
         law = self.content.interactions[folded(pair.interaction)]
-        options: dict[str, Any] = {}
+        options: dict[str, Any] = conductance_of(self.content, law) if self.content.heat else {}
+        if self.content.heat == "alone":
+            return {**options, "kind": "gap_only", **self._fitted(pair)}
+        if law.cohesion:
+            return {**options, **cohesion_of(self.content, law), **self._fitted(pair, glued=True)}
         if law.kind != "unilateral":
             if law.friction or law.changes:
                 raise law.location.refuse(f"friction with {law.kind} contact is not supported")
@@ -341,15 +369,33 @@ class Building:
         if law.penalty is not None and law.kind != "tied":
             options["penalty"] = law.penalty
         options.update(_friction(law, len(self.content.steps)))
-        if pair.adjust or pair.clearance is not None:
-            options.update(self._fitted(pair))
-        return options
+        if "friction" in options and self.content.heat:
+            options.update(friction_heat_of(self.content, law))
+        return {**options, **self._fitted(pair)}
 
-    def _fitted(self, pair: Pair) -> dict[str, Any]:
-        """Return the clearance that brings the sides to where ADJUST or *CLEARANCE say; refused where no number does."""
+    def _tied(self, pair: Pair) -> dict[str, Any]:
+        """Return the options of a tie, through which heat passes where it is computed."""
+        if not self.content.heat:
+            return {"kind": "tied"}
+        kind = "gap_only" if self.content.heat == "alone" else "tied"
+        return {"kind": kind, "conductance": perfect_conductance(self.content, self.model, pair.location)}
+
+    def _fitted(self, pair: Pair, glued: bool = False) -> dict[str, Any]:
+        """Return the clearance that brings the sides to where ADJUST or *CLEARANCE say; refused where no number does.
+
+        CaseError where sides that are `glued` are apart, which they would not be where they do not touch.
+        """
+        if not (pair.adjust or glued) and pair.clearance is None:
+            return {}
         secondary, primary = (group_of_surface(self.found, name) for name in (pair.secondary, pair.primary))
         gaps, places = nodal_gaps(self.model, secondary, primary, self.found.loose.get(secondary, []))
         size = TOUCHING * float(np.ptp(self.model.mesh.points, axis=0).max())
+        if glued:
+            if gaps.max() > size or pair.clearance is not None:
+                raise pair.location.refuse(
+                    f"a cohesive layer between sides that are {gaps.max():.6g} apart is not supported"
+                )
+            return {}
         if pair.clearance is not None:
             if np.ptp(gaps) > size:
                 raise pair.location.refuse(
@@ -375,60 +421,15 @@ class Building:
         nodes, closing = cKDTree(places), -np.where(gaps <= within, gaps, 0.0)
         return {"clearance": lambda points: closing[nodes.query(points)[1]]}
 
-    def _gap_groups(self) -> dict[str, tuple[str, list[tuple[int, int]]]]:
-        """Make groups of the facets behind gap elements; return their names, with the points of each element."""
-        groups = {}
-        self._check_discrete("GAPUNI", self.content.gaps, "*GAP")
-        for name, (location, _, _) in self.content.gaps.items():
-            elements = self.made.elements_of(name, location)
-            if any(element.cell.type != "GAPUNI" for element in elements):
-                raise location.refuse("acts on elements of type GAPUNI only")
-            ends = [element.points for element in elements]
-            chosen = {pair[0] for pair in ends}
-            faces = self.made.faces_within(chosen)
-            shown = self.content.root.set_names.get(name, name)
-            group = self.found.add_facets(f"{shown} facets", faces)
-            covered = {p for face in faces for p in facet_points(*face)}
-            if covered != chosen:
-                raise location.refuse(
-                    "gap elements are supported on all nodes of whole faces only, from the body to nodes that are held"
-                )
-            groups[name] = (group, [(pair[0], pair[1]) for pair in ends])
-        return groups
-
-    def _gaps(self, groups: Mapping[str, Any], conditions: Conditions) -> dict[str, dict[int, int]]:
-        """Make contact with a rigid plane from gap elements to nodes that are held at rest."""
-        ends = {}
-        dim = self.found.dim
-        for name, (group, pairs) in groups.items():
-            location, clearance, vector = self.content.gaps[name]
-            direction = np.array(vector)[:dim] / np.linalg.norm(vector)
-            for _, end in pairs:
-                tracks = [
-                    conditions.supports.tracks.get((end, axis, False)) for axis in np.flatnonzero(direction).tolist()
-                ]
-                if any(track is None or any(v for _, v in track.points) for track in tracks):
-                    raise location.refuse("gap elements are supported to nodes that are held at rest only")
-            places = self.model.mesh.points[[first for first, _ in pairs]] @ direction
-            if np.ptp(places) > TOUCHING * float(np.ptp(self.model.mesh.points, axis=0).max()):
-                raise location.refuse(
-                    "gap elements are supported where their nodes lie in a plane across their direction"
-                )
-            point = tuple((places.mean() + clearance) * direction)
-            shown = self.content.root.set_names.get(name, name)
-            wall = HalfSpace(point=point, normal=tuple(-direction))
-            self.model.add_obstacle(shown, secondary=group, obstacle=wall, formulation="node_to_segment")
-            ends[shown] = dict(pairs)
-        return ends
-
     def _ramp(self, conditions: Conditions) -> Ramp:
         """Return the ends of all steps, of the increments of steps with friction, and the corners of all histories."""
         steps = self.content.steps
         instants = {float(number) for number in range(1, len(steps) + 1)}
-        if any(pair.options.get("friction") for pair in self.model.contact):
+        if any(pair.options.get("friction") or "cohesion" in pair.options for pair in self.model.contact):
             for number, step in enumerate(steps):
                 instants.update(number + part for part in _parts(step))
-        for histories in (conditions.supports, conditions.forces, conditions.loads, conditions.temperatures):
+        mechanical: tuple[Histories[Any], ...] = (conditions.supports, conditions.forces, conditions.loads)
+        for histories in (*mechanical, conditions.temperatures, *conditions.heat.histories):
             for track in histories.distinct():
                 instants.update(round(time, 12) for time, _ in track.points if abs(time - round(time)) > 1e-6)
         if len(instants) > LONGEST_RAMP:
@@ -458,8 +459,12 @@ def _friction(law: Interaction, n_steps: int) -> dict[str, Any]:
 
 def _law(content: Content, material: Material, axes: Any, modes: bool) -> Any:
     """Return the material of the model along axes, with its expansion and incompatible modes where elements have them."""
+    if content.heat == "alone":
+        return _with_axes(HELD, axes, conductivity=_conductivity(content, material))
     assert material.law is not None
     law, expansion = material.law(axes), material.expansion
+    if isinstance(law, NonlinearElastic) and content.heat:
+        raise material.location.refuse(f"material '{material.name}': heat is supported in elastic bodies only")
     if isinstance(law, NonlinearElastic):
         if modes:
             content.note(
@@ -469,7 +474,9 @@ def _law(content: Content, material: Material, axes: Any, modes: bool) -> Any:
         object.__setattr__(law, "density", material.density)
         return law
     law = replace(law, incompatible_modes=modes, density=material.density)
-    heated = any(given.block.keyword == "TEMPERATURE" for step in content.steps for given in step.given)
+    if content.heat or material.conductivity is not None:
+        law = _with_axes(law, axes, conductivity=_conductivity(content, material))
+    heated = content.heat or any(given.block.keyword == "TEMPERATURE" for step in content.steps for given in step.given)
     if expansion is None:
         if heated:
             content.note(
@@ -478,9 +485,36 @@ def _law(content: Content, material: Material, axes: Any, modes: bool) -> Any:
         return replace(law, expansion=0.0) if heated else law
     if not heated:
         content.note(material.location, f"material '{material.name}': without temperatures the expansion has no effect")
-    if isinstance(law, LinearElastic) and isinstance(expansion, tuple):
-        law = Orthotropic((law.E,) * 3, (law.nu,) * 3, (law.E / (2.0 * (1.0 + law.nu)),) * 3, axes)
-    return replace(law, expansion=expansion)
+    return _with_axes(law, axes, expansion=expansion)
+
+
+def _conductivity(content: Content, material: Material) -> float | tuple[float, ...] | None:
+    """Return the conductivity of a material; CaseError where heat is computed and there is none."""
+    block = material.conductivity
+    if content.heat:
+        if block is None:
+            raise material.location.refuse(f"material '{material.name}' has no *CONDUCTIVITY")
+        return conductivity_of(material, block)
+    if block is not None:
+        content.note(block.location, f"material '{material.name}': no effect, temperatures are given, not computed")
+    return None
+
+
+def _with_axes(law: Any, axes: Any, **constants: Any) -> Any:
+    """Return a material with further constants, orthotropic where these differ along the axes."""
+    if isinstance(law, LinearElastic) and any(isinstance(value, tuple) for value in constants.values()):
+        G = law.E / (2.0 * (1.0 + law.nu))
+        kept = {name: getattr(law, name) for name in ("density", "expansion", "conductivity")}
+        law = Orthotropic((law.E,) * 3, (law.nu,) * 3, (G,) * 3, axes, **kept)
+    return replace(law, **constants)
+
+
+def _by_axis(
+    alike: Mapping[int, list[tuple[Table, list[int]]]],
+) -> Iterator[tuple[int, list[int], Any, Table]]:
+    """Yield axis, points, value and history of what points have by axis, as `by_shape` does."""
+    for axis, members in alike.items():
+        yield from ((axis, *own) for own in by_shape(members))
 
 
 def _parts(step: Step) -> list[float]:
@@ -522,30 +556,3 @@ def nodal_gaps(model: Model, secondary: str, primary: str, without: Sequence[int
     gaps, _ = formulation.nodal_gap(Configuration.undeformed(places))
     faced = np.isfinite(gaps) & ~np.isin(formulation.secondary.points, without)
     return (gaps[faced], places[formulation.secondary.points[faced]]) if faced.any() else (np.zeros(1), places[:1])
-
-
-def _by_shape(alike: Mapping[tuple[int, Table], list[int]]) -> Iterator[tuple[int, list[int], Any, Table]]:
-    """Yield axis, points, value and history of what points have by axis and history, once for histories of one shape.
-
-    The value is 1, or a function that returns those of the points, ascending, where they differ.
-    """
-    shapes: dict[tuple[int, Table], dict[Table, float]] = {}
-    for axis, table in alike:
-        size, shape = shape_of(table)
-        shapes.setdefault((axis, shape), {})[table] = size
-    for (axis, shape), sizes in shapes.items():
-        if len(sizes) == 1:
-            table = next(iter(sizes))
-            yield axis, alike[axis, table], 1.0, table
-            continue
-        values: dict[int, float] = {}
-        for table, size in sizes.items():
-            for point in alike[axis, table]:
-                values[point] = values.get(point, 0.0) + size
-        points = sorted(values)
-        yield axis, points, partial(_given, np.array([values[point] for point in points])), shape
-
-
-def _given(values: Array, positions: Array) -> Array:
-    """Return values (n,) that nodes have whatever their positions (n, dim)."""
-    return values

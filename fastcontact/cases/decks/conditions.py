@@ -10,6 +10,7 @@ import numpy as np
 from fastcontact.cases.decks.assembled import Element, Face
 from fastcontact.cases.decks.blocks import Location, Row
 from fastcontact.cases.decks.content import Given
+from fastcontact.cases.decks.heat import OF_HEAT, HeatConditions
 from fastcontact.cases.decks.histories import Histories
 from fastcontact.cases.decks.local_axes import local_directions
 from fastcontact.cases.decks.meshing import DeckMesh
@@ -59,6 +60,7 @@ class Conditions:
         self.acting: dict[Component, Acting] = {}
         self.over: list[tuple[Component, Acting]] = []
         self.keeping: set[Component] = set()
+        self.heat = HeatConditions(mesh, initial)
         self.locks = Locks(self.made)
         self.directions = local_directions(self.made)
 
@@ -68,6 +70,7 @@ class Conditions:
         for given in content.supports:
             self._supports(given, before=True)
         self.supports.begin()
+        self.heat.temperatures.begin()
         self._act(self.supports.first, 0.0)
         for number, step in enumerate(content.steps, start=1):
             self.locks.begin(number, [g for g in step.given if g.block.keyword == "BOUNDARY"], self.made)
@@ -78,11 +81,14 @@ class Conditions:
             self.forces.advance(number, step)
             self.loads.advance(number, step)
             self.temperatures.advance(number, step)
+            self.heat.advance(number, step)
 
     def _take(self, given: Given) -> None:
         keyword = given.block.keyword
         if keyword == "TEMPERATURE":
             give_temperatures(self.made, self.temperatures, given)
+        elif keyword in OF_HEAT:
+            self.heat.take(given)
         else:
             {"BOUNDARY": self._supports, "CLOAD": self._forces}.get(keyword, self._loads)(given)
 
@@ -124,7 +130,11 @@ class Conditions:
             raise block.location.refuse(f"TYPE={kind} is not supported, only DISPLACEMENT")
         if given.new:
             self.supports.forget()
+            self.heat.temperatures.forget()
         for row in block.rows:
+            if row.text(1) == "11":
+                self.heat.prescribe(given, row)
+                continue
             points = self.made.nodes(row.text(0), row.location)
             named = NAMED.get(row.text(1).upper())
             if row.text(1).upper() in ("XASYMM", "YASYMM", "ZASYMM"):

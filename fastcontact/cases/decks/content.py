@@ -105,6 +105,7 @@ class Material:
     law: Callable[[Any], Any] | None = None
     density: float | None = None
     expansion: float | tuple[float, ...] | None = None
+    conductivity: Block | None = None
 
 
 @dataclass
@@ -117,6 +118,9 @@ class Interaction:
     friction: float = 0.0
     stick: float | None = None
     kind: str = "unilateral"
+    cohesion: dict[str, Block] = field(default_factory=dict)
+    conductance: list[Block] = field(default_factory=list)
+    friction_heat: tuple[Location, float] | None = None
     changes: list[tuple[int, Interaction]] = field(default_factory=list)  # of friction, by the number of steps before
 
 
@@ -216,6 +220,8 @@ class Axes:
     nodes: str
     cylindrical: bool
     points: tuple[float, ...]
+    distribution: str = ""  # of material axes by cell, in place of points
+    part: Part | None = None  # where those of materials are defined
 
 
 @dataclass(frozen=True)
@@ -247,6 +253,7 @@ class Step:
     increment: float = 1.0
     static: bool = False
     perturbation: bool = False
+    heat: str = ""  # "alone", "coupled" with displacements, or not computed
     modes: int = 0
     given: list[Given] = field(default_factory=list)
 
@@ -271,6 +278,7 @@ class Content:
     axes: list[Axes] = field(default_factory=list)
     pretensions: list[PretensionSection] = field(default_factory=list)
     orientations: dict[str, Axes] = field(default_factory=dict)
+    distributions: dict[str, Block] = field(default_factory=dict)
     amplitudes: dict[str, Amplitude] = field(default_factory=dict)
     gaps: dict[str, tuple[Location, float, tuple[float, ...]]] = field(default_factory=dict)
     springs: dict[str, tuple[Location, float]] = field(default_factory=dict)
@@ -278,6 +286,7 @@ class Content:
     initial: list[Block] = field(default_factory=list)
     stresses: list[Block] = field(default_factory=list)
     steps: list[Step] = field(default_factory=list)
+    heat: str = ""  # as that of its steps
     modes: dict[str, Any] | None = None
     notes: list[str] = field(default_factory=list)
     outputs: list[Location] = field(default_factory=list)

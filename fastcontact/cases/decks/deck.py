@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from fastcontact.errors import ContactError, FileError, MeshError, ModelError, w
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.files.paths import PathLike, existing_file
 from fastcontact.model.model import Model
-from fastcontact.model.ramp import Ramp
+from fastcontact.model.ramp import Ramp, table_value
 from fastcontact.results.step import StepResult
 
 
@@ -115,6 +115,10 @@ class Deck:
             contact = step.contact[name]
             for point, force in zip(contact.points.tolist(), contact.force_vectors, strict=True):
                 reaction[ends[point]] += force
+        displacement = step.displacement.copy()
+        for at, table in self.building.driven.items():
+            displacement[at] = table_value(table, step.load_factor)
+        step = replace(step, displacement=displacement)
         if self.building.content.steps and step.load_factor == self.ramp.instants[-1]:
             self._tell_nonlinear(step)
         t = self.thickness
@@ -127,8 +131,11 @@ class Deck:
             )
             for name, c in step.contact.items()
         }  # fmt: skip
-        work = {"work": {name: t * value for name, value in step.work.items()}} if step.work else {}
-        return replace(step, reaction=t * reaction, contact=whole, iterations=step.iterations | work)
+        sums = {name: _times(t, step.iterations[name]) for name in ("work", "heat") if step.iterations.get(name)}
+        heat = None if step.heat_reaction is None else t * step.heat_reaction
+        return replace(
+            step, reaction=t * reaction, contact=whole, iterations=step.iterations | sums, heat_reaction=heat
+        )
 
     def _supports_alone(self, reaction: Array, instant: float) -> Array:
         """Return nodal forces (n_points, dim) without those of relations, found where no support acts [force]."""
@@ -226,6 +233,14 @@ def read_deck(path: PathLike) -> Deck:
         modes=content.modes,
         building=building,
     )
+
+
+def _times(factor: float, sums: Mapping[str, Any]) -> dict[str, Any]:
+    """Return sums of works or powers, also those by name, times a factor; what counts exchanges stays."""
+    return {
+        name: _times(factor, value) if isinstance(value, dict) else value if name == "exchanges" else factor * value
+        for name, value in sums.items()
+    }
 
 
 def _text(path: Path) -> str:

@@ -14,10 +14,12 @@ SHAPES = {"tet": TETRAHEDRON, "hex": HEXAHEDRON, "wed": WEDGE, "tri": TRIANGLE, 
 SOLIDS = {"4": "tet4", "6": "wedge6", "8": "hex8", "10": "tet10", "15": "wedge15", "20": "hex20"}
 PLANES = {"3": "tri3", "4": "quad4", "6": "tri6", "8": "quad8"}
 FAMILIES = {"CPE": "plane_strain", "CPS": "plane_stress", "CAX": "axisymmetric"}
+# Families of elements that conduct heat alone, and those of the same shape that deform.
+CONDUCTING = {"DC3D": "C3D", "DC2D": "CPE", "DCAX": "CAX"}
 # Type names of elements that are no solids, by their beginning.
 OTHERS = {
     "S": "shell", "STRI": "shell", "B": "beam", "T": "truss", "M": "membrane", "CPEG": "generalised plane strain",
-    "DC": "heat transfer", "R": "rigid", "SC": "continuum shell", "C3D8P": "pore pressure", "CONN": "connector",
+    "DC": "convective heat transfer", "R": "rigid", "SC": "continuum shell", "C3D8P": "pore pressure", "CONN": "connector",
     "DASHPOT": "dashpot", "MASS": "mass", "F3D": "network", "D": "network", "U": "user", "COH": "cohesive",
     "GK": "gasket", "ITS": "slide line",
 }  # fmt: skip
@@ -37,6 +39,8 @@ class ElementType:
         How the element here differs, empty where it does not.
     modes : bool
         Whether it has incompatible modes.
+    conducts : bool
+        Whether it conducts heat alone, without displacements.
     """
 
     name: str
@@ -44,6 +48,7 @@ class ElementType:
     kinematics: str
     note: str = ""
     modes: bool = False
+    conducts: bool = False
 
     @property
     def faces(self) -> tuple[tuple[int, ...], ...]:
@@ -54,21 +59,24 @@ class ElementType:
 @cache
 def element_type(name: str) -> ElementType | None:
     """Return what an element type of decks (in upper case) becomes, None for what is no solid known here."""
-    base, note, modes = name, "", False
+    conducts = name[:4] in CONDUCTING
+    base = CONDUCTING[name[:4]] + name[4:] if conducts else name.removesuffix("T")
+    note, modes = "", False
     for ending, meaning in (
+        ("MH", "an ordinary quadratic one here"),
         ("RH", "integrated fully, without hybrid pressure"), ("IH", "without hybrid pressure"),
         ("R", "integrated fully here"), ("I", ""),
         ("H", "without hybrid pressure: nearly incompressible materials have a mean dilatation"),
-        ("M", "an ordinary quadratic one here"), ("T", ""),
+        ("M", "an ordinary quadratic one here"),
     ):  # fmt: skip
-        if (meaning or ending == "I") and base.endswith(ending):
+        if base.endswith(ending) and not conducts:
             base, note, modes = base[: -len(ending)], meaning, ending[0] == "I"
             break
     table, kinematics = (SOLIDS, "3d") if base[:3] == "C3D" else (PLANES, FAMILIES.get(base[:3], ""))
     element = table.get(base[3:])
     if modes and kinematics == "axisymmetric":
         modes, note = False, "without incompatible modes: stiffer where thin parts of linear elements bend"
-    return ElementType(name, element, kinematics, note, modes) if element and kinematics else None
+    return ElementType(name, element, kinematics, note, modes, conducts) if element and kinematics else None
 
 
 def described(name: str) -> str:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Hashable, Iterable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Generic, TypeVar
+from functools import partial
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
+from fastcontact.arrays import Array
 from fastcontact.cases.decks.blocks import Location, folded
 from fastcontact.cases.decks.content import Amplitude, Content, Step
 from fastcontact.model.ramp import Table
@@ -82,9 +84,12 @@ class Histories(Generic[Name]):
             self.dying.pop(name, None)
 
     def begin(self) -> None:
-        """Take what was given before all steps as there from the beginning, at zero, and reached in the first step."""
-        for _, _, location in [*self.changing.values()][:1]:
-            self.tracks = dict.fromkeys(self.changing, Track([(0.0, 0.0)], location, len(self.changing)))
+        """Take what was given before all steps as there from the beginning, at rest, and reached in the first step."""
+        alike: dict[float, list[Name]] = {}
+        for name in self.changing:
+            alike.setdefault(self.rest.get(name, 0.0), []).append(name)
+        for value, names in alike.items():
+            self.tracks.update(dict.fromkeys(names, Track([(0.0, value)], self.changing[names[0]][2], len(names))))
         self.first, self.changing = self.changing, {}
 
     def forget(self, which: Callable[[Name], bool] = lambda name: True) -> None:
@@ -163,6 +168,31 @@ def shape_of(table: Table) -> tuple[float, Table]:
     """Return the largest value of a history by size, and the history over it."""
     size = max((value for _, value in table), key=abs)
     return size, tuple((time, round(value / size, ALIKE)) for time, value in table) if size else table
+
+
+def by_shape(alike: Iterable[tuple[Table, list[int]]]) -> Iterator[tuple[list[int], Any, Table]]:
+    """Yield points, value and history of what points have by history, once for histories of one shape.
+
+    The value is 1, or a function that returns those of the points, ascending, where they differ.
+    """
+    shapes: dict[Table, dict[Table, list[int]]] = {}
+    for table, points in alike:
+        shapes.setdefault(shape_of(table)[1], {}).setdefault(table, []).extend(points)
+    for shape, tables in shapes.items():
+        if len(tables) == 1:
+            yield from ((points, 1.0, table) for table, points in tables.items())
+            continue
+        values: dict[int, float] = {}
+        for table, points in tables.items():
+            for point in points:
+                values[point] = values.get(point, 0.0) + shape_of(table)[0]
+        ascending = sorted(values)
+        yield ascending, partial(_given, np.array([values[point] for point in ascending])), shape
+
+
+def _given(values: Array, positions: Array) -> Array:
+    """Return values (n,) that nodes have whatever their positions (n, dim)."""
+    return values
 
 
 def _shaped(value: float, shape: Amplitude, begin: float, start: float, period: float) -> list[tuple[float, float]]:

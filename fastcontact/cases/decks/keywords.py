@@ -21,6 +21,8 @@ def _keyword(used: str = "", harmless: str = "") -> Keyword:
     return Keyword(frozenset(filter(None, used.split("; "))), frozenset(filter(None, harmless.split("; "))))
 
 
+# Parameters of steps that steer their solution.
+STEERING = "SOLVER; DIRECT; STABILIZE; ALLSDTOL; CONTINUE; EXPLICIT; DELTMX; MXDEM; END"
 # Keywords that are translated.
 TRANSLATED = {
     "AMPLITUDE": _keyword("NAME; TIME; DEFINITION; VALUE"),
@@ -28,14 +30,24 @@ TRANSLATED = {
     "BOUNDARY": _keyword("OP; AMPLITUDE; FIXED; TYPE"),
     "CHANGE FRICTION": _keyword("INTERACTION"),
     "CLEARANCE": _keyword("SLAVE; MASTER; SECONDARY; MAIN; VALUE"),
+    "CFLUX": _keyword("OP; AMPLITUDE"),
     "CLOAD": _keyword("OP; AMPLITUDE"),
     "CONTACT PAIR": _keyword("INTERACTION; TYPE; ADJUST; SMALL SLIDING", "CPSET"),
     "COUPLING": _keyword("REF NODE; SURFACE; ORIENTATION", "CONSTRAINT NAME"),
+    "COHESIVE BEHAVIOR": _keyword("TYPE; ELIGIBILITY"),
     "CONDUCTIVITY": Keyword(anything=True),
+    "COUPLED TEMPERATURE-DISPLACEMENT": _keyword("STEADY STATE", STEERING),
     "CYCLIC SYMMETRY MODEL": _keyword("N; TIE", "NGRAPH; CHECK; ELSET"),
+    "DAMAGE EVOLUTION": _keyword("TYPE; SOFTENING; MIXED MODE BEHAVIOR; POWER; MODE MIX RATIO", "DEGRADATION"),
+    "DAMAGE INITIATION": _keyword("CRITERION"),
+    "DAMAGE STABILIZATION": Keyword(anything=True),
     "DENSITY": _keyword(),
+    "DFLUX": _keyword("OP; AMPLITUDE"),
     "DISTRIBUTING": _keyword(),
+    "DISTRIBUTION": _keyword("NAME; LOCATION", "TABLE"),
+    "DISTRIBUTION TABLE": Keyword(anything=True),
     "DLOAD": _keyword("OP; AMPLITUDE"),
+    "DSFLUX": _keyword("OP; AMPLITUDE"),
     "DSLOAD": _keyword("OP; AMPLITUDE"),
     "ELASTIC": _keyword("TYPE"),
     "ELEMENT": _keyword("TYPE; ELSET"),
@@ -46,10 +58,14 @@ TRANSLATED = {
     "END STEP": _keyword(),
     "EQUATION": _keyword(),
     "EXPANSION": _keyword("TYPE", "ZERO"),
+    "FILM": _keyword("OP; AMPLITUDE"),
     "FREQUENCY": _keyword("", "EIGENSOLVER; NORMALIZATION; SOLVER; STORAGE; GLOBAL"),
     "FRICTION": _keyword(),
     "GAP": _keyword("ELSET"),
+    "GAP CONDUCTANCE": _keyword("PRESSURE"),
+    "GAP HEAT GENERATION": _keyword(),
     "HEADING": Keyword(anything=True),
+    "HEAT TRANSFER": _keyword("STEADY STATE", STEERING),
     "HYPERELASTIC": _keyword("NEO HOOKE; MOONEY-RIVLIN; YEOH; OGDEN; N", "MODULI"),
     "INITIAL CONDITIONS": _keyword("TYPE"),
     "INSTANCE": _keyword("NAME; PART"),
@@ -58,15 +74,17 @@ TRANSLATED = {
     "MPC": _keyword(),
     "NODE": _keyword("NSET; SYSTEM"),
     "NSET": _keyword("NSET; GENERATE; INSTANCE", "INTERNAL; UNSORTED; FREQUENCY"),
-    "ORIENTATION": _keyword("NAME; SYSTEM"),
+    "ORIENTATION": _keyword("NAME; SYSTEM; DEFINITION"),
     "PART": _keyword("NAME"),
+    "PHYSICAL CONSTANTS": Keyword(anything=True),
     "PLASTIC": _keyword("HARDENING"),
     "PRE-TENSION SECTION": _keyword("SURFACE; NODE"),
     "RIGID BODY": _keyword("NSET; ELSET; REF NODE; ROT NODE"),
+    "SFILM": _keyword("OP; AMPLITUDE"),
     "SOLID SECTION": _keyword("ELSET; MATERIAL; ORIENTATION", "CONTROLS"),
     "SPECIFIC HEAT": Keyword(anything=True),
     "SPRING": _keyword("ELSET"),
-    "STATIC": _keyword("", "SOLVER; DIRECT; STABILIZE; ALLSDTOL; CONTINUE; EXPLICIT"),
+    "STATIC": _keyword("", STEERING),
     "STEP": _keyword("NLGEOM; AMPLITUDE", "NAME; INC; PERTURBATION; UNSYMM; EXTRAPOLATION; CONVERT SDI; SOLVER"),
     "SURFACE": _keyword("NAME; TYPE", "INTERNAL"),
     "SURFACE BEHAVIOR": _keyword("PRESSURE-OVERCLOSURE; NO SEPARATION"),
@@ -74,6 +92,7 @@ TRANSLATED = {
     "TEMPERATURE": _keyword("OP; AMPLITUDE"),
     "TIE": _keyword("POSITION TOLERANCE; ADJUST; CYCLIC SYMMETRY; NAME", "TYPE; NO ROTATION"),
     "TRANSFORM": _keyword("NSET; TYPE"),
+    "UNCOUPLED TEMPERATURE-DISPLACEMENT": _keyword("STEADY STATE", STEERING),
 }
 # Requests for output, all of which is in the results, and controls of convergence, which has criteria of its own.
 OUTPUT = (
@@ -84,19 +103,17 @@ OUTPUT = (
 )  # fmt: skip
 # Why other keywords of the format are refused.
 LINEAR = "is outside of fastcontact (elastic, elastic-plastic and hyperelastic materials)"
-STATIC = "is outside of fastcontact (quasi-static: *STATIC, and *FREQUENCY behind it)"
+STATIC = "is outside of fastcontact (quasi-static: *STATIC, steady heat, and *FREQUENCY behind them)"
 SOLIDS = "is outside of fastcontact (solid elements only)"
-HEAT = "is outside of fastcontact (temperatures are given by *TEMPERATURE, not computed)"
+HEAT = "is outside of fastcontact (steady conduction of heat, without radiation)"
 NOT_YET = "is not supported"
 REFUSED = {
     **dict.fromkeys(
-        ("HYPERFOAM", "CREEP", "CYCLIC HARDENING", "DAMAGE INITIATION", "DAMAGE EVOLUTION",
+        ("HYPERFOAM", "CREEP", "CYCLIC HARDENING",
          "DEFORMATION PLASTICITY", "DRUCKER PRAGER", "MOHR COULOMB", "VISCOELASTIC", "USER MATERIAL", "DEPVAR",
-         "CONCRETE DAMAGED PLASTICITY", "GASKET BEHAVIOR", "COHESIVE BEHAVIOR", "RATE DEPENDENT", "NO COMPRESSION"), LINEAR),
+         "CONCRETE DAMAGED PLASTICITY", "GASKET BEHAVIOR", "RATE DEPENDENT", "NO COMPRESSION"), LINEAR),
     **dict.fromkeys(
-        ("DYNAMIC", "BUCKLE", "MODAL DYNAMIC", "STEADY STATE DYNAMICS", "VISCO", "HEAT TRANSFER",
-         "ELECTROMAGNETICS",
-         "COUPLED TEMPERATURE-DISPLACEMENT", "UNCOUPLED TEMPERATURE-DISPLACEMENT",
+        ("DYNAMIC", "BUCKLE", "MODAL DYNAMIC", "STEADY STATE DYNAMICS", "VISCO", "ELECTROMAGNETICS",
          "COMPLEX FREQUENCY", "SENSITIVITY",
          "DAMPING", "MODAL DAMPING", "GREEN", "CRACK PROPAGATION", "GEOSTATIC", "CONTACT DAMPING",
          "FEASIBLE DIRECTION"), STATIC),
@@ -106,12 +123,12 @@ REFUSED = {
          "CONNECTOR SECTION", "COHESIVE SECTION", "GASKET SECTION", "MASS", "ROTARY INERTIA", "DASHPOT", "NODAL THICKNESS",
          "SURFACE SECTION", "RIGID SURFACE", "TRANSVERSE SHEAR STIFFNESS"), SOLIDS),
     **dict.fromkeys(
-        ("CFLUX", "DFLUX", "FILM", "RADIATE", "PHYSICAL CONSTANTS", "GAP CONDUCTANCE", "GAP HEAT GENERATION"), HEAT),
+        ("RADIATE", "SRADIATE", "CAVITY DEFINITION", "FILM PROPERTY", "CFILM", "GAP RADIATION"), HEAT),
     **dict.fromkeys(
         ("CONTACT", "CONTACT INCLUSIONS", "CONTACT PROPERTY ASSIGNMENT",
          "BASE MOTION",
-         "SUBMODEL", "MODEL CHANGE", "CHANGE CONTACT TYPE", "CONTACT CONTROLS",
-         "CONTACT INITIALIZATION DATA", "CONTACT STABILIZATION", "SYSTEM", "DISTRIBUTION", "NGEN", "NFILL", "ELGEN", "NCOPY",
+         "SUBMODEL", "MODEL CHANGE", "CHANGE CONTACT TYPE", "CONTACT CONTROLS", "FRACTURE CRITERION", "DEBOND",
+         "CONTACT INITIALIZATION DATA", "CONTACT STABILIZATION", "SYSTEM", "NGEN", "NFILL", "ELGEN", "NCOPY",
          "ELCOPY", "PARAMETER", "MATRIX INPUT", "SUPER ELEMENT", "USER ELEMENT", "DISTRIBUTING COUPLING",
          "KINEMATIC COUPLING",
          "CONNECTOR BEHAVIOR", "EMBEDDED ELEMENT", "FIELD", "VALUES AT INFINITY", "FILTER", "IMPERFECTION",

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from fastcontact.arrays import Array
-from fastcontact.cases.decks.assembled import Assembled
+from fastcontact.cases.decks.assembled import Assembled, Element
 from fastcontact.cases.decks.blocks import Location, folded
 from fastcontact.cases.decks.content import Axes, Content
 
@@ -27,7 +29,40 @@ def orientation_of(content: Content, name: str, location: Location) -> Axes:
     if axes is None:
         known = ", ".join(content.orientations).lower() or "none"
         raise location.refuse(f"orientation '{name}' is not defined; orientations: {known}")
+    if axes.distribution and location.keyword != "SOLID SECTION":
+        raise location.refuse(f"orientation '{name}' is one of cells, by a distribution: no use outside of sections")
     return axes
+
+
+def axes_by_cell(made: Assembled, axes: Axes, members: Sequence[Element]) -> Array:
+    """Return the axes (n, 3, 3) of the solids of the mesh, by the *DISTRIBUTION of those of elements [-].
+
+    Others have those of the mesh. CaseError if an element has none, and there is no line for all.
+    """
+    block = made.content.distributions.get(folded(axes.distribution))
+    if block is None:
+        raise axes.location.refuse(f"distribution '{axes.distribution[:80]}' is not defined")
+    scopes = [scope for scope in made.scopes if made.part(scope) is axes.part]
+    default, given = None, {}  # type: Array | None, dict[int, Array]
+    for row in block.each():
+        points = tuple(row.number(index) for index in range(1, 7))
+        frame = local_axes(Axes(row.location, "", False, points), np.zeros(3))
+        if not row.text(0):
+            default = frame
+            continue
+        for scope in scopes:
+            for element in made.elements_of(f"{scope}.{row.text(0)}" if scope else row.text(0), row.location):
+                given[id(element)] = frame
+    first = dict(zip(made.by_kind, np.cumsum([0, *map(len, made.by_kind.values())]).tolist()))
+    found = np.tile(np.eye(3), (len(made.solids), 1, 1))
+    for element in members:
+        own = given.get(id(element), default)
+        if own is None:
+            raise block.location.refuse(
+                f"element {element.number} has no axes, and no line without an element gives those of others"
+            )
+        found[first[element.solid.element] + element.row] = own
+    return found
 
 
 def local_axes(axes: Axes, point: Array) -> Array:

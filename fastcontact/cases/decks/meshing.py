@@ -10,7 +10,6 @@ import numpy as np
 from fastcontact.cases.decks.assembled import Assembled, Element, Face, facet_points
 from fastcontact.cases.decks.blocks import Location, folded
 from fastcontact.cases.decks.content import SurfaceDefinition
-from fastcontact.errors import CaseError
 from fastcontact.mesh import topology
 from fastcontact.mesh.mesh import Mesh
 
@@ -116,12 +115,16 @@ def begun(made: Assembled) -> DeckMesh:
     CaseError if there are no solids, if elements of several kinematics are mixed, or if a plane model is not flat.
     """
     if not made.solids:
-        raise CaseError("the deck has no solid elements")
+        raise made.content.steps[0].location.refuse("the deck has no solid elements")
     first = made.solids[0].solid
     for element in made.solids:
         if element.solid.kinematics != first.kinematics:
             raise element.cell.location.refuse(
                 f"elements of type {element.solid.name} and {first.name} ({first.kinematics}) cannot be in one model"
+            )
+        if element.solid.conducts and made.content.heat != "alone":
+            raise element.cell.location.refuse(
+                f"elements of type {element.solid.name} conduct heat alone: they need steps with *HEAT TRANSFER, all of them"
             )
     dim, points = 3 if first.kinematics == "3d" else 2, made.points
     if dim == 2 and np.ptp(points[:, 2]) > FLAT * np.ptp(points[:, :2]):

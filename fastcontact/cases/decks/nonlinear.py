@@ -93,12 +93,13 @@ def strain_of(content: Content, laws: list[Any]) -> tuple[str, str]:
     finite = [law for law in laws if getattr(law, "strain", "small") == "finite"]
     if finite:
         return "finite", ""
-    if not any(step.nonlinear for step in content.steps):
+    if content.heat == "alone" or not any(step.nonlinear for step in content.steps):
         return "small", ""
     reasons = {
         "plasticity": any(isinstance(law, ElasticPlastic) for law in laws),
         "a nearly incompressible elastic material": any(law.averaged for law in laws),
-        "temperatures": any(given.block.keyword == "TEMPERATURE" for step in content.steps for given in step.given),
+        "temperatures": bool(content.heat)
+        or any(given.block.keyword == "TEMPERATURE" for step in content.steps for given in step.given),
         "initial stresses": bool(content.stresses),
         "couplings, rigid bodies and multi-point constraints": bool(
             content.links or content.pins or content.multi_points

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact.arrays import Array
-from fastcontact.cases.decks.blocks import Block, Row, folded
+from fastcontact.cases.decks.blocks import Block, Row, folded, unquoted
 from fastcontact.cases.decks.content import Amplitude, Axes, Content, Interaction, Material, Part, Section
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
@@ -40,7 +40,7 @@ def elastic(content: Content, current: Material, block: Block) -> None:
     if kinds[0] != "ISOTROPIC":
         _with_axes(current, block, kinds[0])
         return
-    row = _only(block, "temperatures" if len(block.rows) > 1 else "")
+    row = block.only("temperatures" if len(block.rows) > 1 else "")
     E, nu = row.number(0), row.number(1, 0.0)
     if row.text(2):
         content.note(row.location, "the temperature of the constants has no effect: there is one set of them")
@@ -86,25 +86,60 @@ def _moduli(values: list[float]) -> Array:
     return D[np.ix_(order, order)]
 
 
-def orientation(content: Content, block: Block) -> None:
+def distribution_table(content: Content, part: Part, block: Block) -> None:
+    """*DISTRIBUTION TABLE: what distributions hold, which axes of cells alone do here."""
+    kinds = [entry.upper() for row in block.rows for entry in row.entries if entry]
+    if kinds != ["COORD3D", "COORD3D"]:
+        raise block.location.refuse(
+            f"a distribution of {', '.join(kinds)[:80]} is not supported, only COORD3D, COORD3D of axes"
+        )
+
+
+def distribution(content: Content, part: Part, block: Block) -> None:
+    """*DISTRIBUTION: two points for the axes of each cell, seen from 0, 0, 0, by default those of the line without a cell."""
+    name = block.required("NAME")
+    block.choice("LOCATION", ("ELEMENT",))
+    if folded(name) in content.distributions:
+        raise block.location.refuse(f"distribution '{name}' is defined twice")
+    content.distributions[folded(name)] = block
+
+
+def orientation(content: Content, part: Part, block: Block) -> None:
     """*ORIENTATION: axes of materials."""
     name, system = block.required("NAME"), block.choice("SYSTEM", ("RECTANGULAR", "CYLINDRICAL"))
-    rows = block.rows
+    block.choice("DEFINITION", ("COORDINATES",))
+    rows, key = block.rows, folded(name)
+    if key in content.orientations:
+        raise block.location.refuse(
+            f"orientation '{name}' is defined twice, first in line {content.orientations[key].location.line}"
+        )
     if not rows:
         raise block.location.refuse("a data line with six coordinates is needed")
+    given = rows[0].text(0)
+    if given[:1].isalpha() or given[:1] == "_":
+        if system == "CYLINDRICAL":
+            raise block.location.refuse("a distribution of axes is supported with SYSTEM=RECTANGULAR only")
+        _not_turned(rows)
+        content.orientations[key] = Axes(block.location, "", False, (), unquoted(given), part)
+        return
     points = tuple(rows[0].number(i) for i in range(6))
     if any(rows[0].entries[6:]) and any(rows[0].number(6 + i, 0.0) for i in range(3)):
         raise rows[0].location.refuse("an origin of the axes is not supported: give points seen from 0, 0, 0")
+    _not_turned(rows)
+    content.orientations[key] = Axes(block.location, "", system == "CYLINDRICAL", points, part=part)
+
+
+def _not_turned(rows: list[Row]) -> None:
+    """Refuse a further rotation about an axis in the second line of an *ORIENTATION."""
     if len(rows) > 1 and rows[1].number(1, 0.0):
         raise rows[1].location.refuse(
             "a further rotation of the axes is not supported: turn the points of the first line"
         )
-    content.orientations[folded(name)] = Axes(block.location, "", system == "CYLINDRICAL", points)
 
 
 def density(content: Content, current: Material, block: Block) -> None:
     """*DENSITY."""
-    current.density = _only(block).number(0)
+    current.density = block.only().number(0)
     if not current.density > 0:
         raise block.location.refuse(f"material '{current.name}': the density {current.density:g} must be positive")
 
@@ -151,9 +186,9 @@ def behaviour(content: Content, current: Interaction, block: Block) -> None:
     """*SURFACE BEHAVIOR: hard, or soft with a slope, a table or an exponential law."""
     law = block.choice("PRESSURE-OVERCLOSURE", ("HARD", "LINEAR", "EXPONENTIAL", "TABULAR", "TIED"))
     if law == "LINEAR":
-        current.penalty = _positive(_only(block), 0, "slope")
+        current.penalty = block.only().positive(0, "slope")
     elif law == "EXPONENTIAL":
-        current.penalty = _exponential(_positive(_only(block), 0, "clearance"), _positive(_only(block), 1, "pressure"))
+        current.penalty = _exponential(block.only().positive(0, "clearance"), block.only().positive(1, "pressure"))
     elif law == "TABULAR":
         current.penalty = _table(block)
     elif law == "TIED":
@@ -184,12 +219,12 @@ def _exponential(clearance: float, pressure: float) -> list[tuple[float, float]]
 
 def friction(content: Content, current: Interaction, block: Block) -> None:
     """*FRICTION: coefficient, and in CalculiX the stick slope."""
-    row = _only(block)
+    row = block.only()
     current.friction = row.number(0)
     if current.friction < 0:
         raise row.location.refuse(f"the coefficient of friction {current.friction:g} is negative")
     if row.text(1) and row.number(1):
-        current.stick = _positive(row, 1, "stick slope")
+        current.stick = row.positive(1, "stick slope")
         content.note(row.location, f"{current.stick:g} is taken for the stick slope, as in CalculiX (shear by slip)")
     if len(row.entries) > 2 and any(row.entries[2:]):
         raise row.location.refuse(
@@ -212,7 +247,7 @@ def amplitude(content: Content, block: Block) -> None:
 
 def gap(content: Content, block: Block) -> None:
     """*GAP: clearance and direction of gap elements."""
-    row = _only(block)
+    row = block.only()
     direction = tuple(row.number(i, 0.0) for i in (1, 2, 3))
     if not any(direction):
         raise row.location.refuse("the direction of the gap elements is missing")
@@ -228,20 +263,4 @@ def spring(content: Content, block: Block) -> None:
         )
     if rows[0].text(1):
         raise rows[0].location.refuse("only linear springs are supported: one stiffness")
-    content.springs[folded(block.required("ELSET"))] = (block.location, _positive(rows[0], 0, "stiffness"))
-
-
-def _positive(row: Row, index: int, name: str) -> float:
-    value = row.number(index)
-    if not value > 0:
-        raise row.location.refuse(f"the {name} {value:g} must be positive")
-    return value
-
-
-def _only(block: Block, why: str = "") -> Row:
-    """Return the only data line of a block."""
-    rows = block.rows
-    if len(rows) != 1:
-        text = f"{len(rows)} data lines where one is needed"
-        raise block.location.refuse(text + (f": constants that depend on {why} are not supported" if why else ""))
-    return rows[0]
+    content.springs[folded(block.required("ELSET"))] = (block.location, rows[0].positive(0, "stiffness"))

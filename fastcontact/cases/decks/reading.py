@@ -6,9 +6,11 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 from fastcontact.cases.decks import (
+    cohesive,
     connections,
     cyclic_symmetry,
     geometry,
+    heat,
     nonlinear,
     pretension,
     properties,
@@ -26,6 +28,9 @@ IN_PARTS: dict[str, Callable[[Content, Part, Block], None]] = {
     "ELSET": geometry.element_set,
     "SURFACE": geometry.surface,
     "SOLID SECTION": properties.section,
+    "ORIENTATION": properties.orientation,
+    "DISTRIBUTION": properties.distribution,
+    "DISTRIBUTION TABLE": properties.distribution_table,
 }
 OF_MATERIALS: dict[str, Callable[[Content, Material, Block], None]] = {
     "ELASTIC": properties.elastic,
@@ -33,18 +38,24 @@ OF_MATERIALS: dict[str, Callable[[Content, Material, Block], None]] = {
     "HYPERELASTIC": nonlinear.hyperelastic,
     "DENSITY": properties.density,
     "EXPANSION": temperatures.expansion,
-    "CONDUCTIVITY": temperatures.without_effect,
-    "SPECIFIC HEAT": temperatures.without_effect,
+    "CONDUCTIVITY": heat.conductivity,
+    "SPECIFIC HEAT": heat.specific_heat,
 }
 OF_INTERACTIONS: dict[str, Callable[[Content, Interaction, Block], None]] = {
     "SURFACE BEHAVIOR": properties.behaviour,
     "FRICTION": properties.friction,
+    "COHESIVE BEHAVIOR": cohesive.keep,
+    "DAMAGE INITIATION": cohesive.keep,
+    "DAMAGE EVOLUTION": cohesive.keep,
+    "DAMAGE STABILIZATION": cohesive.stabilization,
+    "GAP CONDUCTANCE": heat.gap_conductance,
+    "GAP HEAT GENERATION": heat.gap_heat_generation,
 }
 OF_MODELS: dict[str, Callable[[Content, Block], None]] = {
     "AMPLITUDE": properties.amplitude,
     "GAP": properties.gap,
     "INITIAL CONDITIONS": temperatures.initial_conditions,
-    "ORIENTATION": properties.orientation,
+    "PHYSICAL CONSTANTS": heat.physical_constants,
     "PRE-TENSION SECTION": pretension.pretension_section,
     "SPRING": properties.spring,
     "CONTACT PAIR": connections.contact_pair,
@@ -56,7 +67,15 @@ OF_MODELS: dict[str, Callable[[Content, Block], None]] = {
     "RIGID BODY": connections.rigid_body,
     "TRANSFORM": connections.transform,
 }
-IN_STEPS = ("BOUNDARY", "CLOAD", "DLOAD", "DSLOAD", "TEMPERATURE")
+IN_LAYERS = ("DAMAGE INITIATION", "DAMAGE EVOLUTION", "DAMAGE STABILIZATION")
+IN_STEPS = ("BOUNDARY", "CLOAD", "DLOAD", "DSLOAD", "TEMPERATURE", *heat.OF_HEAT)
+PROCEDURES: dict[str, Callable[[Content, Step, Block], None]] = {
+    "STATIC": stepping.static,
+    "FREQUENCY": stepping.frequency,
+    "HEAT TRANSFER": stepping.heated,
+    "COUPLED TEMPERATURE-DISPLACEMENT": stepping.heated,
+    "UNCOUPLED TEMPERATURE-DISPLACEMENT": stepping.heated,
+}
 
 
 @dataclass
@@ -85,6 +104,11 @@ class Reader:
                 raise block.location.refuse("belongs below *MATERIAL")
             OF_MATERIALS[keyword](content, self.material, block)
             return
+        if self.material is not None and keyword in IN_LAYERS:
+            name = self.material.name
+            raise block.location.refuse(
+                f"material '{name}': damage of bodies is outside of fastcontact, that of layers is not"
+            )
         self.material = None
         if keyword in OF_INTERACTIONS:
             if self.interaction is None:
@@ -107,6 +131,10 @@ class Reader:
         elif keyword in IN_STEPS:
             self._not_in_part(block)
             stepping.given(content, self.step, block)
+        elif keyword in PROCEDURES:
+            if self.step is None:
+                raise block.location.refuse("belongs into a step")
+            PROCEDURES[keyword](content, self.step, block)
         else:
             getattr(self, "_" + keyword.lower().replace(" ", "_"))(block)
 
@@ -173,16 +201,6 @@ class Reader:
         self._not_in_part(block)
         self.step = stepping.new_step(self.content, block)
 
-    def _static(self, block: Block) -> None:
-        if self.step is None:
-            raise block.location.refuse("belongs into a step")
-        stepping.static(self.content, self.step, block)
-
-    def _frequency(self, block: Block) -> None:
-        if self.step is None:
-            raise block.location.refuse("belongs into a step")
-        stepping.frequency(self.step, block)
-
     def _end_step(self, block: Block) -> None:
         if self.step is None:
             raise block.location.refuse("there is no step to end")
@@ -199,4 +217,5 @@ def read_content(blocks: Iterable[Block]) -> Content:
         raise reader.step.location.refuse("the step has no *END STEP: the deck is cut off, or the line is missing")
     if reader.coupling is not None:
         raise reader.coupling.location.refuse("*KINEMATIC or *DISTRIBUTING must follow")
+    heat.check_steps(reader.content)
     return reader.content

@@ -43,7 +43,17 @@ def static(content: Content, step: Step, block: Block) -> None:
             raise row.location.refuse("the increment and the length of the step must be positive")
 
 
-def frequency(step: Step, block: Block) -> None:
+def heated(content: Content, step: Step, block: Block) -> None:
+    """*HEAT TRANSFER, *COUPLED and *UNCOUPLED TEMPERATURE-DISPLACEMENT: as *STATIC, of steady heat."""
+    if "STEADY STATE" not in block.parameters:
+        raise block.location.refuse("only STEADY STATE is supported: heat is not followed in time")
+    static(content, step, block)
+    step.heat = "alone" if block.keyword == "HEAT TRANSFER" else "coupled"
+    if block.keyword[:2] == "UN":
+        content.note(block.location, "temperatures and displacements are solved together")
+
+
+def frequency(content: Content, step: Step, block: Block) -> None:
     """*FREQUENCY: how many modes."""
     if step.static or step.modes:
         raise block.location.refuse("a step has either *STATIC or one *FREQUENCY")
@@ -57,7 +67,7 @@ def end_step(content: Content, step: Step) -> None:
     """*END STEP: what a step with *FREQUENCY asks for is kept, and no load step."""
     if not step.modes:
         if not step.static:
-            raise step.location.refuse("the step has no *STATIC, so it is unknown what to solve")
+            raise step.location.refuse("the step has no *STATIC or other procedure, so it is unknown what to solve")
         return
     if step.given:
         raise step.given[0].block.location.refuse(
@@ -66,6 +76,8 @@ def end_step(content: Content, step: Step) -> None:
     content.steps.pop()
     if not content.steps:
         raise step.location.refuse("*FREQUENCY needs a step with *STATIC before: modes are those about its end")
+    if content.steps[-1].heat == "alone":
+        raise step.location.refuse("*FREQUENCY behind *HEAT TRANSFER is not supported: bodies are at rest there")
     stiffening = step.perturbation or any(own.nonlinear for own in content.steps)
     content.modes = {"n": step.modes, "stress_stiffening": stiffening}
     content.note(

@@ -13,34 +13,42 @@ from fastcontact.cases.decks.histories import Histories, shape_of
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
 
-# Coefficients of expansion by type.
-EXPANSIONS = {"ISO": 1, "ORTHO": 3}
+# Coefficients of expansion and conductivity by type.
+COEFFICIENTS = {"ISO": 1, "ORTHO": 3}
 
 
 def expansion(content: Content, current: Material, block: Block) -> None:
-    """*EXPANSION: coefficients of one temperature, one for all directions or one along each axis."""
-    kind = block.choice("TYPE", tuple(EXPANSIONS))
-    if len(block.rows) != 1:
-        raise block.location.refuse(
-            f"material '{current.name}': {len(block.rows)} data lines where one is needed: coefficients that depend on "
-            "temperatures are not supported"
-        )
-    row, count = block.rows[0], EXPANSIONS[kind]
-    values = tuple(row.number(index) for index in range(count))
-    if any(row.entries[count + 1 :]):
-        raise row.location.refuse(
-            f"material '{current.name}': TYPE={kind} has {count} coefficients, at one temperature"
-        )
-    current.expansion = values[0] if kind == "ISO" else values
+    """*EXPANSION: coefficients of one temperature."""
+    current.expansion = along_axes(current, block)
     if "ZERO" in block.parameters:
         content.note(
             block.location, "ZERO has no effect: strains count from the initial temperatures, coefficients are constant"
         )
 
 
-def without_effect(content: Content, current: Material, block: Block) -> None:
-    """*CONDUCTIVITY, *SPECIFIC HEAT: properties that static steps do not use."""
-    content.note(block.location, f"material '{current.name}': no effect, temperatures are given, not computed")
+def along_axes(current: Material, block: Block) -> float | tuple[float, ...]:
+    """Return coefficients of one temperature, one for all directions or one along each axis."""
+    kind = block.choice("TYPE", tuple(COEFFICIENTS))
+    if len(block.rows) != 1:
+        raise block.location.refuse(
+            f"material '{current.name}': {len(block.rows)} data lines where one is needed: coefficients that depend on "
+            "temperatures are not supported"
+        )
+    row, count = block.rows[0], COEFFICIENTS[kind]
+    values = tuple(row.number(index) for index in range(count))
+    if any(row.entries[count + 1 :]):
+        raise row.location.refuse(
+            f"material '{current.name}': TYPE={kind} has {count} coefficients, at one temperature"
+        )
+    return values[0] if kind == "ISO" else values
+
+
+def conductivity_of(material: Material, block: Block) -> float | tuple[float, ...]:
+    """Return the conductivity of a material, one or three along its axes; CaseError if one is not positive."""
+    found = along_axes(material, block)
+    if not np.min(found) > 0.0:
+        raise block.location.refuse(f"material '{material.name}': the conductivity {np.min(found):g} must be positive")
+    return found
 
 
 def initial_conditions(content: Content, block: Block) -> None:

@@ -104,6 +104,7 @@ class ModelBase:
         ] = []  # those of the relations that support a group
         self.springs: list[Springs] = []
         self.pretensions: list[Pretension] = []
+        self.interpolated: list[str] = []  # cyclic symmetries whose nodes follow facets
         self.periodic_interfaces: list[PeriodicInterface] = []  # nodes that are one place of a part that repeats itself
         self.contact: list[ContactPair] = []
 

@@ -216,7 +216,8 @@ class ModelConnections(ModelInitialStates):
         Parameters
         ----------
         first, second : str
-            The ends: groups whose nodes lie upon each other after the turn, either way.
+            The ends: groups whose nodes lie upon each other after the turn, either way. Where meshes differ, groups of facets
+            that do: nodes of the end with more of them then follow the facets of the other one.
         sectors : int
             How many make the whole.
         origin : sequence of float (dim,), optional
@@ -227,7 +228,7 @@ class ModelConnections(ModelInitialStates):
         Raises
         ------
         MeshError, ModelError
-            If there are no such groups, their nodes do not lie upon each other (the largest distance is told), or
+            If there are no such groups, they do not lie upon each other (the largest distance is told), or
             kinematics are axisymmetric.
         """
         name = f"the cyclic symmetry of '{first}' and '{second}'"
@@ -248,7 +249,10 @@ class ModelConnections(ModelInitialStates):
             )
         relations, interface = cyclic(self.mesh, (first, second), sectors, origin_given, along)
         self.relations.extend(relations)
-        self.periodic_interfaces.append(interface)
+        if interface is None:
+            self.interpolated.append(name)
+        else:
+            self.periodic_interfaces.append(interface)
 
     @typed(ModelError)
     def relate(

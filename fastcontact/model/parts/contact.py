@@ -85,7 +85,8 @@ class ModelContact(ModelConnections):
             - ``cohesion``: a layer between the sides that stretches up to its ``strength`` [pressure] and then breaks, which
               takes its ``energy`` by area [pressure length]: a mapping of these, and of ``shear_strength``, ``shear_energy``
               (by default as in opening), ``stiffness`` (by default the strength is reached at a hundredth of the opening at
-              break) [pressure / length], and ``exponent``, that of Benzeggagh and Kenane between the modes (2) [-]. It is
+              break) [pressure / length], ``exponent``, between the modes (2) [-], ``mixed_mode``, its law: ``"bk"``
+              (Benzeggagh and Kenane) or ``"power"``, and ``initiation``: ``"bk"``, ``"quadratic"`` or ``"maximum"``. It is
               without stress as the sides lie, also across gaps, and has its stiffness where it is pressed. Damage
               is in the results. ``adhesion``: attraction without memory, a mapping of ``work``, of adhesion by area,
               ``strength`` and ``stiffness``, likewise; along the sides it has no resistance.

@@ -55,8 +55,8 @@ class ModelHeat(ModelMaterials):
         self._heat(HeatSource(group_names(groups), value, table_of(ramp, "the ramp of the heat source")))
 
     @typed(ModelError)
-    def add_nodal_heat(self, group: str, value: float, *, ramp: History = None) -> None:
-        """Heat every node of a group by `value` [power]; in axisymmetry over the full circle."""
+    def add_nodal_heat(self, group: str, value: Value, *, ramp: History = None) -> None:
+        """Heat every node of a group by `value` [power], in axisymmetry over the full circle; as in `fix_temperature`."""
         self._heat(NodalHeat(group, value, table_of(ramp, f"the ramp of the heat at nodes of '{group}'")))
 
     @typed(ModelError)
@@ -144,6 +144,10 @@ class ModelHeat(ModelMaterials):
                 "temperatures are both given by add_temperature and conducted: prescribe them by fix_temperature"
             )
         self.refuse_nonlinear("conduction of heat is")
+        if self.interpolated:
+            raise ModelError(
+                f"{self.interpolated[0]} joins meshes that differ, which no heat crosses: mesh its ends alike"
+            )
         self.conduction().check()
         lacking = [material for material, _ in self.materials if material.expansion is None]
         if self.expands and lacking:

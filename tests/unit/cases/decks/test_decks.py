@@ -58,7 +58,7 @@ def test_two_cubes_are_a_bar(tmp_path):
         ("top\n15, 16, 17, 18\n", "top\n15, 16, 17, 18, 77\n", "15, 16, 17, 18, 77", "node 77 is not defined"),
         ("top\n15, 16, 17, 18\n", "top\ntop\n", "top", "set 'top' contains itself"),
         ("2, 1., 0., 0.\n", "2, 1., 0., 0.\n1, 5.\n", "1, 5.", "node 1 is defined twice"),
-        ("*Static\n", "*Static\n*Cflux\n17, 11, 3.\n", "*Cflux", "temperatures are given"),
+        ("*Static\n", "*Static\n*Cflux\n17, 11, 3.\n", "*Cflux", "heats bodies in steps with"),
         ("roof, P, 100.\n", "roof, P, 100.\nroof, P, 50.\n", "roof, P, 50.", "second value here in one step"),
         ("*Dsload\n", "*Dsload, amplitude=none\n", "*Dsload", "amplitude 'none' is not defined"),
         ("roof, P, 100.\n", "roof, P, 100.\n*Dload\nup, GRAV, 9.81, 0, 0, -1\n", "up, GRAV", r"no \*DENSITY"),

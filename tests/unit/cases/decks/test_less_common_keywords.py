@@ -184,15 +184,38 @@ GAPS = """*Node
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (("bottom, 3\n", "bottom, 3\n"), "to nodes that are held at rest only"),
+        (("bottom, 3\n", "bottom, 3\n"), "to nodes that are held, or driven as one"),
         (("15, 0., 0., 2.\n", "15, 0., 0., 2.1\n"), "their nodes lie in a plane across their direction"),
     ],
 )
 def test_gap_elements_that_are_no_plane_at_rest(tmp_path, change, said):
-    held = "bottom, 3\n" if "rest" in said else "bottom, 3\nceiling, 1, 3\n"
+    held = "bottom, 3\n" if "held" in said else "bottom, 3\nceiling, 1, 3\n"
     text = before("*Boundary\n", GAPS).replace(*change).replace("bottom, 3\n", held)
     with pytest.raises(fc.CaseError, match=said):
         deck_of(tmp_path, text)
+
+
+def test_gap_elements_to_driven_nodes(tmp_path):
+    """The ceiling comes down by 0.011, of which 0.001 are the gap; then it goes."""
+    text = before("*Boundary\n", GAPS).replace("bottom, 3\n", "bottom, 3\nceiling, 1, 2\n")
+    steps = "".join(f"*Step\n*Static\n*Boundary\nceiling, 3, 3, {z}\n*End Step\n" for z in (-0.011, 0.01))
+    deck = deck_of(tmp_path, text.replace(STEP, steps))
+    down, up = deck.solve()
+    assert down.contact["gaps"].force[2] == pytest.approx(-1000.0, rel=1e-9)
+    assert down.displacement[deck.points_of("ceiling"), 2] == pytest.approx(-0.011)
+    assert down.reaction[deck.points_of("ceiling"), 2].sum() == pytest.approx(-1000.0, rel=1e-9)
+    assert not up.contact["gaps"].active.any()
+
+
+def test_gap_elements_between_bodies(tmp_path):
+    pairs = "".join(f"{31 + k}, {5 + k}, {11 + k}\n" for k in range(4))
+    between = f"*Element, type=GAPUNI, elset=gaps\n{pairs}*Gap, elset=gaps\n0.002, 0., 0., 1.\n"
+    pushed = "*Step\n*Static\n*Boundary\ntop, 3, 3, -0.012\n*End Step\n"
+    text = WHOLE.replace(CONTACT, between).replace(STEP, pushed)
+    (step,) = deck_of(tmp_path, text).solve()
+    assert abs(step.contact["gaps"].force[2]) == pytest.approx(1000.0, rel=1e-9)
+    with pytest.raises(fc.CaseError, match=r"\*GAP: gap elements between bodies are supported along their direction"):
+        deck_of(tmp_path, text.replace("31, 5, 11\n", "31, 5, 12\n").replace("32, 6, 12\n", "32, 6, 11\n"))
 
 
 def test_fixed_supports_keep_where_they_are(tmp_path):

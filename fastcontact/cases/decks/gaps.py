@@ -1,0 +1,144 @@
+"""Gap elements of a deck: contact of the faces around their nodes with a rigid plane, or with the faces of another body."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fastcontact.arrays import Array, Indices
+from fastcontact.cases.decks.assembled import Assembled, facet_points
+from fastcontact.cases.decks.blocks import Location
+from fastcontact.cases.decks.conditions import Conditions
+from fastcontact.cases.decks.meshing import DeckMesh
+from fastcontact.contact.obstacles.shapes import HalfSpace
+from fastcontact.errors import FastcontactError
+from fastcontact.model.model import Model
+from fastcontact.model.ramp import Table
+
+# Distances that count as none, relative to the size of the model.
+TOUCHING = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class GapGroup:
+    """Gap elements of a set.
+
+    Attributes
+    ----------
+    name : str
+    location : Location
+    clearance : float
+        [length]
+    direction : ndarray (dim,)
+        From the first node to the second one [-].
+    ends : ndarray of int (n, 2)
+        Points.
+    facets, opposite : str
+        Groups of the facets around the first nodes, and around the second ones; empty where these belong to no solids.
+    """
+
+    name: str
+    location: Location
+    clearance: float
+    direction: Array
+    ends: Indices
+    facets: str
+    opposite: str
+
+
+def check_discrete(made: Assembled, kind: str, given: Mapping[str, Any], needed: str) -> None:
+    """Refuse springs and gap elements without properties."""
+    with_one = {own for name, entry in given.items() for own in made.elements_of(name, entry[0])}
+    for element in made.discrete:
+        if element.cell.type == kind and element not in with_one:
+            raise element.cell.location.refuse(f"element {element.number} of type {kind} has no {needed}")
+
+
+def gap_groups(found: DeckMesh) -> list[GapGroup]:
+    """Make groups of the facets around the nodes of gap elements; CaseError where these make up no whole facets."""
+    made, groups = found.made, []
+    check_discrete(made, "GAPUNI", made.content.gaps, "*GAP")
+    for name, (location, clearance, vector) in made.content.gaps.items():
+        own = made.elements_of(name, location)
+        if any(element.cell.type != "GAPUNI" for element in own):
+            raise location.refuse("acts on elements of type GAPUNI only")
+        shown = made.content.root.set_names.get(name, name)
+        ends = np.array([element.points for element in own], np.intp)
+        bodies = all(point in made.of_solids for point in ends[:, 1].tolist())
+        groups.append(
+            GapGroup(
+                shown, location, clearance, np.array(vector)[: found.dim] / np.linalg.norm(vector), ends,
+                _whole(found, f"{shown} facets", ends[:, 0], location),
+                _whole(found, f"{shown} opposite facets", ends[:, 1], location) if bodies else "",
+            )
+        )  # fmt: skip
+    return groups
+
+
+def _whole(found: DeckMesh, group: str, points: Indices, location: Location) -> str:
+    """Make a group of the facets all of whose nodes are among points; CaseError where points belong to none of them."""
+    chosen = set(points.tolist())
+    faces = found.made.faces_within(chosen)
+    if {p for face in faces for p in facet_points(*face)} != chosen:
+        raise location.refuse(
+            "gap elements are supported on all nodes of whole faces only, from a body to another or to held nodes"
+        )
+    return found.add_facets(group, faces)
+
+
+def add_gap(model: Model, found: DeckMesh, gap: GapGroup, conditions: Conditions) -> dict[str, dict[int, int]]:
+    """Add the contact of gap elements to a model; return by its name the held nodes behind those of the body."""
+    first, second = model.mesh.points[gap.ends[:, 0]], model.mesh.points[gap.ends[:, 1]]
+    size = TOUCHING * float(np.ptp(model.mesh.points, axis=0).max())
+    if np.ptp(first @ gap.direction) > size:
+        raise gap.location.refuse("gap elements are supported where their nodes lie in a plane across their direction")
+    if gap.opposite:
+        between = second - first
+        along = between @ gap.direction
+        if (
+            np.ptp(along) > size
+            or np.abs(between - np.outer(along, gap.direction)).max() > size
+            or along.mean() < -size
+        ):
+            raise gap.location.refuse(
+                "gap elements between bodies are supported along their direction, in planes across it only"
+            )
+        try:
+            model.add_contact(
+                gap.name, secondary=gap.facets, primary=gap.opposite, formulation="node_to_segment",
+                clearance=gap.clearance - float(along.mean()),
+            )  # fmt: skip
+        except FastcontactError as error:
+            raise gap.location.refuse(str(error)) from error
+        return {}
+    history = _motion(gap, conditions)
+    wall = HalfSpace(
+        point=tuple((first @ gap.direction).mean() * gap.direction + gap.clearance * gap.direction),
+        normal=tuple(-gap.direction),
+    )
+    moves: dict[str, Any] = {}
+    if any(value for _, value in history):
+        moves = {"motion": dict(zip("xyz", gap.direction.tolist(), strict=False)), "ramp": history}
+    model.add_obstacle(gap.name, secondary=gap.facets, obstacle=wall, formulation="node_to_segment", **moves)
+    return {gap.name: dict(gap.ends.tolist())}
+
+
+def _motion(gap: GapGroup, conditions: Conditions) -> Table:
+    """Return how far the second nodes move along the direction; CaseError where they are not driven there, all alike."""
+    axes, supports = np.flatnonzero(gap.direction).tolist(), conditions.supports
+    temporary = {name for name, _ in conditions.temporary()}
+    by_axis: list[tuple[float, Array]] = []
+    for axis in axes:
+        names = [(end, axis, False) for end in gap.ends[:, 1].tolist()]
+        tables = {supports.table(name) for name in names if name in supports.tracks and name not in temporary}
+        if len(tables) != 1 or not all(name in supports.tracks and name not in temporary for name in names):
+            raise gap.location.refuse(
+                "gap elements are supported to nodes that are held, or driven as one, along their direction"
+            )
+        by_axis.append((float(gap.direction[axis]), np.array(tables.pop())))
+    times = np.unique(np.concatenate([table[:, 0] for _, table in by_axis]))
+    moved = sum((cosine * np.interp(times, *table.T) for cosine, table in by_axis), np.zeros(len(times)))
+    return tuple(zip(times.tolist(), moved.tolist(), strict=True))

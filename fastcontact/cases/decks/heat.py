@@ -1,0 +1,337 @@
+"""Heat of a deck: conductivity and conductance; temperatures, fluxes and films over its steps as loads of the model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from fastcontact.arrays import Array
+from fastcontact.cases.decks.assembled import Assembled, Element, Face
+from fastcontact.cases.decks.blocks import Block, Location, Row
+from fastcontact.cases.decks.content import Content, Given, Interaction, Material, Step
+from fastcontact.cases.decks.histories import Histories, by_shape
+from fastcontact.cases.decks.meshing import DeckMesh
+from fastcontact.contact.conductance import Conductance
+from fastcontact.elasticity.materials import LinearElastic
+from fastcontact.errors import ContactError
+from fastcontact.model.model import Model
+from fastcontact.model.ramp import Table
+
+# Number of the degree of freedom of temperature.
+TEMPERATURE = 11
+# Bodies of steps of heat alone, which are held.
+HELD = LinearElastic(E=1.0, nu=0.0)
+# Conductance of ties, over conductivity by size of the model: temperatures of both sides differ by about its inverse.
+PERFECT = 1e8
+# Clearance over the last of a table beyond which nothing is conducted.
+BEYOND = 1.0 + 1e-9
+
+
+def conductivity(content: Content, current: Material, block: Block) -> None:
+    """*CONDUCTIVITY: kept until it is known whether heat is computed."""
+    current.conductivity = block
+
+
+def specific_heat(content: Content, current: Material, block: Block) -> None:
+    """*SPECIFIC HEAT: a property that neither static nor steady steps use."""
+    content.note(block.location, f"material '{current.name}': no effect, heat is steady, or temperatures are given")
+
+
+def physical_constants(content: Content, block: Block) -> None:
+    """*PHYSICAL CONSTANTS: those of radiation, without effect."""
+    content.note(block.location, "no effect: there is no radiation")
+
+
+def gap_conductance(content: Content, current: Interaction, block: Block) -> None:
+    """*GAP CONDUCTANCE: kept until it is known whether heat is computed."""
+    current.conductance.append(block)
+
+
+def gap_heat_generation(content: Content, current: Interaction, block: Block) -> None:
+    """*GAP HEAT GENERATION: the share of the work of friction that becomes heat, the same on both sides."""
+    row = block.rows[0] if block.rows else Row(block.location, ())
+    share, secondary = row.number(0, 1.0), row.number(1, 0.5)
+    if not 0.0 <= share <= 1.0:
+        raise row.location.refuse(
+            f"the share {share:g} of the work of friction that becomes heat must lie between 0 and 1"
+        )
+    if secondary != 0.5:
+        raise row.location.refuse(
+            f"{secondary:g} of the heat to the secondary side is not supported, only half of it, 0.5"
+        )
+    if row.number(2, 0.0) > 0.0:
+        raise row.location.refuse("a given velocity is not supported: sides slide by their displacements")
+    current.friction_heat = block.location, share
+
+
+def conductance_of(content: Content, law: Interaction) -> dict[str, Any]:
+    """Return the options of a contact pair by which heat crosses it: by pressure or clearance, none without a table."""
+    tables: dict[str, Any] = {}
+    for block in law.conductance:
+        rows = [(row.number(1, 0.0), row.number(0)) for row in block.rows]
+        if len({row.number(2, 0.0) for row in block.rows}) > 1:
+            raise block.location.refuse(
+                "a conductance that depends on the temperature is not supported: give one table"
+            )
+        if not rows or any(b[0] <= a[0] for a, b in pairwise(rows)):
+            raise block.location.refuse("needs conductances with pressures or clearances that ascend")
+        if len(rows) == 1:
+            tables["number"] = rows[0][1]
+            continue
+        pressure = "PRESSURE" in block.parameters
+        by = "pressure" if pressure or rows[-1][1] >= rows[0][1] else "gap"
+        if not pressure:
+            meant = (
+                "rises with: pressure, as in CalculiX" if by == "pressure" else "falls with: clearance, as in Abaqus"
+            )
+            content.note(block.location, f"the conductance is by what it {meant}")
+        end = (rows[-1][0] * BEYOND, 0.0)
+        tables[by] = rows if by == "pressure" else [*rows, end]
+        if by == "pressure" and content.heat == "alone":
+            content.note(
+                block.location, "steps of heat alone have no pressures: sides that touch conduct as without any"
+            )
+    given = tables.pop("number", None)
+    if given is not None and tables:
+        raise law.conductance[0].location.refuse("one conductance, and a table besides: give one of them")
+    if given is None and not tables:
+        return {}
+    try:
+        Conductance(law.name, tables or given)
+    except ContactError as error:
+        raise law.conductance[0].location.refuse(str(error)) from None
+    return {"conductance": tables or given}
+
+
+def friction_heat_of(content: Content, law: Interaction) -> dict[str, Any]:
+    """Return the option by which the work of friction heats both sides, by the time of the steps."""
+    if law.friction_heat is None:
+        if law.conductance:
+            content.note(law.location, "friction makes no heat without *GAP HEAT GENERATION, as in CalculiX")
+        return {}
+    location, share = law.friction_heat
+    periods = {step.period for step in content.steps}
+    if len(periods) > 1:
+        raise location.refuse("heat of friction is supported in steps of the same length only, which is their time")
+    return {"friction_heat": share / periods.pop()}
+
+
+def perfect_conductance(content: Content, model: Model, location: Location) -> Any:
+    """Return the conductance of a tie, whatever pressure and gap."""
+    largest = max(np.max(material.conductivity) for material, _ in model.materials)
+    h = PERFECT * float(largest) / float(np.ptp(model.mesh.points, axis=0).max())
+    content.note(location, f"heat crosses by a conductance of {h:.3g}: temperatures of both sides differ by some 1e-8")
+    return (lambda pressure, gap: np.full(gap.shape, h)) if content.heat == "alone" else h
+
+
+def check_steps(content: Content) -> None:
+    """Find out whether the steps of a deck compute heat, alone or with displacements; CaseError where they do not fit."""
+    first = next((step for step in content.steps if step.heat), None)
+    content.heat = first.heat if first else ""
+    for number, step in enumerate(content.steps):
+        if first and step.heat != first.heat and (first.heat == "alone" or number > content.steps.index(first)):
+            raise step.location.refuse(
+                "steps of heat alone, of heat with displacements, and static ones after these cannot be in one deck: make "
+                "all *HEAT TRANSFER, or *COUPLED TEMPERATURE-DISPLACEMENT"
+            )
+        for block in (given.block for given in step.given):
+            if block.keyword in OF_HEAT and not step.heat:
+                raise block.location.refuse(
+                    "heats bodies in steps with *HEAT TRANSFER or *COUPLED TEMPERATURE-DISPLACEMENT"
+                )
+            if block.keyword == "TEMPERATURE" and first:
+                raise block.location.refuse(
+                    "temperatures are computed in this deck: prescribe them by *BOUNDARY, component 11"
+                )
+            if block.keyword in ("CLOAD", "DLOAD", "DSLOAD") and step.heat == "alone":
+                raise block.location.refuse(
+                    "is no load of heat: use *COUPLED TEMPERATURE-DISPLACEMENT in place of *HEAT TRANSFER"
+                )
+
+
+@dataclass(frozen=True)
+class Exchange:
+    """Where a flux or a film acts: a face or elements; the coefficient of a film, None for a flux."""
+
+    keyword: str
+    face: Face | None
+    elements: tuple[Element, ...] = ()
+    coefficient: float | None = None
+
+
+class HeatConditions:
+    """Prescribed temperatures, heat at nodes, fluxes and films of a deck with their histories."""
+
+    def __init__(self, found: DeckMesh, initial: Mapping[int, float]) -> None:
+        self.found, self.made = found, found.made
+        content = self.made.content
+        self.reference = _reference(self.made, initial) if content.heat else 0.0
+        self.rest: dict[Exchange, float] = {}
+        of_points = dict.fromkeys(range(len(self.made.points)), self.reference)
+        self.temperatures: Histories[int] = Histories(content, rest=of_points)
+        self.powers: Histories[int] = Histories(content)
+        self.fluxes: Histories[Exchange] = Histories(content)
+        self.films: Histories[Exchange] = Histories(content, rest=self.rest)
+        self.begun = False
+
+    @property
+    def histories(self) -> tuple[Histories[Any], ...]:
+        """All histories of heat."""
+        return self.temperatures, self.powers, self.fluxes, self.films
+
+    def prescribe(self, given: Given, row: Row) -> None:
+        """Prescribe the temperature of nodes by a line of *BOUNDARY."""
+        if not self.made.content.heat:
+            raise row.location.refuse(
+                "component 11, the temperature, is none of 1 to 6: in static steps use *TEMPERATURE"
+            )
+        if "FIXED" in given.block.parameters:
+            raise row.location.refuse("FIXED is not supported for temperatures: give them")
+        for point in self._of_solids(row):
+            self.temperatures.give(point, row.number(3, 0.0), given.amplitude, row.location)
+
+    def _of_solids(self, row: Row) -> list[int]:
+        """Return the points of a node set in a line; CaseError if one belongs to no solid."""
+        points = self.made.nodes(row.text(0), row.location)
+        for point in points:
+            if point not in self.made.of_solids:
+                raise row.location.refuse(
+                    f"node {self.made.number_of(point)} belongs to no solid, so it has no temperature"
+                )
+        return points
+
+    def take(self, given: Given) -> None:
+        """Take the values of a block of heat for the current step."""
+        keyword = given.block.keyword
+        by: dict[str, Histories[Any]] = {"CFLUX": self.powers, "FILM": self.films, "SFILM": self.films}
+        history = by.get(keyword, self.fluxes)
+        if given.new:
+            history.forget(lambda name: getattr(name, "keyword", keyword) == keyword)
+        for row in given.block.rows:
+            if keyword == "CFLUX":
+                if row.whole(1, TEMPERATURE) not in (0, TEMPERATURE):
+                    raise row.location.refuse(f"component {row.text(1)} is not 11, that of heat")
+                for point in self._of_solids(row):
+                    self.powers.give(point, row.number(2), given.amplitude, row.location)
+                continue
+            film = history is self.films
+            if film and row.number(3) < 0.0:
+                raise row.location.refuse(f"the coefficient {row.number(3):g} of the film must not be negative")
+            for name in self._places(keyword, row, row.number(3) if film else None):
+                if film:
+                    self.rest[name] = self.reference
+                history.give(name, row.number(2), given.amplitude, row.location)
+
+    def _places(self, keyword: str, row: Row, coefficient: float | None) -> list[Exchange]:
+        """Return where a line of fluxes or films acts."""
+        label, letter = row.text(1).upper(), "S" if coefficient is None else "F"
+        if keyword in ("DSFLUX", "SFILM"):
+            if label != letter:
+                raise row.location.refuse(f"{label[:40]} on a surface is not supported, only {letter}")
+            return [Exchange(keyword, face, (), coefficient) for face in self.made.faces(row.text(0), row.location)]
+        own = self.made.elements_of(row.text(0), row.location)
+        if label[:1] == letter and label[1:].isdigit():
+            faces = [(element, self.made.facet(element, int(label[1:]), row.location)) for element in own]
+            return [Exchange(keyword, face, (), coefficient) for face in faces]
+        if label == "BF" and keyword == "DFLUX":
+            return [Exchange(keyword, None, tuple(own))]
+        known = f"{letter}1, {letter}2, ..." + (", BF" if keyword == "DFLUX" else "")
+        raise row.location.refuse(f"{label[:40]} is not supported; known are {known}")
+
+    def advance(self, number: int, step: Step) -> None:
+        """Go on to the end of step `number`, from 1."""
+        for history, what in ((self.temperatures, "a temperature"), (self.films, "a film")):
+            given: Histories[Any] = history  # type: ignore[assignment]
+            for name, (_, _, location) in given.changing.items():
+                if self.begun and name not in given.tracks:
+                    raise location.refuse(
+                        f"{what} that comes in a later step is not supported: give it from the first one on"
+                    )
+            for name in given.dying:
+                raise step.location.refuse(
+                    f"{what} of line {given.tracks[name].location.line} that is let go is not supported"
+                )
+        for other in self.histories:
+            other.advance(number, step)
+        self.begun = self.begun or bool(step.heat)
+
+    def loads(self, thickness: float) -> list[Callable[[Model], None]]:
+        """Make the groups of all loads of heat in the mesh; return what adds each of them to a model."""
+        found, made = self.found, []  # type: DeckMesh, list[Callable[[Model], None]]
+        for points, value, table in by_shape([(self._risen(t), names) for t, names in self.temperatures.alike()]):
+            group = found.add_points(f"temperature {len(made)}", points)
+            made.append(_prescribed(group, _above(value, self.reference), table))
+        for points, value, table in by_shape(self.powers.alike()):
+            group = found.add_points(f"heat {len(made)}", points)
+            made.append(_nodal(group, value, tuple((time, power / thickness) for time, power in table)))
+        on_faces: dict[tuple[str, Table, float | None], list[Face]] = {}
+        for history in (self.fluxes, self.films):
+            for table, names in history.alike():
+                for name in names:
+                    if name.face is not None:
+                        on_faces.setdefault((name.keyword, table, name.coefficient), []).append(name.face)
+                        continue
+                    group = found.add_solids(f"heat source {len(made)}", name.elements)
+                    made.append(_source(group, table))
+        for (keyword, table, coefficient), faces in on_faces.items():
+            group = found.add_facets(f"{keyword.lower()} {len(made)}", faces)
+            made.append(_flux(group, table) if coefficient is None else self._film(group, coefficient, table))
+        return made
+
+    def _risen(self, table: Table) -> Table:
+        """Return the rise of a history of temperatures over the reference."""
+        return tuple((time, value - self.reference) for time, value in table)
+
+    def _film(self, group: str, coefficient: float, table: Table) -> Callable[[Model], None]:
+        rise = self._risen(table)
+        size = max((value for _, value in rise), key=abs)
+        ramp = tuple((time, value / size) for time, value in rise) if size else None
+        return lambda model: model.add_film(group, coefficient, self.reference + size, ramp=ramp)
+
+
+def _prescribed(group: str, value: Any, table: Table) -> Callable[[Model], None]:
+    return lambda model: model.fix_temperature(group, value, ramp=table)
+
+
+def _nodal(group: str, value: Any, table: Table) -> Callable[[Model], None]:
+    return lambda model: model.add_nodal_heat(group, value, ramp=table)
+
+
+def _source(group: str, table: Table) -> Callable[[Model], None]:
+    return lambda model: model.add_heat_source(1.0, group, ramp=table)
+
+
+def _flux(group: str, table: Table) -> Callable[[Model], None]:
+    return lambda model: model.add_heat_flux(group, 1.0, ramp=table)
+
+
+def _above(value: Any, reference: float) -> Any:
+    """Return temperatures that rise over the reference by a number, or by what a function returns."""
+
+    def risen(points: Array) -> Array:
+        return np.asarray(value(points) + reference)
+
+    return risen if callable(value) else value + reference
+
+
+def _reference(made: Assembled, initial: Mapping[int, float]) -> float:
+    """Return the initial temperature of all solids; zero where they differ and nothing expands."""
+    content = made.content
+    values = {initial.get(point, 0.0) for point in made.of_solids}
+    if len(values) == 1:
+        return values.pop()
+    location = content.initial[0].location
+    if content.heat == "coupled" and any(material.expansion for material in content.materials.values()):
+        raise location.refuse(
+            f"initial temperatures from {min(values):g} to {max(values):g} are not supported where computed ones expand "
+            "bodies: strains count from one temperature"
+        )
+    content.note(location, "no effect: initial temperatures differ, and steady ones do not depend on them")
+    return 0.0
+
+
+OF_HEAT: Mapping[str, str] = dict.fromkeys(("CFLUX", "DFLUX", "DSFLUX", "FILM", "SFILM"), "")
