@@ -25,7 +25,7 @@ E = 1000.0  # of the upper body
 
 
 def examples(count: int) -> settings:
-    """Return settings for `count` examples; a longer profile multiplies them (``--hypothesis-profile=long``)."""
+    """Return settings for `count` examples of a profile of 100 (the default one has 40, ``--hypothesis-profile=long`` more)."""
     return settings(max_examples=max(1, count * settings.default.max_examples // 100), deadline=None)
 
 

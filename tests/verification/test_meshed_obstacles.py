@@ -27,9 +27,9 @@ def half_sphere(obstacle, formulation="continuous", element="quad4"):
 
 
 @pytest.mark.parametrize(
-    ("formulation", "element"), [("continuous", "quad8"), ("continuous", "quad4"), ("node_to_segment", "tri3")]
+    ("formulation", "element", "facet"),
+    [("continuous", "quad8", "line2"), ("continuous", "quad4", "line3"), ("node_to_segment", "tri3", "line2")],
 )
-@pytest.mark.parametrize("facet", ["line2", "line3"])
 def test_a_meshed_plane_is_a_plane(formulation, element, facet):
     x = np.linspace(0.0, 60.0, 41) + 0.2 * np.sin(np.arange(41) * np.pi / 2)  # facets of several lengths
     plane = lines(np.column_stack([x, np.zeros(41)]), facet)

@@ -71,7 +71,7 @@ def test_the_press_fit_of_lame():
 
 
 def ball_on_plane(force: float, size: float) -> fc.Model:
-    mesh = fc.generate.half_spheres(size=8.0, contact_size=size)
+    mesh = fc.generate.half_spheres(size=10.0, contact_size=size)
     model = fc.Model(mesh, kinematics="axisymmetric")
     model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3), "SPHHAU")
     model.add_material(fc.LinearElastic(E=30_000.0, nu=0.2), "SPHBAS")
@@ -100,7 +100,7 @@ def test_hertz_and_what_scaling_leaves_the_same():
 
 
 def test_prescribed_displacements_scale_forces_with_moduli():
-    mesh = fc.generate.sphere_on_block("hex8", R=10.0, contact_size=1.0, size=4.0)
+    mesh = fc.generate.sphere_on_block("hex8", R=10.0, contact_size=2.0, size=5.0)
     model = fc.Model(mesh, kinematics="3d")
     model.add_material(fc.LinearElastic(E=1000.0, nu=0.3), "SPHERE")
     model.add_material(fc.LinearElastic(E=3000.0, nu=0.2), "BLOCK")

@@ -77,7 +77,8 @@ def two_blocks(element: str = "quad4", kinematics: str = "plane_strain", press: 
     return make
 
 
-MOVED: Changes = {**STEEL, "moved": (("prescribed", "UPPER_TOP", "y"), 1.0, 1e-4)}
+# Poisson's ratio enters as Young's modulus does: it is tried where bodies are held otherwise, below.
+MOVED: Changes = {"E": STEEL["E"], "moved": (("prescribed", "UPPER_TOP", "y"), 1.0, 1e-4)}
 CLEAR = (("clearance", "c"), 0.0, 1e-5)
 
 
@@ -127,7 +128,9 @@ def test_in_space_with_factors_and_with_a_hierarchy(solver):
         model.add_contact("c", secondary="UZMIN", primary="LZMAX", clearance=clearance)
         return model
 
-    changes = {**STEEL, "moved": (("prescribed", "UZMAX", "z"), 1.0, 1e-4), "clearance": CLEAR}
+    changes = {"nu": STEEL["nu"], "moved": (("prescribed", "UZMAX", "z"), 1.0, 1e-4)}
+    if solver == "direct":
+        changes["clearance"] = CLEAR
     compare(make, [("contact_force", "c", "z"), ("pressure_max", "c")], changes, linear_solver=solver)
 
 
@@ -166,8 +169,8 @@ def test_pairing_that_is_kept_takes_one_solution():
     criteria = fc.Criteria(relative=1e-10, keep_pairing=True)
     found = compare(two_blocks(), [("pressure_max", "c")], MOVED, criteria=criteria)
     assert found.solutions == 1
-    moving = compare(two_blocks(), [("pressure_max", "c")], MOVED)
     by = ("prescribed", "UPPER_TOP", "y")
+    moving = asked(two_blocks()(), parameters=[by])
     assert abs(found.derivatives[by] / moving.derivatives[by] - 1.0) > 1e-3  # what the moving geometry makes
 
 
@@ -188,17 +191,17 @@ def test_rigid_obstacles_that_are_moved_and_pushed(kinematics, formulation):
         model.add_obstacle("ball", secondary=top, obstacle=ball, formulation=formulation, **driving)
         return model
 
-    moved = {**STEEL, "motion": (("motion", "ball"), 1.0, 1e-6)}
+    moved = {"nu": STEEL["nu"], "motion": (("motion", "ball"), 1.0, 1e-6)}
     compare(make, [("contact_force", "ball", up)], moved)
 
     def pushed(**changes):
         return make(True, **changes)
 
-    compare(pushed, [("pressure_max", "ball")], {**STEEL, "force": (("load", "ball"), 1.0, 1e-5)}, within=2e-6)
+    compare(pushed, [("pressure_max", "ball")], {"E": STEEL["E"], "force": (("load", "ball"), 1.0, 1e-5)}, within=2e-6)
 
 
 def test_heat_normals_and_loads_by_volume():
-    mesh = fc.generate.rings("quad8", divisions_inner=(3, 7), divisions_outer=(3, 9))
+    mesh = fc.generate.rings("quad8", divisions_inner=(2, 5), divisions_outer=(2, 6))
 
     def make(E=2e5, nu=0.3, moved=1.0, expansion=1e-5, warm=1.0, speed=300.0, weight=1.0, pulled=1.0):
         model = fc.Model(mesh, kinematics="plane_strain")
@@ -211,7 +214,7 @@ def test_heat_normals_and_loads_by_volume():
         model.add_gravity(y=-9810.0 * weight)
         model.add_body_force("OUTER", x=1e-3 * pulled)
         model.prescribe("BORE", normal=-0.01 * moved)
-        model.add_contact("c", secondary="CONT_INNER", primary="CONT_OUTER", clearance=-0.02)
+        model.add_contact("c", secondary="CONT_INNER", primary="CONT_OUTER", clearance=-0.02, formulation="continuous")
         return model
 
     changes = {
@@ -293,56 +296,47 @@ def asked(model: fc.Model, quantity=("pressure_max", "c"), parameters=(("E", 0),
     return fc.sensitivities(model, step, quantity, parameters, ramp=1, criteria=criteria, **options)
 
 
-@pytest.mark.parametrize(
-    ("quantity", "text"),
-    [
-        (("presure", "c"), "unknown quantity 'presure': did you mean 'pressure'"),
-        (("pressure_max", "d"), "unknown contact pair 'd'"),
-        (("pressure_max",), r"must have the form \(\"pressure_max\", pair\)"),
-        (("pressure", "c", 0), "point 0 is no node of the secondary side of contact 'c'"),
-        (("displacement", 10**6, "y"), "point 1000000 is not in the mesh of"),
-        (("displacement", 0, "w"), "unknown component"),
-        (("reaction", "CONT_UPPER", "x"), "no support acts along x on group 'CONT_UPPER'"),
-    ],
-)
-def test_quantities_that_are_none(quantity, text):
-    with pytest.raises(fc.ModelError, match=text):
-        asked(two_blocks()(), quantity)
+NO_QUANTITIES = [
+    (("presure", "c"), "unknown quantity 'presure': did you mean 'pressure'"),
+    (("pressure_max", "d"), "unknown contact pair 'd'"),
+    (("pressure_max",), r"must have the form \(\"pressure_max\", pair\)"),
+    (("pressure", "c", 0), "point 0 is no node of the secondary side of contact 'c'"),
+    (("displacement", 10**6, "y"), "point 1000000 is not in the mesh of"),
+    (("displacement", 0, "w"), "unknown component"),
+    (("reaction", "CONT_UPPER", "x"), "no support acts along x on group 'CONT_UPPER'"),
+]
+NO_PARAMETERS = [
+    (("g", 0), "unknown parameter 'g'"),
+    (("G", 0, "12"), "the material 0 has no G, or one that varies: there is no sensitivity by that"),
+    (("E", 0, "1"), "unknown component of E '1': there is none here"),
+    (("friction", "c"), "no sensitivity by friction: where all sticks"),
+    (("speed", "UPPER"), "unknown group with a centrifugal force 'UPPER': there is none here"),
+    (("temperature", "UPPER"), "unknown group with a temperature 'UPPER'"),
+    (("pretension", "bolt"), "unknown pretension 'bolt'"),
+    (("E",), r"must have the form \(\"E\", material\)"),
+    (("E", "STEEL"), "unknown material 'STEEL'"),
+    (("load", "UPPER_TOP"), "unknown group with a load, or obstacle with a force, 'UPPER_TOP'"),
+    (("prescribed", "UPPER_LEFT"), "unknown group whose displacement is prescribed 'UPPER_LEFT'"),
+    (("motion", "c"), "unknown rigid obstacle with a motion 'c'"),
+    (("clearance", "d"), "unknown contact pair 'd'"),
+]
+# What depends on the path, or keeps its gaps.
+NO_SUCH_CONTACT = [
+    ({"friction": 0.2}, "contact 'c' has friction: its results depend on all load steps"),
+    ({"kind": "bilateral_once_closed"}, "never opens what was closed in earlier load steps"),
+]
 
 
-@pytest.mark.parametrize(
-    ("parameter", "text"),
-    [
-        (("g", 0), "unknown parameter 'g'"),
-        (("G", 0, "12"), "the material 0 has no G, or one that varies: there is no sensitivity by that"),
-        (("E", 0, "1"), "unknown component of E '1': there is none here"),
-        (("friction", "c"), "no sensitivity by friction: where all sticks"),
-        (("speed", "UPPER"), "unknown group with a centrifugal force 'UPPER': there is none here"),
-        (("temperature", "UPPER"), "unknown group with a temperature 'UPPER'"),
-        (("pretension", "bolt"), "unknown pretension 'bolt'"),
-        (("E",), r"must have the form \(\"E\", material\)"),
-        (("E", "STEEL"), "unknown material 'STEEL'"),
-        (("load", "UPPER_TOP"), "unknown group with a load, or obstacle with a force, 'UPPER_TOP'"),
-        (("prescribed", "UPPER_LEFT"), "unknown group whose displacement is prescribed 'UPPER_LEFT'"),
-        (("motion", "c"), "unknown rigid obstacle with a motion 'c'"),
-        (("clearance", "d"), "unknown contact pair 'd'"),
-    ],
-)
-def test_parameters_that_are_none(parameter, text):
-    with pytest.raises(fc.ModelError, match=text):
-        asked(two_blocks()(), parameters=[parameter])
-
-
-@pytest.mark.parametrize(
-    ("options", "text"),
-    [
-        ({"friction": 0.2}, "contact 'c' has friction: its results depend on all load steps"),
-        ({"kind": "bilateral_once_closed"}, "never opens what was closed in earlier load steps"),
-    ],
-)
-def test_what_depends_on_the_path_is_refused(options, text):
-    with pytest.raises(fc.ModelError, match=text):
-        asked(two_blocks(**options)())
+def test_what_has_no_sensitivity_is_named():
+    model = two_blocks()()
+    step = fc.solve(model, 1, criteria=TIGHT)[-1]
+    tried = [(quantity, [("E", 0)], text) for quantity, text in NO_QUANTITIES]
+    for quantity, by, text in [*tried, *((("pressure_max", "c"), [name], text) for name, text in NO_PARAMETERS)]:
+        with pytest.raises(fc.ModelError, match=text):
+            fc.sensitivities(model, step, quantity, by, ramp=1, criteria=TIGHT)
+    for options, text in NO_SUCH_CONTACT:
+        with pytest.raises(fc.ModelError, match=text):
+            asked(two_blocks(**options)())
 
 
 def test_other_refusals():
@@ -377,7 +371,7 @@ def test_a_constraint_about_to_change_is_named():
     whole = fc.solve(model(-0.01), 1)[-1].contact["plane"]
     assert whole.active.all()
     low, high = 0.0, 0.1  # where the last node lifts off
-    for _ in range(60):
+    for _ in range(36):
         middle = 0.5 * (low + high)
         closed = fc.solve(model(middle), 1)[-1].contact["plane"].active.all()
         low, high = (middle, high) if closed else (low, middle)

@@ -277,14 +277,11 @@ def test_no_traceback_is_printed(command, when, tmp_path):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_no_half_written_file_stays(number, tmp_path):
+def test_no_half_written_file_stays(number, solved_case, tmp_path):
     """Two signals come while a picture is written to a file that is to take the place of another."""
     (tmp_path / "out.png").write_bytes(b"before")
     process = subprocess.Popen(
-        [
-            sys.executable, "-m", "fastcontact", "sweep", "forma04a", "--set", "approach=1,2", "--workers", "1", "-q",
-            "--png", "out.png",
-        ],
+        [sys.executable, "-m", "fastcontact", "profile", str(solved_case / "old.vtkhdf"), "-q", "--png", "out.png"],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True, cwd=tmp_path,
     )  # fmt: skip
     while sorted(os.listdir(tmp_path)) in (["out.png"], []):
@@ -314,12 +311,12 @@ def test_the_end_of_a_study_by_sigterm(tmp_path):
     """As a scheduler does it: no process stays, nothing but one line is said, what was finished is kept."""
     process = subprocess.Popen(
         [
-            sys.executable, "-m", "fastcontact", "sweep", "forma04c", "--set", "approach=1:4:400", "--workers", "2", "-q",
+            sys.executable, "-m", "fastcontact", "sweep", "forma04a", "--set", "approach=1:4:400", "--workers", "2", "-q",
             "--store", "store",
         ],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True, cwd=tmp_path,
     )  # fmt: skip
-    while len(list(tmp_path.glob("store/*.json"))) < 3:
+    while len(list(tmp_path.glob("store/*.json"))) < 1:
         assert process.poll() is None, process.communicate()[1]
         time.sleep(0.005)
     process.terminate()
