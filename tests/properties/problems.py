@@ -25,7 +25,7 @@ E = 1000.0  # of the upper body
 
 
 def examples(count: int) -> settings:
-    """Return settings for `count` examples of a profile of 100 (the default one has 40, ``--hypothesis-profile=long`` more)."""
+    """Return settings for `count` examples where a profile asks for 100; see ``conftest.py`` and ``--hypothesis-profile``."""
     return settings(max_examples=max(1, count * settings.default.max_examples // 100), deadline=None)
 
 
