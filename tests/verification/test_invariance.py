@@ -4,8 +4,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from images import Image, ball, cylinder, differences, discs, floating, floating_ball, image_of, on_plane, solved
 from scipy.spatial.transform import Rotation
 
@@ -94,29 +92,6 @@ def agrees(name, image, tolerance=1e-9):
 @pytest.mark.parametrize(("name", "change"), cases())
 def test_an_image_has_the_image_of_the_result(name, change):
     agrees(name, *image(change, ALL[name]))
-
-
-@settings(max_examples=8, deadline=None, derandomize=True)
-@given(
-    name=st.sampled_from([name for name in WHOLE if WHOLE[name].mesh.dim == 2]),
-    angle=st.floats(-180, 180),
-    shift=st.tuples(st.floats(-500, 500), st.floats(-500, 500)),
-    seed=st.one_of(st.none(), st.integers(0, 999)),
-)
-def test_any_rigid_motion_and_numbering_in_the_plane(name, angle, shift, seed):
-    turn = Rotation.from_euler("z", angle, degrees=True).as_matrix()[:2, :2]
-    agrees(name, Image(Q=turn, shift=shift, seed=seed))
-
-
-@settings(max_examples=6, deadline=None, derandomize=True)
-@given(
-    name=st.sampled_from([name for name in WHOLE if WHOLE[name].mesh.dim == 3 and name not in LONG]),
-    quaternion=st.tuples(*[st.floats(-1, 1)] * 4).filter(lambda q: np.linalg.norm(q) > 0.1),
-    shift=st.tuples(*[st.floats(-500, 500)] * 3),
-    seed=st.one_of(st.none(), st.integers(0, 999)),
-)
-def test_any_rigid_motion_and_numbering_in_space(name, quaternion, shift, seed):
-    agrees(name, Image(Q=Rotation.from_quat(quaternion).as_matrix(), shift=shift, seed=seed))
 
 
 # --- what these rest on ---------------------------------------------------------------------------------------------

@@ -444,9 +444,8 @@ def result(tmp_path_factory):
     [
         ["--map"],
         ["--section", "z=0", "--field", "stress.yy", "--zoom", "8"],
-        ["--section", "x = 12.5"],
         ["--field", "displacement.y", "--scale", "10"],
-        ["--history"],
+        pytest.param(["--history"], marks=pytest.mark.slow),
     ],
 )
 def test_the_command_draws_solids(result, tmp_path, options):
