@@ -6,6 +6,8 @@ from two_bodies import blocks, boxes, held, touching
 
 import fastcontact as fc
 
+pytestmark = pytest.mark.each_value
+
 FORMULATIONS = ("node_to_segment", "continuous", "mortar")
 MODULUS = {"plane_strain": 1000.0 / 0.91, "axisymmetric": 1000.0, "3d": 1000.0}
 # Pressed by the first step, pulled by the second.

@@ -7,7 +7,7 @@ import pytest
 
 import fastcontact as fc
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 E, LENGTH, FORCE = 1000.0, 2.0, 3.0
 

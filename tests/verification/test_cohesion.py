@@ -5,6 +5,8 @@ import pytest
 
 import fastcontact as fc
 
+pytestmark = pytest.mark.each_value
+
 FORMULATIONS = (
     {},
     {"formulation": "mortar", "multipliers": "standard"},

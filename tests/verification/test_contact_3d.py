@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 import fastcontact as fc
 from fastcontact.mesh.generate import box, merge_points, renamed, sphere_octant, sphere_on_block, union
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 LINEAR = ("hex8", "tet4", "wedge6", "pyramid5")
 QUADRATIC = ("hex20", "hex27", "tet10", "wedge15", "wedge18", "pyramid13")

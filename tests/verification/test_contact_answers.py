@@ -8,6 +8,8 @@ import pytest
 import fastcontact as fc
 from fastcontact.cli._main import main
 
+pytestmark = pytest.mark.each_value
+
 E, HEIGHT = 1000.0, 2.0
 ELEMENTS = ("tri3", "quad4", "tri6", "quad8")
 

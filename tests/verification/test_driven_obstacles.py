@@ -13,6 +13,8 @@ from fastcontact.cases.summary import lines, of_step, summarise
 from fastcontact.contact.formulations import FORMULATIONS
 from fastcontact.mesh.generate import block, box, quarter_disc
 
+pytestmark = pytest.mark.each_value
+
 
 def block_under_a_ball(kinematics, element="quad4", centre=3.0, **options):
     left = 0.0 if kinematics == "axisymmetric" else -1.0

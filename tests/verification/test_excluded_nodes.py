@@ -6,6 +6,8 @@ from two_bodies import SIDES, blocks, boxes, held, touching
 
 import fastcontact as fc
 
+pytestmark = pytest.mark.each_value
+
 FORMULATIONS = ("node_to_segment", "continuous", "mortar")
 
 

@@ -12,6 +12,8 @@ import pytest
 
 import fastcontact as fc
 
+pytestmark = pytest.mark.each_value
+
 MESHES = {"tri3": {"size": 6.0}, "tri6": {"size": 8.0}, "quad4": {"arc_sizes": (0.5, 4.0), "radial_sizes": (0.5, 4.0)}}
 FACETS = [("node_to_segment", {}), ("node_to_segment", {"normals": "averaged"})]
 FIELDS = [("continuous", {}), ("mortar", {"multipliers": "standard"})]

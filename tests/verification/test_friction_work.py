@@ -7,7 +7,7 @@ from stepping import Stepping
 import fastcontact as fc
 from fastcontact.mesh.generate import box, renamed, union
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 E, FRICTION, PRESSURE, SLIP = 1e5, 0.3, 1.0, 0.1
 

@@ -89,7 +89,7 @@ def agrees(name, image, tolerance=1e-9):
     assert any(contact.active.any() for contact in one.contact.values())
 
 
-@pytest.mark.parametrize(("name", "change"), cases())
+@pytest.mark.parametrize(("name", "change"), [*cases()])
 def test_an_image_has_the_image_of_the_result(name, change):
     agrees(name, *image(change, ALL[name]))
 

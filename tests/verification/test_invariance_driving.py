@@ -5,7 +5,7 @@ import pytest
 
 import fastcontact as fc
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 FORMULATIONS = [
     ("node_to_segment", {}),

@@ -61,13 +61,13 @@ def in_units(jobs, units):
             yield pytest.param(name, unit, marks=() if default else pytest.mark.slow)
 
 
-@pytest.mark.parametrize(("name", "unit"), in_units(PLANE, list(UNITS)))
+@pytest.mark.parametrize(("name", "unit"), [*in_units(PLANE, list(UNITS))])
 def test_units_make_no_difference_in_the_plane(name, unit):
     stays(PLANE[name], IMAGES[unit], solved(PLANE[name], Image())[0])
 
 
 @pytest.mark.parametrize("solver", ["direct", "amg"])
-@pytest.mark.parametrize(("name", "unit"), in_units(SPACE, list(UNITS)[:2]))
+@pytest.mark.parametrize(("name", "unit"), [*in_units(SPACE, list(UNITS)[:2])])
 def test_units_make_no_difference_in_space(name, unit, solver):
     job = replace(SPACE[name], solver=solver, tolerance=1e-10)
     stays(job, IMAGES[unit], solved(job, Image())[0])

@@ -12,7 +12,7 @@ from fastcontact.contact.formulations._determined_field import DETERMINED, Whole
 from fastcontact.contact.integration import nodal_areas
 from fastcontact.mesh.generate import block, renamed, union
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 
 def named(*meshes):

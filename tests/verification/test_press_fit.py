@@ -8,7 +8,7 @@ from two_bodies import rings
 
 import fastcontact as fc
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 INTERFERENCE = 0.02
 SHAFT, HUB = fc.LinearElastic(E=1000.0, nu=0.3), fc.LinearElastic(E=500.0, nu=0.25)

@@ -13,7 +13,7 @@ from fastcontact.analysis import step_result
 from fastcontact.contact.integration import nodal_areas
 from fastcontact.mesh.generate import box, half_spheres, renamed, union
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 METHODS = {
     "node": {"formulation": "node_to_segment"},

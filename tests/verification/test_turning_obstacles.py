@@ -12,7 +12,7 @@ from fastcontact.contact.obstacles.rigid_side import RigidSide, Stance
 from fastcontact.contact.obstacles.rotation import Rotation
 from fastcontact.mesh.generate import block, box
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 FRICTION, RADIUS = 0.3, 10.0
 PRESS, PRESS_AND_TURN = [(0.0, 0.0), (1.0, 1.0), (9.0, 1.0)], [(0.0, 0.0), (1.0, 0.0), (9.0, 1.0)]

@@ -7,7 +7,7 @@ import fastcontact as fc
 from fastcontact.cases.case import read_case
 from fastcontact.mesh.generate import block, block_on_block, box, renamed, union
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 COEFFICIENT, FORCE = 2e-5, 40.0
 PRESS, SLIDE = [(0.0, 0.0), (1.0, 1.0), (100.0, 1.0)], [(0.0, 0.0), (1.0, 0.0), (100.0, 99.0)]

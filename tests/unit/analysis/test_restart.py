@@ -12,7 +12,7 @@ from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.state import State
 from fastcontact.mesh.generate import block, box, renamed, union
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 FRICTIONLESS, FRICTION = 1e-12, 1e-10
 UP_AND_DOWN = fc.Ramp((1.0, 2.0, 3.0, 4.0, 5.0), ((0.0, 0.0), (3.0, 1.0), (5.0, 0.3)))

@@ -15,7 +15,7 @@ from fastcontact.linear.protocol import FrictionTerms
 from fastcontact.linear.solvers.amg import Amg
 from fastcontact.linear.springs import Springs
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 # Of the diagonal of K, at its softest end and at its stiffest: the springs here are from 1e-6 to 1e8 times as stiff.
 SOFTNESS = {"soft": (1e2, 1e6), "stiff": (1e-8, 1e-2), "mixed": (1e-8, 1e6)}

@@ -22,7 +22,7 @@ from fastcontact.results.plot.patches import fill, outlines
 from fastcontact.results.plot.section import _cut_tetrahedra
 from fastcontact.results.step import StepResult
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 SOLIDS = sorted(name for name, kind in elements.ELEMENTS.items() if kind.dim == 3)
