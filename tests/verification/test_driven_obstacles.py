@@ -168,11 +168,6 @@ def test_forces_that_cannot_be_are_told(options, error, message):
         fc.solve(block_under_a_ball("plane_strain", **options), fc.linear_ramp(4))
 
 
-def test_in_axisymmetry_a_radial_force_is_refused():
-    with pytest.raises(fc.ModelError, match="cannot move obstacle 'ball' along x, the radius"):
-        block_under_a_ball("axisymmetric", force={"x": 1.0, "y": -9.0})
-
-
 CASE = """
 kinematics = "axisymmetric"
 [mesh]

@@ -89,13 +89,6 @@ def test_in_the_plane_the_force_is_that_of_the_continuous_form(element, kinemati
     assert force(formulation="mortar") == pytest.approx(force(formulation="continuous"), rel=2e-3)
 
 
-def test_standard_multipliers_in_the_plane_are_refused_at_an_obstacle():
-    model = fc.Model(fc.generate.block((1.0, 1.0), (1, 1), "quad4"), "plane_strain")
-    wall = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
-    with pytest.raises(fc.ContactError, match="mortar in the plane needs multipliers='dual' at an obstacle"):
-        model.add_obstacle("wall", secondary="BOTTOM", obstacle=wall, formulation="mortar", multipliers="standard")
-
-
 def test_a_turning_obstacle_drags_with_the_torque_of_full_friction():
     """A plane that turns under a square block; the error is that of the nodes' places, of second order."""
     mean_radius = (np.sqrt(2) + np.log(1 + np.sqrt(2))) / 3  # of a square of half-width 1

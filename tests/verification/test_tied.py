@@ -155,10 +155,3 @@ def moved(mesh, by):
 def test_what_contradicts_itself_is_refused(options, words):
     with pytest.raises(fc.ContactError, match=words):
         touching(held(blocks()), "mortar", **options)
-
-
-def test_an_obstacle_cannot_be_tied():
-    model = fc.Model(fc.generate.block((1.0, 1.0), (2, 2), "quad4"), "plane_strain")
-    floor = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
-    with pytest.raises(fc.ContactError, match="'floor' cannot be tied to a rigid obstacle: prescribe"):
-        model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor, kind="tied")

@@ -135,12 +135,6 @@ def test_a_closed_crack_carries_uniform_stress_up_to_the_node_that_its_faces_sha
     balanced(model, step)
 
 
-def test_shared_nodes_that_are_not_excluded_are_refused():
-    model = fc.Model(cracked(), "plane_strain")
-    with pytest.raises(fc.ContactError, match=r"share 1 nodes .* name the nodes .* `excluded`"):
-        touching(model, "node_to_segment")
-
-
 # Forces on both sides
 
 

@@ -306,13 +306,6 @@ def test_corner_volumes_are_those_of_the_cells_with_straight_edges(element):
 # Models --------------------------------------------------------------------------------------------------------------
 
 
-def test_kinematics_must_fit_the_dimension():
-    with pytest.raises(fc.ModelError, match=r"'plane_strain' do not fit a mesh in 3 dimensions: use '3d'"):
-        fc.Model(box(divisions=(1, 1, 1)), "plane_strain")
-    with pytest.raises(fc.ModelError, match=r"'3d' do not fit a mesh in 2 dimensions: use 'axisymmetric'"):
-        fc.Model(fc.generate.block(), "3d")
-
-
 def test_six_rigid_motions_are_counted_and_named():
     model = fc.Model(box(divisions=(1, 1, 1)), "3d")
     model.add_material(fc.LinearElastic(E, NU))

@@ -28,13 +28,6 @@ def test_constants_out_of_range(constants, message):
         fc.LinearElastic(**{"E": 1.0, "nu": 0.3, **constants})
 
 
-def test_an_unknown_group_offers_near_names(model):
-    with pytest.raises(fc.MeshError, match=r"'A1A3'.*'A1A2'"):
-        model.fix("A1A3", "x")
-    with pytest.raises(fc.MeshError, match=r"'SPHHAUT'.*'SPHHAU'"):
-        model.add_material(fc.LinearElastic(1.0, 0.3), ["SPHHAUT"])
-
-
 def test_groups_without_material_are_named(spheres):
     model = fc.Model(spheres, "axisymmetric")
     model.add_material(fc.LinearElastic(1.0, 0.3), ["SPHBAS"])
@@ -84,15 +77,3 @@ def test_wrong_contact_options(model, options, message):
     arguments = {"secondary": "CONT1", "primary": "CONT2", **options}
     with pytest.raises(fc.ContactError, match=message):
         model.add_contact("pair", **arguments)
-
-
-def test_a_second_pair_of_the_same_name_is_refused(model):
-    model.add_contact("pair", secondary="CONT1", primary="CONT2")
-    with pytest.raises(fc.ContactError, match=r"already"):
-        model.add_contact("pair", secondary="CONT2", primary="CONT1")
-
-
-@pytest.mark.parametrize("kinematics", ["axisymetric", "3d"])
-def test_wrong_kinematics(spheres, kinematics):
-    with pytest.raises(fc.ModelError):
-        fc.Model(spheres, kinematics)
