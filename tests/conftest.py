@@ -13,6 +13,7 @@ from hypothesis import settings
 from pairwise import mark_the_rest
 
 import fastcontact as fc
+from fastcontact._jit import ahead, cache, decorators
 from fastcontact.linear import choice as linear
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -36,8 +37,20 @@ def pytest_configure(config: pytest.Config) -> None:
     """Hear Ctrl-C, also where the tests run in background; under another linear solver results come whichever way."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+    if getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput"):
+        prepare_workers()
+    ahead.MOST = 0  # processes that compile ahead of a run would do so for each worker
     if config.getoption("--linear-solver"):
         config.addinivalue_line("filterwarnings", "ignore:multigrid gave up")
+
+
+def prepare_workers() -> None:
+    """Give each worker one processor, and in an empty cache compile the usual kernels once for all of them."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    folder = cache.folder_of("")
+    if decorators.compiled() and not any(folder.glob("*.nbc")):
+        for process in ahead.start((), decorators.threads()):
+            process.wait()
 
 
 @pytest.hookimpl(tryfirst=True)
