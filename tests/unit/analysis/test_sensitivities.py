@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 
@@ -183,8 +184,7 @@ def test_rigid_obstacles_that_are_moved_and_pushed(kinematics, formulation):
     centre = {"plane_strain": (4.3, 13.0), "axisymmetric": (0.0, 13.0), "3d": (3.3, 4.1, 13.0)}[kinematics]
 
     def make(pushed=False, E=1000.0, nu=0.3, motion=1.0, force=1.0):
-        model = fc.Model(mesh, kinematics=kinematics)
-        model.add_material(fc.LinearElastic(E=E, nu=nu))
+        model = elastic_model(mesh, kinematics, E=E, nu=nu)
         model.fix(bottom, "xyz"[:dim])
         driving = {"force": {up: -60.0 * force}} if pushed else {"motion": {up: -0.3 * motion}}
         ball = fc.obstacles.Sphere(centre=centre, R=8.0)
@@ -279,10 +279,7 @@ def test_pretension(given):
     mesh = fc.generate.cut(mesh, "CUT")
 
     def make(E=1000.0, pulled=1.0):
-        model = fc.Model(mesh, "plane_stress")
-        model.add_material(fc.LinearElastic(E=E, nu=0.3))
-        model.fix("BOTTOM", "xy")
-        model.fix("TOP", "xy")
+        model = elastic_model(mesh, "plane_stress", E=E, BOTTOM="xy", TOP="xy")
         model.add_pretension("bolt", "CUT", **{given: {"force": 3.0, "shortening": 0.01}[given] * pulled})
         return model
 
@@ -361,8 +358,7 @@ def test_a_constraint_about_to_change_is_named():
     mesh = fc.generate.block((4.0, 1.0), (4, 1))
 
     def model(depth):
-        made = fc.Model(mesh, kinematics="plane_strain")
-        made.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+        made = elastic_model(mesh, "plane_strain", nu=0.0)
         made.prescribe("TOP", x=0.0, y=lambda x: np.where(x[:, 0] < 3.5, -0.01, depth))
         plane = fc.obstacles.HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
         made.add_obstacle("plane", secondary="BOTTOM", obstacle=plane, formulation="node_to_segment")
@@ -412,8 +408,7 @@ def test_bolts_before_and_after_their_lock():
         "CUT", lambda x: np.abs(x[:, 1] - 1.0) < 1e-9, between=True
     )
     mesh = fc.generate.cut(mesh, "CUT")
-    model = fc.Model(mesh, "plane_stress")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    model = elastic_model(mesh, "plane_stress", nu=0.0)
     for end in ("BOTTOM", "TOP"):
         model.fix(end, "xy")
     model.add_pretension("bolt", "CUT", force=3.0, locked_from=1.0, ramp=[(0.0, 0.0), (1.0, 1.0), (2.0, 1.0)])
@@ -432,9 +427,7 @@ def test_quantities_that_cannot_be_told():
     with pytest.raises(fc.ModelError, match="reactions of a model with springs"):
         asked(springy, ("reaction", "UPPER_TOP", "y"))
     mesh = fc.generate.block((10.0, 5.0), (8, 4))
-    model = fc.Model(mesh, kinematics="axisymmetric")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("BOTTOM", "xy")
+    model = elastic_model(mesh, "axisymmetric", BOTTOM="xy")
     ball = fc.obstacles.Sphere(centre=(0.0, 13.0), R=8.0)
     model.add_obstacle("ball", secondary="TOP", obstacle=ball, motion={"y": -0.3}, formulation="node_to_segment")
     rim = int(mesh.points_of("TOP_RIGHT")[0])
@@ -449,8 +442,7 @@ def test_quantities_that_cannot_be_told():
 
 def test_nodes_of_two_pairs_are_named():
     mesh = fc.generate.block((10.0, 5.0), (8, 4))
-    model = fc.Model(mesh, kinematics="plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model = elastic_model(mesh, "plane_strain")
     model.prescribe("RIGHT", x=-0.05, y=0.0)
     for name, side, normal in (("floor", "BOTTOM", (0.0, 1.0)), ("wall", "LEFT", (1.0, 0.0))):
         plane = fc.obstacles.HalfSpace(point=(0.0, 0.0), normal=normal)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.analysis import restart
@@ -28,10 +29,7 @@ def spheres(material=ELASTIC, strain="small", **options):
 
 def lying_block(**options):
     """Return a block that a pressure presses on another one, held by contact alone along y."""
-    model = fc.Model(fc.generate.block_on_block("quad4"), kinematics="plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("LOWER_BOTTOM", "xy")
-    model.fix("UPPER_LEFT", "x")
+    model = elastic_model(fc.generate.block_on_block("quad4"), "plane_strain", LOWER_BOTTOM="xy", UPPER_LEFT="x")
     model.add_pressure("UPPER_TOP", 5.0)
     model.add_contact("seam", secondary="CONT_UPPER", primary="CONT_LOWER", **options)
     return model

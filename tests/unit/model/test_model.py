@@ -1,6 +1,7 @@
 """A model is checked whole before any numerics: one clear line each."""
 
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 
@@ -12,10 +13,7 @@ def spheres():
 
 @pytest.fixture
 def model(spheres):
-    model = fc.Model(spheres, "axisymmetric")
-    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
-    model.fix("A1A2", "x")
-    return model
+    return elastic_model(spheres, "axisymmetric", E=20_000.0, A1A2="x")
 
 
 @pytest.mark.parametrize(
@@ -49,11 +47,7 @@ def test_bodies_that_overlap_without_contact_are_refused(spheres):
     moved = spheres.points.copy()
     upper = spheres.points_of("SPHHAU")
     moved[upper, 1] -= 3.0
-    model = fc.Model(spheres.replace(points=moved), "axisymmetric")
-    model.add_material(fc.LinearElastic(1.0, 0.3))
-    model.fix("A1A2", "x")
-    model.fix("A1B1", "y")
-    model.fix("A2B2", "y")
+    model = elastic_model(spheres.replace(points=moved), "axisymmetric", E=1.0, A1A2="x", A1B1="y", A2B2="y")
     with pytest.raises(fc.ModelError, match=r"overlaps body .* by 2.99"):
         model.check()
     model.add_contact("pair", secondary="CONT1", primary="CONT2")
