@@ -48,7 +48,9 @@ def _run(tests: list[str], workers: int, data: Path, disable: str, *options: str
         "COVERAGE_FILE": f"{data}/.coverage",
     }
     command = ["-m", "coverage", "run", "-m", "pytest", "-n", str(workers), "-p", "no:cacheprovider", "--tb=short"]
-    return subprocess.run([sys.executable, *command, *options, *tests], cwd=ROOT, env={**os.environ, **environment}).returncode
+    return subprocess.run(
+        [sys.executable, *command, *options, *tests], cwd=ROOT, env={**os.environ, **environment}
+    ).returncode
 
 
 def _coverage(data: Path, *arguments: str) -> None:
