@@ -69,7 +69,7 @@ def test_the_press_fit_of_lame():
 
 
 def ball_on_plane(force: float, size: float) -> fc.Model:
-    mesh = fc.generate.half_spheres(size=10.0, contact_size=size)
+    mesh = fc.generate.half_spheres(size=8.0, contact_size=size)
     model = fc.Model(mesh, kinematics="axisymmetric")
     model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3), "SPHHAU")
     model.add_material(fc.LinearElastic(E=30_000.0, nu=0.2), "SPHBAS")
