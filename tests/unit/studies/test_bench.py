@@ -131,7 +131,6 @@ def test_contact_in_detail(problem, tmp_path):
     assert set(found["from_assembly"]) == {"linear_cpu_s", "cold_step_cpu_s", "ratio_to_linear"}
     assert set(found["twenty_steps"]) == {"cpu_s", "ratio_to_linear", "setups", "linear_iterations"}
     assert 750 < found["n_dofs"] < 4000
-    assert found["linear"]["setup_cpu_s"] < found["linear"]["cpu_s"]
     assert found["twenty_steps"]["linear_iterations"] > found["linear"]["iterations"]
 
 

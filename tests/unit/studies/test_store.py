@@ -14,7 +14,7 @@ import pytest
 def test_a_killed_sweep_redoes_no_finished_run(root, tmp_path):
     store, target = tmp_path / "store", tmp_path / "sweep.json"
     command = [sys.executable, "-m", "fastcontact", "sweep", str(root / "data/cases/forma04c.toml")]
-    command += ["--set", "approach=0.1:4:12", "--level", "1", "--workers", "2", "--store", str(store), "-q"]
+    command += ["--set", "approach=0.1:4:12", "--level", "0", "--workers", "2", "--store", str(store), "-q"]
     command += ["--json", str(target)]
     first = subprocess.Popen(command, start_new_session=True)
     deadline = time.monotonic() + 120
