@@ -288,7 +288,7 @@ def test_no_traceback_is_printed(command, when, tmp_path):
     )
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [pytest.param(signal.SIGINT, marks=pytest.mark.slow), signal.SIGTERM])
 def test_no_half_written_file_stays(number, solved_case, tmp_path):
     """Two signals come while a picture is written to a file that is to take the place of another."""
     (tmp_path / "out.png").write_bytes(b"before")
