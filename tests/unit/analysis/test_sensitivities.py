@@ -83,6 +83,7 @@ MOVED: Changes = {"E": STEEL["E"], "moved": (("prescribed", "UPPER_TOP", "y"), 1
 CLEAR = (("clearance", "c"), 0.0, 1e-5)
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("element", ["quad4", "tri6"])
 @pytest.mark.parametrize("formulation", ["node_to_segment", "continuous", "mortar"])
 def test_every_formulation_between_bodies(formulation, element):
@@ -175,6 +176,7 @@ def test_pairing_that_is_kept_takes_one_solution():
     assert abs(found.derivatives[by] / moving.derivatives[by] - 1.0) > 1e-3  # what the moving geometry makes
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
 @pytest.mark.parametrize("kinematics", ["plane_strain", "axisymmetric", "3d"])
 def test_rigid_obstacles_that_are_moved_and_pushed(kinematics, formulation):
