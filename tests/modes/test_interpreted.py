@@ -9,9 +9,12 @@ from starting import finished, start
 CLOSE = {"plane": 1e-11, "friction": 1e-11, "small": 1e-9}
 
 
+@pytest.fixture(scope="module")
+def compiled():
+    return json.loads(finished(start("whole_runs.py", *CLOSE, NUMBA_DISABLE_JIT="0"))[0])
+
+
 @pytest.mark.parametrize("run", CLOSE)
-def test_interpreted_kernels_find_the_numbers_of_compiled_ones(run):
-    compiled, interpreted = (
-        json.loads(finished(start("whole_runs.py", run, NUMBA_DISABLE_JIT=off))[0])[run]["sizes"] for off in "01"
-    )
-    assert interpreted == pytest.approx(compiled, rel=CLOSE[run], abs=0.0)
+def test_interpreted_kernels_find_the_numbers_of_compiled_ones(run, compiled):
+    interpreted = json.loads(finished(start("whole_runs.py", run, NUMBA_DISABLE_JIT="1"))[0])
+    assert interpreted[run]["sizes"] == pytest.approx(compiled[run]["sizes"], rel=CLOSE[run], abs=0.0)
