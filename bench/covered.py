@@ -32,12 +32,13 @@ def measure(tests: dict[str, list[str]], workers: int, data: Path) -> int:
     data.mkdir(parents=True, exist_ok=True)
     for old in data.glob(".coverage*"):
         old.unlink()
-    code = max(_run(tests["compiled"], workers, data, "0"), _run(tests["interpreted"], workers, data, "1"))
+    codes = [_run(tests["compiled"], workers, data, "0"), _run(tests["slow"], workers, data, "0", "-m", "slow")]
+    codes.append(_run(tests["interpreted"], workers, data, "1"))
     _coverage(data, "combine", "-q")
-    return code
+    return max(codes)
 
 
-def _run(tests: list[str], workers: int, data: Path, disable: str) -> int:
+def _run(tests: list[str], workers: int, data: Path, disable: str, *options: str) -> int:
     """Run tests under coverage, with `disable` for NUMBA_DISABLE_JIT; return the exit code of pytest."""
     environment = {
         "NUMBA_DISABLE_JIT": disable,
@@ -47,7 +48,9 @@ def _run(tests: list[str], workers: int, data: Path, disable: str) -> int:
         "COVERAGE_FILE": f"{data}/.coverage",
     }
     command = ["-m", "coverage", "run", "-m", "pytest", "-n", str(workers), "-p", "no:cacheprovider", "--tb=short"]
-    return subprocess.run([sys.executable, *command, *tests], cwd=ROOT, env={**os.environ, **environment}).returncode
+    return subprocess.run(
+        [sys.executable, *command, *options, *tests], cwd=ROOT, env={**os.environ, **environment}
+    ).returncode
 
 
 def _coverage(data: Path, *arguments: str) -> None:

@@ -13,13 +13,14 @@ from hypothesis import settings
 from pairwise import mark_the_rest
 
 import fastcontact as fc
+from fastcontact._jit import ahead, cache, decorators
 from fastcontact.linear import choice as linear
 
 ROOT = Path(__file__).resolve().parent.parent
 SHARED = ROOT.parent / "shared"
 
 # The same examples in every run, so that no change fails by chance; `--hypothesis-profile=long` looks further.
-settings.register_profile("fixed", derandomize=True, deadline=None)
+settings.register_profile("fixed", max_examples=40, derandomize=True, deadline=None)
 settings.register_profile("long", max_examples=2000, deadline=None)
 settings.load_profile("fixed")
 
@@ -36,8 +37,20 @@ def pytest_configure(config: pytest.Config) -> None:
     """Hear Ctrl-C, also where the tests run in background; under another linear solver results come whichever way."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+    if getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput"):
+        prepare_workers(whole=config.args_source is pytest.Config.ArgsSource.TESTPATHS)
+    ahead.MOST = 0  # processes that compile ahead of a run would do so for each worker
     if config.getoption("--linear-solver"):
         config.addinivalue_line("filterwarnings", "ignore:multigrid gave up")
+
+
+def prepare_workers(whole: bool) -> None:
+    """Give each worker one processor; where all tests run on an empty cache, compile the usual kernels once for them."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    folder = cache.folder_of("")
+    if whole and decorators.compiled() and not any(folder.glob("*.nbc")):
+        for process in ahead.start((), decorators.threads()):
+            process.wait()
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -74,6 +87,14 @@ def linear_solver(request: pytest.FixtureRequest):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(linear, "make", given)
         yield
+
+
+@pytest.fixture
+def meshio_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let meshio read in this process; starting one of its own for each file is tested in `test_hostile_files`."""
+    from fastcontact.mesh.files import meshio_files, meshio_process
+
+    monkeypatch.setattr(meshio_files, "read_in_process", meshio_process.plain_content)
 
 
 @pytest.fixture(scope="session")

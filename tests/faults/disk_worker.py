@@ -8,8 +8,10 @@ The children come from a parent that has run no kernel, since threads do not sur
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import errno
+import importlib
 import json
 import os
 import shutil
@@ -17,6 +19,19 @@ import sys
 from pathlib import Path
 
 from fastcontact.cli import main
+
+# Children have what all commands import; none of it runs a kernel.
+for needed in (
+    "analysis.run",
+    "cases.case",
+    "results.reader",
+    "results.writer",
+    "mesh.files.mesh_files",
+    "mesh.generate",
+):
+    importlib.import_module(f"fastcontact.{needed}")
+with contextlib.suppress(ImportError):
+    importlib.import_module("matplotlib.pyplot")
 
 DISK = ctypes.CDLL(None)
 ERRORS = (errno.EIO, errno.ENOSPC)

@@ -40,9 +40,18 @@ def source(solved_case: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("count", [3, pytest.param(0, marks=pytest.mark.slow)], ids=["few", "every"])
-@pytest.mark.parametrize("command", COMMANDS, ids=lambda command: "-".join(command[:1] + command[-2:]))
-def test_a_disk_that_fails_ends_a_command_with_one_line(command, count, library, source, tmp_path):
-    faults = disk_faults.found(library, tmp_path, source, [command], count)
-    assert len(faults) > 2
+def check(library: Path, source: Path, folder: Path, commands: list[list[str]], count: int) -> None:
+    faults = disk_faults.found(library, folder, source, commands, count)
+    assert len(faults) > 2 * len(commands)
     assert [text for fault in faults for text in disk_faults.complaints(fault)] == []
+
+
+def test_a_disk_that_fails_ends_a_command_with_one_line(library, source, tmp_path):
+    """The first, a middle and the last call of each command, in children of one process."""
+    check(library, source, tmp_path, COMMANDS, 3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda command: "-".join(command[:1] + command[-2:]))
+def test_every_call_that_fails_ends_a_command_with_one_line(command, library, source, tmp_path):
+    check(library, source, tmp_path, [command], 0)

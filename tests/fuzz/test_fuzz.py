@@ -18,7 +18,7 @@ def prepared(tmp_path_factory):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of memory and time as Linux knows them")
-@pytest.mark.parametrize("count", [120, pytest.param(1000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [60, pytest.param(1000, marks=pytest.mark.slow)])
 def test_damaged_files_are_read_or_refused_and_nothing_else(prepared, count):
     found = fuzz_run.run(list(range(count)), 1, prepared)
     assert not found.failures, found.table()
@@ -65,8 +65,12 @@ def test_memory_that_is_wanted_behind_a_clear_error_is_seen(monkeypatch, tmp_pat
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of memory and time as Linux knows them")
 @pytest.mark.parametrize(
     ("code", "kind"),
-    [("import os; os.abort()", "crash"), ("while True: pass", "hang"), ("bytearray(1 << 31)", "memory"),
-     ("open('/etc/hostname').close()", "outside"), ("path.parent.joinpath('mine').touch()", "read")],
+    [
+        ("import os; os.abort()", "crash"), ("while True: pass", "hang"),
+        pytest.param("bytearray(1 << 31)", "memory", marks=pytest.mark.slow),
+        pytest.param("open('/etc/hostname').close()", "outside", marks=pytest.mark.slow),
+        pytest.param("path.parent.joinpath('mine').touch()", "read", marks=pytest.mark.slow),
+    ],
 )  # fmt: skip
 def test_the_fuzzer_survives_and_tells_what_a_reader_does(monkeypatch, tmp_path, prepared, code, kind):
     """A reader that does `code`, which a module in front of the true one brings into the worker."""

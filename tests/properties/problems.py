@@ -25,7 +25,7 @@ E = 1000.0  # of the upper body
 
 
 def examples(count: int) -> settings:
-    """Return settings for `count` examples; a longer profile multiplies them (``--hypothesis-profile=long``)."""
+    """Return settings for `count` examples where a profile asks for 100; see ``conftest.py`` and ``--hypothesis-profile``."""
     return settings(max_examples=max(1, count * settings.default.max_examples // 100), deadline=None)
 
 

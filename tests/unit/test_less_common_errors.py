@@ -10,6 +10,7 @@ import h5py
 import meshio
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.analytic.pressure_curve import pressure_curve
@@ -26,9 +27,7 @@ GROUP = SQUARE.group_names[0]
 
 
 def model(mesh=SQUARE):
-    found = fc.Model(mesh, "plane_strain")
-    found.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    return found
+    return elastic_model(mesh, "plane_strain")
 
 
 def test_the_curve_of_a_pin_is_its_pressure_over_the_arc():
@@ -252,9 +251,7 @@ def test_iterations_that_do_not_get_there_name_other_solvers(monkeypatch):
     from fastcontact.linear.solvers import pyamg
 
     monkeypatch.setattr(pyamg, "MAX_ITERATIONS", 1)
-    found = fc.Model(fc.generate.block(divisions=(8, 8)), "plane_strain")
-    found.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    found.fix("BOTTOM", "xy")
+    found = elastic_model(fc.generate.block(divisions=(8, 8)), "plane_strain", BOTTOM="xy")
     found.prescribe("TOP", y=-0.01, x=0.02)
     with pytest.raises(fc.ConvergenceError, match=r"do not reach .*: use amg or direct"):
         fc.solve(found, 1, linear_solver="pyamg")
@@ -368,9 +365,7 @@ def test_stresses_along_the_normal_of_a_contact_in_the_plane():
     """Without an axis of symmetry the line begins at the largest pressure, along the normal there."""
     pytest.importorskip("matplotlib")
     mesh = fc.generate.block(divisions=(6, 6))
-    found = fc.Model(mesh, "plane_strain")
-    found.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    found.fix("BOTTOM", "xy")
+    found = elastic_model(mesh, "plane_strain", BOTTOM="xy")
     top = mesh.points[:, 1].max()
     ball = fc.obstacles.Sphere((0.4, top + 5.0), 5.0)
     found.add_obstacle("ball", secondary="TOP", obstacle=ball, motion={"y": -0.01})

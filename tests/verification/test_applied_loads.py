@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 PLANE = ("tri3", "tri6", "quad4", "quad8", "quad9")
 SOLID = ("tet4", "tet10", "hex8", "hex20", "hex27", "wedge6", "wedge15", "pyramid5", "pyramid13")
@@ -13,9 +14,7 @@ E, NU = 1000.0, 0.3
 
 
 def model_on(mesh, kinematics):
-    model = fc.Model(mesh, kinematics)
-    model.add_material(fc.LinearElastic(E, NU))
-    return model
+    return elastic_model(mesh, kinematics, E=E, nu=NU)
 
 
 def one_step(model, **options):
@@ -107,8 +106,7 @@ def test_a_column_under_its_weight(element):
     else:
         mesh, axis = fc.generate.box((1.0, 1.0, 4.0), (1, 1, 3), element), 2
         sides, kinematics = {"bottom": "ZMIN", "left": "XMIN"}, "3d"
-    model = fc.Model(mesh, kinematics)
-    model.add_material(fc.LinearElastic(E, 0.0))
+    model = elastic_model(mesh, kinematics, E=E, nu=0.0)
     model.fix(sides["bottom"], "xyz"[axis])
     model.fix(sides["left"], "x")
     if axis == 2:
@@ -234,9 +232,7 @@ def driven_by_force(mesh, formulation, force, gap=0.0, **load):
     points = mesh.points.copy()
     if gap:
         points[mesh.points_of("SPHHAU"), 1] += gap
-    model = fc.Model(mesh.replace(points=points), "axisymmetric")
-    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
-    model.fix("A1A2", "x")
+    model = elastic_model(mesh.replace(points=points), "axisymmetric", E=20_000.0, A1A2="x")
     model.prescribe("A1B1", y=2.0)
     model.couple("A2B2", "y")
     model.add_force("A2B2", y=-force, **load)
@@ -426,10 +422,7 @@ def test_units_do_not_matter_for_floating_bodies(length, pressure, request):
     mesh = fc.generate.half_spheres("tri3", size=5.0)
     results = []
     for a, p in ((1.0, 1.0), (length, pressure)):
-        model = fc.Model(mesh.replace(points=mesh.points * a), "axisymmetric")
-        model.add_material(fc.LinearElastic(E=20_000.0 * p, nu=0.3))
-        model.fix("A1A2", "x")
-        model.fix("A1B1", "y")
+        model = elastic_model(mesh.replace(points=mesh.points * a), "axisymmetric", E=20_000.0 * p, A1A2="x", A1B1="y")
         model.add_pressure("A2B2", 50.0 * p)
         model.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation="continuous")
         results.append(one_step(model))

@@ -205,7 +205,8 @@ def test_a_sector_whose_ends_have_other_meshes(element, differ, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("law", "element", "force", "shape"), [("HARD", "quad4", 3e-3, 1e-2), ("LINEAR", "quad8", 1e-3, 4e-3)]
+    ("law", "element", "force", "shape"),
+    [("HARD", "quad4", 3e-3, 1e-2), pytest.param("LINEAR", "quad8", 1e-3, 4e-3, marks=pytest.mark.slow)],
 )
 def test_a_cylinder_pressed_on_a_block(law, element, force, shape, tmp_path):
     """The half-width of the contact is five edges: displacements differ most at the edge of the contact, by 0.7 % and 0.3 %.

@@ -2,9 +2,12 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 from two_bodies import blocks, boxes, held, touching
 
 import fastcontact as fc
+
+pytestmark = pytest.mark.each_value
 
 FORMULATIONS = ("node_to_segment", "continuous", "mortar")
 MODULUS = {"plane_strain": 1000.0 / 0.91, "axisymmetric": 1000.0, "3d": 1000.0}
@@ -31,9 +34,7 @@ def test_a_uniform_tension_passes(formulation, kinematics, swap):
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_a_bilateral_pair_slides_without_resistance(formulation):
-    model = fc.Model(blocks(upper=(4, 2)), "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("LOWER_BOTTOM", "xy")
+    model = elastic_model(blocks(upper=(4, 2)), "plane_strain", LOWER_BOTTOM="xy")
     model.prescribe("UPPER_TOP", x=0.5, y=0.0)
     touching(model, formulation, kind="bilateral", projection_tolerance=0.5)
     last = fc.solve(model, fc.linear_ramp(1))[-1]
@@ -80,9 +81,7 @@ def test_once_closed_leaves_the_rest_free(formulation, forma04):
 
 @pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
 def test_an_obstacle_may_be_a_guide(formulation):
-    model = fc.Model(fc.generate.block((10.0, 5.0), (4, 2), "quad4"), "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("LEFT", "x")
+    model = elastic_model(fc.generate.block((10.0, 5.0), (4, 2), "quad4"), "plane_strain", LEFT="x")
     model.prescribe("TOP", y=0.01)
     floor = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
     model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor, formulation=formulation, kind="bilateral")
@@ -93,8 +92,7 @@ def test_an_obstacle_may_be_a_guide(formulation):
 
 def test_a_body_may_hang_on_a_bilateral_pair():
     """Nothing but the contact holds the upper block up."""
-    model = fc.Model(blocks(upper=(4, 3)), "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model = elastic_model(blocks(upper=(4, 3)), "plane_strain")
     for side in ("LOWER", "UPPER"):
         model.fix(f"{side}_LEFT", "x")
     model.fix("LOWER_BOTTOM", "y")

@@ -9,6 +9,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.mesh.generate import merge_points, mirrored, renamed, sphere_octant, union
@@ -37,11 +38,7 @@ def half_spheres():
 
 
 def held(mesh):
-    model = fc.Model(mesh, "3d")
-    model.add_material(fc.LinearElastic(E=E, nu=0.0))
-    model.fix("SYMMETRY_Z", "z")
-    model.fix("FAR_LOWER", "xyz")
-    return model
+    return elastic_model(mesh, "3d", E=E, nu=0.0, SYMMETRY_Z="z", FAR_LOWER="xyz")
 
 
 @cache

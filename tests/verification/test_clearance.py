@@ -6,6 +6,8 @@ from two_bodies import blocks, boxes, held, touching
 
 import fastcontact as fc
 
+pytestmark = pytest.mark.each_value
+
 FORMULATIONS = ("node_to_segment", "continuous", "mortar")
 LAST = fc.linear_ramp(1)
 

@@ -2,8 +2,11 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
+
+pytestmark = pytest.mark.each_value
 
 FORMULATIONS = (
     {},
@@ -26,8 +29,7 @@ def glued(element="quad4", motion=None, E=E, **options):
         lower = make((4.0, 1.0), (6, 1), element, (-1.0, 0.0), name="A")
     bodies = (lower, make(size, divisions, element, (*origin, 1.0), name="B"))
     mesh = fc.generate.union(*(fc.generate.renamed(b, lambda g, n=n: f"{n} {g}") for b, n in zip(bodies, "AB")))
-    model = fc.Model(mesh, "3d" if element == "hex8" else "plane_strain")
-    model.add_material(fc.LinearElastic(E=E, nu=0.0))
+    model = elastic_model(mesh, "3d" if element == "hex8" else "plane_strain", E=E, nu=0.0)
     model.fix(f"A {bottom}", axes)
     model.prescribe(f"B {top}", **{**dict.fromkeys(axes, 0.0), **(motion or {axes[-1]: 1.0})})
     law = {"strength": STRENGTH, "energy": ENERGY, "stiffness": STIFFNESS, **options.pop("law", {})}
@@ -100,8 +102,7 @@ def test_a_double_cantilever_beam_follows_beam_theory(options):
     beams = [fc.generate.block((70.0, h), (n, 1), "quad8", (0.0, y), name=k) for k, y in (("UP", 0.0), ("LOW", -h))]
     mesh = fc.generate.union(*(fc.generate.renamed(b, lambda g, k=k: f"{k} {g}") for b, k in zip(beams, ("UP", "LOW"))))
     mesh = mesh.with_facet_group("GLUE", lambda x: (np.abs(x[:, 1]) < 1e-9) & (x[:, 0] > a - 1e-9), of="UP UP")
-    model = fc.Model(mesh, "plane_stress")
-    model.add_material(fc.LinearElastic(E=E, nu=0.0))
+    model = elastic_model(mesh, "plane_stress", E=E, nu=0.0)
     model.prescribe("UP TOP_LEFT", y=2.0)
     model.prescribe("LOW BOTTOM_LEFT", y=-2.0)
     for corner in ("UP BOTTOM_RIGHT", "LOW TOP_RIGHT"):
@@ -140,9 +141,7 @@ def test_a_ball_is_pulled_off_with_the_force_of_johnson_kendall_and_roberts(form
     w = 8.0 * a**3 / (9.0 * np.pi)
     strength = 3.0 / (4.5 * R / (np.pi * w)) ** (1.0 / 3.0)
     mesh = fc.generate.graded_block("quad4", width=1.0, contact_radius=0.08, contact_size=1e-3)
-    model = fc.Model(mesh, "axisymmetric")
-    model.add_material(fc.LinearElastic(E=1.0, nu=0.0))
-    model.fix("BOTTOM", "xy")
+    model = elastic_model(mesh, "axisymmetric", E=1.0, nu=0.0, BOTTOM="xy")
     model.add_obstacle(
         "ball", secondary="TOP", obstacle=fc.obstacles.Sphere((0.0, R), R), motion={"y": a**2},
         adhesion={"work": w, "strength": strength}, formulation=formulation,

@@ -4,12 +4,13 @@ from functools import cache
 
 import numpy as np
 import pytest
+from models import elastic_model
 from scipy.spatial.transform import Rotation
 
 import fastcontact as fc
 from fastcontact.mesh.generate import box, merge_points, renamed, sphere_octant, sphere_on_block, union
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 LINEAR = ("hex8", "tet4", "wedge6", "pyramid5")
 QUADRATIC = ("hex20", "hex27", "tet10", "wedge15", "wedge18", "pyramid13")
@@ -35,8 +36,7 @@ def two_cubes(lower, upper, divisions=((2, 3, 2), (2, 3, 2))):
 
 
 def pressed(mesh, formulation, swap=False, push=0.01, **options):
-    model = fc.Model(mesh, "3d")
-    model.add_material(fc.LinearElastic(E=E, nu=NU))
+    model = elastic_model(mesh, "3d", E=E, nu=NU)
     for name in ("LOWER", "UPPER"):
         model.fix(f"{name}_XMIN", "x")
         model.fix(f"{name}_YMIN", "y")
@@ -107,10 +107,7 @@ def test_bodies_apart_stay_open_and_carry_nothing():
 
 
 def sphere_model(mesh, formulation, swap=False, push=0.5, **options):
-    model = fc.Model(mesh, "3d")
-    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
-    model.fix("SYMMETRY_X", "x")
-    model.fix("SYMMETRY_Z", "z")
+    model = elastic_model(mesh, "3d", E=20_000.0, SYMMETRY_X="x", SYMMETRY_Z="z")
     model.prescribe("SPHERE_TOP", y=-push)
     sides = ("CONT_BLOCK", "CONT_SPHERE") if swap else ("CONT_SPHERE", "CONT_BLOCK")
     model.add_contact("hertz", secondary=sides[0], primary=sides[1], formulation=formulation, **options)
@@ -232,9 +229,7 @@ def test_forces_are_in_equilibrium(element, formulation):
 
 def turned(rotation, formulation, **options):
     mesh = sphere_on_block("hex8", size=25.0, contact_size=3.0, contact_radius=5.0, block_size=(30.0, 30.0))
-    model = fc.Model(mesh.replace(points=mesh.points @ rotation.T), "3d")
-    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
-    model.fix("BLOCK_BOTTOM", "xyz")
+    model = elastic_model(mesh.replace(points=mesh.points @ rotation.T), "3d", E=20_000.0, BLOCK_BOTTOM="xyz")
     model.prescribe("SPHERE_TOP", **dict(zip("xyz", rotation @ [0.1, -0.5, 0.05], strict=True)))
     model.add_contact("pair", secondary="CONT_SPHERE", primary="CONT_BLOCK", formulation=formulation, **options)
     return fc.solve(model, fc.linear_ramp(1), linear_solver="direct")[-1]

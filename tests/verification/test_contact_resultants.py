@@ -4,9 +4,12 @@ import json
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.cli._main import main
+
+pytestmark = pytest.mark.each_value
 
 E, HEIGHT = 1000.0, 2.0
 ELEMENTS = ("tri3", "quad4", "tri6", "quad8")
@@ -15,8 +18,7 @@ ELEMENTS = ("tri3", "quad4", "tri6", "quad8")
 def column(element="quad4", divisions=(4, 2), tilt=0.0, kinematics="plane_stress", **options):
     """Return a block of width 2 on a rigid plane; nu = 0, so that each column of it is a spring."""
     mesh = fc.generate.block((2.0, HEIGHT), divisions, element)
-    model = fc.Model(mesh, kinematics)
-    model.add_material(fc.LinearElastic(E=E, nu=0.0))
+    model = elastic_model(mesh, kinematics, E=E, nu=0.0)
     model.add_obstacle(
         "plane", secondary="BOTTOM", obstacle=fc.obstacles.HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0)),
         formulation="continuous", **options,
@@ -94,8 +96,7 @@ def test_a_punch_off_the_middle_has_a_moment():
 
 def test_in_space_the_moment_has_three_components():
     mesh = fc.generate.box((2.0, 2.0, 1.0), (4, 4, 2))
-    model = fc.Model(mesh, "3d")
-    model.add_material(fc.LinearElastic(E=E, nu=0.0))
+    model = elastic_model(mesh, "3d", E=E, nu=0.0)
     model.add_obstacle("plane", secondary="ZMIN", obstacle=fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
     corners = [int(np.flatnonzero((mesh.points == place).all(axis=1))[0]) for place in ([0, 0, 0], [2, 0, 0])]
     model.mesh = mesh.with_groups(points={"ONE": corners[:1], "BOTH": corners})
@@ -111,9 +112,7 @@ def test_in_space_the_moment_has_three_components():
 
 
 def test_the_area_of_hertz_lies_between_the_brackets_of_the_radius():
-    case = fc.Model(fc.generate.half_spheres(size=2.0), kinematics="axisymmetric")
-    case.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
-    case.fix("A1A2", "x")
+    case = elastic_model(fc.generate.half_spheres(size=2.0), "axisymmetric", E=20_000.0, A1A2="x")
     case.prescribe("A2B2", y=-2.0)
     case.prescribe("A1B1", y=2.0)
     case.add_contact("hertz", secondary="CONT1", primary="CONT2")
@@ -229,8 +228,7 @@ def test_what_is_refused(call, said):
 
 def sliding(cells):
     """Return the model of a block that a rigid floor presses while it slides."""
-    model = fc.Model(fc.generate.block((2.0, 1.0), (cells, 2)), "plane_strain")
-    model.add_material(fc.LinearElastic(E=1e3, nu=0.0))
+    model = elastic_model(fc.generate.block((2.0, 1.0), (cells, 2)), "plane_strain", nu=0.0)
     model.add_obstacle("floor", secondary="BOTTOM", obstacle=fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0)))
     model.prescribe("TOP", x=1.0, y=-0.01)
     return model

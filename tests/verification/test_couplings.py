@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.cases.case import build_case
@@ -76,8 +77,7 @@ def test_in_space_a_body_follows_the_reference_point(kind, element):
     """Prescribed motions and rotations of the reference point move a free body as a rigid one, without stress."""
     place, angles, shift = np.array([0.3, -1.0, 4.0]), np.array([1e-3, -2e-3, 3e-3]), np.array([0.1, 0.2, -0.3])
     mesh = fc.generate.with_reference_points(fc.generate.box((1.0, 2.0, 1.5), (2, 2, 2), element), {"REF": place})
-    model = fc.Model(mesh, "3d")
-    model.add_material(fc.LinearElastic(E=E, nu=0.3))
+    model = elastic_model(mesh, "3d", E=E)
     model.add_coupling("REF", "ZMAX", kind=kind)
     model.prescribe("REF", **dict(zip("xyz", shift, strict=True)))
     model.prescribe("REF rotation", **dict(zip("xyz", angles, strict=True)))
@@ -91,9 +91,7 @@ def test_in_space_a_body_follows_the_reference_point(kind, element):
 @pytest.mark.parametrize("kind", KINDS)
 def test_forces_and_moments_in_space_are_balanced_by_the_supports(kind):
     mesh = fc.generate.with_reference_points(fc.generate.box((1.0, 1.0, 2.0), (2, 2, 4)), {"REF": (0.2, 0.9, 2.5)})
-    model = fc.Model(mesh, "3d")
-    model.add_material(fc.LinearElastic(E=E, nu=0.3))
-    model.fix("ZMIN", "xyz")
+    model = elastic_model(mesh, "3d", E=E, ZMIN="xyz")
     model.add_coupling("REF", "ZMAX", kind=kind)
     force, moment = np.array([0.1, -0.2, 0.3]), np.array([0.05, 0.02, -0.07])
     model.add_force("REF", **dict(zip("xyz", force, strict=True)))
@@ -115,9 +113,7 @@ def test_components_of_a_rigid_coupling():
 @pytest.mark.parametrize("level", [0.4, 1.0, 3.0])
 def test_a_liquid_presses_by_its_depth(level):
     """The force on a wall of height 1 is weight * depth^2 / 2, less the part above the wall."""
-    model = fc.Model(fc.generate.block((1.0, 1.0), (4, 20), "quad8"), "plane_strain")
-    model.add_material(fc.LinearElastic(E=E, nu=0.0))
-    model.fix("RIGHT", "xy")
+    model = elastic_model(fc.generate.block((1.0, 1.0), (4, 20), "quad8"), "plane_strain", E=E, nu=0.0, RIGHT="xy")
     model.add_hydrostatic_pressure("LEFT", weight=2.0, level=level)
     (step,) = fc.solve(model, 1)
     exact = level**2 - max(level - 1.0, 0.0) ** 2
@@ -198,8 +194,7 @@ def test_nothing_turns_in_axisymmetry():
 @pytest.mark.parametrize("said", ["component", "normal", "axes"])
 def test_forces_of_supports_hold_neither_springs_nor_couplings(said):
     """A block on a support and a spring, its top coupled: the support carries what the spring does not."""
-    model = fc.Model(fc.generate.block((2.0, 1.0), (4, 2)), "plane_stress")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model = elastic_model(fc.generate.block((2.0, 1.0), (4, 2)), "plane_stress")
     if said == "normal":
         model.fix("BOTTOM", "normal")
     elif said == "axes":

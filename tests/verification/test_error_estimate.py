@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.mesh import elements
@@ -14,9 +15,7 @@ def pressed(kinematics, element, n):
     box = fc.analytic.hertz_box(kinematics=kinematics, radius=0.5123)
     mesh = fc.generate.block((1.0, 1.0), (n, n), element, origin=(0.0, -1.0))
     mesh = mesh.with_groups(points={"HELD": np.union1d(mesh.points_of("RIGHT"), mesh.points_of("BOTTOM"))})
-    model = fc.Model(mesh, kinematics)
-    model.add_material(fc.LinearElastic(E=box.E, nu=box.nu))
-    model.fix("LEFT", "x")
+    model = elastic_model(mesh, kinematics, E=box.E, nu=box.nu, LEFT="x")
     model.prescribe("HELD", x=lambda p: box.displacement(p)[:, 0], y=lambda p: box.displacement(p)[:, 1])
     model.add_obstacle("bowl", secondary="TOP", obstacle=box, formulation="continuous")
     return box, model, fc.solve(model, fc.linear_ramp(1), criteria=fc.Criteria(geometry_updates=0))[-1]
@@ -49,8 +48,7 @@ def test_a_uniform_stress_has_no_error_even_across_materials(element):
     mesh = fc.generate.block((1.0, 1.0), (4, 4), element)
     centres = mesh.points[mesh.solids[element]].mean(axis=1)
     right = mesh.offsets[element] + np.flatnonzero(centres[:, 0] > 0.5)
-    model = fc.Model(mesh.with_groups(cells={"RIGHT HALF": right}), "plane_stress")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    model = elastic_model(mesh.with_groups(cells={"RIGHT HALF": right}), "plane_stress", nu=0.0)
     model.add_material(fc.LinearElastic(E=5000.0, nu=0.0), "RIGHT HALF")
     model.fix("LEFT", "x")
     model.fix("BOTTOM", "y")
@@ -82,8 +80,7 @@ def test_stress_that_jumps_between_materials_is_not_an_error():
     mesh = fc.generate.block((1.0, 1.0), (4, 4), "quad4")
     centres = mesh.points[mesh.solids["quad4"]].mean(axis=1)
     right = mesh.offsets["quad4"] + np.flatnonzero(centres[:, 0] > 0.5)
-    model = fc.Model(mesh.with_groups(cells={"RIGHT HALF": right}), "plane_stress")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    model = elastic_model(mesh.with_groups(cells={"RIGHT HALF": right}), "plane_stress", nu=0.0)
     model.add_material(fc.LinearElastic(E=5000.0, nu=0.0), "RIGHT HALF")
     model.fix("BOTTOM", "y")
     model.fix("LEFT", "x")
@@ -97,8 +94,7 @@ def test_stress_that_jumps_between_materials_is_not_an_error():
 def test_a_block_in_space_pressed_on_a_plane_has_no_error_and_a_wrong_pressure_has(element, axis):
     """The contact term: a uniform pressure balances the stress of the cells under it, another one does not."""
     name, others = "XYZ"[axis], [k for k in range(3) if k != axis]
-    model = fc.Model(fc.generate.box((1.0, 1.0, 1.0), (2, 2, 2), element), "3d")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    model = elastic_model(fc.generate.box((1.0, 1.0, 1.0), (2, 2, 2), element), "3d", nu=0.0)
     for k in others:
         model.fix(f"{'XYZ'[k]}MIN", "xyz"[k])
     model.prescribe(f"{name}MAX", **{"xyz"[axis]: -0.01})

@@ -2,9 +2,12 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 from two_bodies import SIDES, blocks, boxes, held, touching
 
 import fastcontact as fc
+
+pytestmark = pytest.mark.each_value
 
 FORMULATIONS = ("node_to_segment", "continuous", "mortar")
 
@@ -95,8 +98,7 @@ def test_nodes_without_friction_slide_freely(formulation, space):
     mesh = with_group(mesh, SIDES[space][0], left_half)
     axis = "z" if space == "space" else "y"
     top, bottom = ("U_ZMAX", "L_ZMIN") if space == "space" else ("UPPER_TOP", "LOWER_BOTTOM")
-    model = fc.Model(mesh, "3d" if space == "space" else "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    model = elastic_model(mesh, "3d" if space == "space" else "plane_strain", nu=0.0)
     model.fix(bottom, "xy" if axis == "y" else "xyz")
     model.prescribe(top, **{"x": 0.1, axis: -0.02, **({"y": 0.0} if axis == "z" else {})})
     touching(model, formulation, friction=0.3, frictionless="OUT")
@@ -119,9 +121,7 @@ def test_nodes_without_friction_slide_freely(formulation, space):
 def test_friction_along_one_direction_alone(formulation, along, expected):
     """Sliding along the diagonal: what has no friction along x has mu N along y, as DIRE_EXCL_FROT of code_aster."""
     mesh = with_group(boxes(lower=(4, 2, 2), upper=(4, 2, 2)), "U_ZMIN", left_half)
-    model = fc.Model(mesh, "3d")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
-    model.fix("L_ZMIN", "xyz")
+    model = elastic_model(mesh, "3d", nu=0.0, L_ZMIN="xyz")
     options = {"friction": 0.3, "frictionless_along": along}
     if formulation == "obstacle":
         model.fix("U_ZMAX", "xyz")

@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 import fastcontact as fc
 from tests.verification.test_plasticity import bar
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 
 def isochoric(stretch: np.ndarray) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.mesh.generate import box, renamed, union
@@ -9,9 +10,7 @@ from fastcontact.mesh.generate import box, renamed, union
 
 def spheres(**options):
     mesh = fc.generate.half_spheres(element="quad8", segments=16)
-    model = fc.Model(mesh, "axisymmetric")
-    model.add_material(fc.LinearElastic(20_000.0, 0.3))
-    model.fix("A1A2", "x")
+    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x")
     model.prescribe("A2B2", y=-1.0)
     model.prescribe("A1B1", y=1.0)
     model.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation="node_to_segment", **options)
@@ -44,9 +43,7 @@ def pressed(element, cells, swapped, friction):
                 mesh.replace(points=points), {group: f"{name}_{group}" for group in mesh.group_names if group != name}
             )
         )
-    model = fc.Model(union(*parts), "3d")
-    model.add_material(fc.LinearElastic(1000.0, 0.3))
-    model.fix("LOW_ZMIN", "xyz")
+    model = elastic_model(union(*parts), "3d", LOW_ZMIN="xyz")
     model.prescribe("UP_ZMAX", x=0.0, y=0.0, z=-0.02)
     sides = ("LOW_ZMAX", "UP_ZMIN") if swapped else ("UP_ZMIN", "LOW_ZMAX")
     model.add_contact(

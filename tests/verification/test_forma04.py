@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.cases.case import read_case
@@ -62,9 +63,7 @@ def test_force_and_pressure_converge_with_the_mesh(forma04):
 def test_small_loads_approach_hertz(forma04):
     """At a tenth of the load the finite body matters less: 3.2 instead of 10.36 mm radius."""
     mesh = fc.generate.half_spheres("quad8", arc_sizes=(0.1, 2.0), segments=20)
-    model = fc.Model(mesh, "axisymmetric")
-    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
-    model.fix("A1A2", "x")
+    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x")
     model.prescribe("A2B2", y=-0.2)
     model.prescribe("A1B1", y=0.2)
     model.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation="continuous")
@@ -78,9 +77,7 @@ def test_swapping_the_sides_changes_no_more_than_the_mesh_error(root):
     mesh = fc.read_mesh(root / "data/meshes/forma04c.med")
     forces = []
     for secondary, primary in (("CONT1", "CONT2"), ("CONT2", "CONT1")):
-        model = fc.Model(mesh, "axisymmetric")
-        model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
-        model.fix("A1A2", "x")
+        model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x")
         model.prescribe("A2B2", y=-2.0)
         model.prescribe("A1B1", y=2.0)
         model.add_contact("hertz", secondary=secondary, primary=primary)
@@ -95,9 +92,7 @@ def test_units_do_not_matter(scale, forma04):
     mesh = fc.generate.half_spheres("tri3", size=5.0)
     results = []
     for a, p in ((1.0, 1.0), (length, pressure)):
-        model = fc.Model(mesh.replace(points=mesh.points * a), "axisymmetric")
-        model.add_material(fc.LinearElastic(E=20_000.0 * p, nu=0.3))
-        model.fix("A1A2", "x")
+        model = elastic_model(mesh.replace(points=mesh.points * a), "axisymmetric", E=20_000.0 * p, A1A2="x")
         model.prescribe("A2B2", y=-2.0 * a)
         model.prescribe("A1B1", y=2.0 * a)
         model.add_contact("hertz", secondary="CONT1", primary="CONT2")

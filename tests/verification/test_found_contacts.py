@@ -7,6 +7,8 @@ import fastcontact as fc
 from fastcontact.cases.case import build_case
 from fastcontact.cli import main
 
+pytestmark = pytest.mark.each_value
+
 block, box, union = fc.generate.block, fc.generate.box, fc.generate.union
 FLAT = ("tri3", "quad4", "tri6", "quad8", "quad9")
 SOLID = ("tet4", "hex8", "wedge6", "pyramid5", "tet10", "hex20", "hex27", "wedge15")

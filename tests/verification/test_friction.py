@@ -4,6 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 
@@ -13,9 +14,7 @@ FORMULATIONS = ("node_to_segment", "continuous", "mortar")
 def pressed_block(formulation, friction, push, steps=4, nu=0.0):
     """A block pressed on a wide one and pushed sideways by its rigid top."""
     mesh = fc.generate.block_on_block(divisions_lower=(6, 2), divisions_upper=(3, 3), element="quad4")
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=nu))
-    model.fix("LOWER_BOTTOM", "xy")
+    model = elastic_model(mesh, "plane_strain", nu=nu, LOWER_BOTTOM="xy")
     model.prescribe("UPPER_TOP", x=push, y=-1e-4)
     model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", formulation=formulation, friction=friction)
     return fc.solve(model, fc.linear_ramp(steps))
@@ -63,9 +62,7 @@ def test_multigrid_solves_friction_too():
     mesh = fc.generate.block_on_block(divisions_lower=(6, 2), divisions_upper=(3, 3), element="quad4")
     results = []
     for solver in ("direct", "amg"):
-        model = fc.Model(mesh, "plane_strain")
-        model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-        model.fix("LOWER_BOTTOM", "xy")
+        model = elastic_model(mesh, "plane_strain", LOWER_BOTTOM="xy")
         model.prescribe("UPPER_TOP", x=2e-5, y=-1e-4)
         model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", friction=0.3)
         results.append(fc.solve(model, fc.linear_ramp(2), linear_solver=solver, linear_tolerance=1e-12)[-1])
@@ -81,8 +78,7 @@ def pressed_and_drawn(friction=0.3, nu=0.49):
     """
     block = fc.generate.block((2.0, 1.0), (120, 48), "quad8", origin=(-1.0, -1.0))  # quad4 would lock
     graded = np.sign(block.points) * np.sinh(8.0 * np.abs(block.points)) / np.sinh(8.0) * 60.0
-    model = fc.Model(block.replace(points=graded), "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=nu))
+    model = elastic_model(block.replace(points=graded), "plane_strain", nu=nu)
     model.prescribe("BOTTOM", y=0.09, ramp=[(0, 0), (1, 1), (2, 1)])
     model.prescribe("BOTTOM", x=0.03, ramp=[(0, 0), (1, 0), (2, 1)])
     model.add_obstacle(

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 FORMULATIONS = {
     "default": {},
@@ -52,8 +53,7 @@ def test_a_block_held_or_drawn_by_its_sides_carries_all_friction(element, dim, f
     if dim == 3 and formulation in ("standard", "continuous"):
         pytest.skip("the same in the plane")
     bottom, top, left, right = sides(dim)
-    model = fc.Model(blocks(element, dim), "plane_strain" if dim == 2 else "3d")
-    model.add_material(fc.LinearElastic(E=1e3, nu=0.3))
+    model = elastic_model(blocks(element, dim), "plane_strain" if dim == 2 else "3d")
     model.add_pressure(f"B_{top}", 1.0, ramp=[(0, 0), (1, 1), (3, 1)])
     late = [(0, 0), (1, 0), (3, 1)]
     model.fix(f"A_{bottom}", "yz"[: dim - 1])
@@ -75,8 +75,7 @@ def test_a_block_held_or_drawn_by_its_sides_carries_all_friction(element, dim, f
 @pytest.mark.parametrize("group", ["LEFT", "BLOCK"])
 def test_a_block_driven_over_a_plane_carries_all_friction(formulation, said, group):
     mesh = fc.generate.block((6.0, 2.0), (6, 2), "quad4")
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(E=1e3, nu=0.3))
+    model = elastic_model(mesh, "plane_strain")
     model.add_pressure("TOP", 1.0, ramp=[(0, 0), (1, 1), (3, 1)])
     axes = {"axes": (1.0, 0.0)} if said == "axes" else {}
     model.prescribe("LEFT" if group == "LEFT" else mesh.group_names[0], x=0.1, ramp=[(0, 0), (1, 0), (3, 1)], **axes)
@@ -96,8 +95,7 @@ def test_bodies_pressed_uniformly_have_no_shear_in_planes_of_symmetry(said, seed
     for name, element, n, z in zip("LU", elements, (2, 3), (-0.5, 0.0), strict=True):
         parts.append(prefixed(fc.generate.box((1.0, 1.0, 0.5), (n, n, 1), element, origin=(0, 0, z), name=name), name))
     mesh, Q = fc.generate.union(*parts), turn(3, seed)
-    model = fc.Model(mesh.replace(points=mesh.points @ Q.T), "3d")
-    model.add_material(fc.LinearElastic(E=1e3, nu=0.3))
+    model = elastic_model(mesh.replace(points=mesh.points @ Q.T), "3d")
     for group, axis in (("L_ZMIN", 2), ("L_XMIN", 0), ("U_XMIN", 0), ("L_YMIN", 1), ("U_YMIN", 1)):
         if said == "fix":
             model.fix(group, "xyz"[axis])
@@ -115,8 +113,7 @@ def test_bodies_pressed_uniformly_have_no_shear_in_planes_of_symmetry(said, seed
 
 @pytest.mark.parametrize("azimuth", [0.0, np.pi / 8, 3 * np.pi / 4])
 def test_a_block_within_the_cone_is_held_whatever_the_direction_of_its_load(azimuth):
-    model = fc.Model(fc.generate.box((1.0, 1.0, 0.25), (3, 3, 1), "hex8"), "3d")
-    model.add_material(fc.LinearElastic(E=1e3, nu=0.3))
+    model = elastic_model(fc.generate.box((1.0, 1.0, 0.25), (3, 3, 1), "hex8"), "3d")
     along = 0.95 * 0.5 * np.array([np.cos(azimuth), np.sin(azimuth)])
     model.add_body_force(x=along[0], y=along[1], z=-1.0)
     floor = fc.obstacles.HalfSpace(point=(0.0, 0.0, 0.0), normal=(0.0, 0.0, 1.0))
@@ -126,8 +123,7 @@ def test_a_block_within_the_cone_is_held_whatever_the_direction_of_its_load(azim
 
 
 def test_a_push_beyond_friction_is_told_as_such():
-    model = fc.Model(fc.generate.box((1.0, 1.0, 1.0), (2, 2, 2), "hex8"), "3d")
-    model.add_material(fc.LinearElastic(E=1e3, nu=0.3))
+    model = elastic_model(fc.generate.box((1.0, 1.0, 1.0), (2, 2, 2), "hex8"), "3d")
     model.add_pressure("ZMAX", 1.0, ramp=[(0, 0), (1, 1), (2, 1)])
     model.add_traction("XMIN", x=0.5, ramp=[(0, 0), (1, 0), (2, 1)])
     floor = fc.obstacles.HalfSpace(point=(0.0, 0.0, 0.0), normal=(0.0, 0.0, 1.0))

@@ -9,8 +9,11 @@ import warnings
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
+
+pytestmark = pytest.mark.each_value
 
 MESHES = {"tri3": {"size": 6.0}, "tri6": {"size": 8.0}, "quad4": {"arc_sizes": (0.5, 4.0), "radial_sizes": (0.5, 4.0)}}
 FACETS = [("node_to_segment", {}), ("node_to_segment", {"normals": "averaged"})]
@@ -19,9 +22,7 @@ FIELDS = [("continuous", {}), ("mortar", {"multipliers": "standard"})]
 
 def spheres(element):
     mesh = fc.generate.half_spheres(element, **MESHES[element])
-    model = fc.Model(mesh, "axisymmetric")
-    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
-    model.fix("A1A2", "x")
+    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x")
     model.prescribe("A2B2", y=-2.0)
     model.prescribe("A1B1", y=2.0)
     return model
@@ -98,8 +99,7 @@ def test_mirrored_bodies_in_space_stay_mirrored(formulation, exact):
     upper = fc.generate.renamed(body, {name: f"U_{name}" for name in body.group_names})
     names = {name: name.replace("U_", "L_") for name in upper.group_names}
     mesh = fc.generate.union(upper, fc.generate.mirrored(upper, "y", at=body.points[:, 1].min(), rename=names))
-    model = fc.Model(mesh, "3d")
-    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+    model = elastic_model(mesh, "3d", E=20_000.0)
     for side, approach in (("U", -1.0), ("L", 1.0)):
         model.fix(f"{side}_SYMMETRY_X", "x")
         model.fix(f"{side}_SYMMETRY_Z", "z")

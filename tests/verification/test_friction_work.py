@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 from stepping import Stepping
 
 import fastcontact as fc
 from fastcontact.mesh.generate import box, renamed, union
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 E, FRICTION, PRESSURE, SLIP = 1e5, 0.3, 1.0, 0.1
 
@@ -33,8 +34,7 @@ def pushed_block(dim, formulation, ratio):
     """Press a block on a rigid base, then push it with `ratio` of its limit against weak springs; return the steps."""
     mesh = blocks(dim)
     up, contact = "xyz"[dim - 1], ("CONT_UPPER", "CONT_LOWER") if dim == 2 else ("UPPER_BOTTOM", "LOWER_TOP")
-    model = fc.Model(mesh, "plane_strain" if dim == 2 else "3d")
-    model.add_material(fc.LinearElastic(E=E, nu=0.0))
+    model = elastic_model(mesh, "plane_strain" if dim == 2 else "3d", E=E, nu=0.0)
     model.fix("LOWER", "xyz"[:dim])
     top = mesh.points_of("UPPER_TOP")
     if dim == 3:
@@ -91,8 +91,7 @@ def test_a_load_that_turns_round_leaves_work_in_elasticity_and_friction_only(for
     # that the work of the supports is that of the mean force exactly.
     mesh = fc.generate.block((2.0, 1.0), (3, 2))
     rows = {f"row {k}": np.flatnonzero(np.isclose(mesh.points[:, 1], 0.5 * k)) for k in range(2)}
-    model = fc.Model(mesh.with_groups(points=rows), "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    model = elastic_model(mesh.with_groups(points=rows), "plane_strain", nu=0.0)
     for row in rows:
         model.couple(row, "xy")
     path = [0.0, 0.6, 1.0, -0.2, -1.0, 0.2, 1.0]
@@ -127,8 +126,7 @@ def test_a_load_that_turns_round_leaves_work_in_elasticity_and_friction_only(for
 def test_every_step_balances_its_energy_in_partial_slip(dim):
     # By the mean of the forces at both ends of each step, work is energy and friction.
     mesh = blocks(dim)
-    model = fc.Model(mesh, "plane_strain" if dim == 2 else "3d")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model = elastic_model(mesh, "plane_strain" if dim == 2 else "3d")
     axes = "xyz"[:dim]
     model.fix("LOWER_BOTTOM" if dim == 2 else "LOWER_ZMIN", axes)
     up = {axes[-1]: -2e-3}
@@ -181,8 +179,7 @@ def test_works_add_up_however_few_the_steps(formulation, penalty):
 @pytest.mark.parametrize("count", [1, 16])
 def test_works_that_do_not_add_up_are_told(count):
     """A block on springs is drawn up a drum: in one step the normal turns by half a radian under its force."""
-    model = fc.Model(fc.generate.block((0.2, 0.2), (2, 2), origin=(-0.1, 0.0)), "plane_strain")
-    model.add_material(fc.LinearElastic(E=1e4, nu=0.0))
+    model = elastic_model(fc.generate.block((0.2, 0.2), (2, 2), origin=(-0.1, 0.0)), "plane_strain", E=1e4, nu=0.0)
     model.add_spring("TOP", y=100.0)
     model.prescribe("TOP", x=-2.0, ramp=[(0.0, 0.0), (1.0, 0.0), (2.0, 1.0)])
     drum = fc.obstacles.Sphere((0.0, -4.0), 4.0)

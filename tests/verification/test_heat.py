@@ -7,6 +7,8 @@ from scipy.optimize import brentq
 import fastcontact as fc
 from fastcontact.elasticity.loads import cell_points
 
+pytestmark = pytest.mark.each_value
+
 BARS = {"size_lower": (0.05, 0.1), "size_upper": (0.05, 0.1), "divisions_lower": (3, 4), "divisions_upper": (4, 3)}
 REST = "ignore:contact 'c' never closed"
 

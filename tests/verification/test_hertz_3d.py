@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 
@@ -47,10 +48,7 @@ def ellipsoid_on_plane(element, formulation, size, stretch=1.0, growth=0.4, far=
         element, R=1.0, contact_size=0.1 * size, contact_radius=0.13, growth=growth, size=far
     )
     mesh = sphere.replace(points=sphere.points * [1.0, 1.0, stretch])
-    model = fc.Model(mesh, "3d")
-    model.add_material(fc.LinearElastic(E=E, nu=NU))
-    model.fix("SYMMETRY_X", "x")
-    model.fix("SYMMETRY_Z", "z")
+    model = elastic_model(mesh, "3d", E=E, nu=NU, SYMMETRY_X="x", SYMMETRY_Z="z")
     if force is None:
         model.prescribe("SPHERE_TOP", y=-0.01)
     else:
@@ -69,11 +67,7 @@ def block_under_paraboloid(element, formulation, size, R_y=200.0, growth=0.4):
     mesh = fc.generate.graded_block(
         element, width=8 * b, contact_radius=1.25 * a, contact_radius_y=1.25 * b, contact_size=size * a, growth=growth
     )
-    model = fc.Model(mesh, "3d")
-    model.add_material(fc.LinearElastic(E=E, nu=NU))
-    model.fix("SYMMETRY_X", "x")
-    model.fix("SYMMETRY_Y", "y")
-    model.fix("BOTTOM", "z")
+    model = elastic_model(mesh, "3d", E=E, nu=NU, SYMMETRY_X="x", SYMMETRY_Y="y", BOTTOM="z")
     curvature = np.array([1 / 100.0, 1 / R_y])
     paraboloid = fc.obstacles.Height(lambda x: (0.5 * x**2 @ curvature, x * curvature), "above")
     model.add_obstacle(
@@ -160,11 +154,7 @@ def test_the_stress_below_the_pole_on_tetrahedra_is_the_pressure():
     mesh = fc.generate.graded_block(
         "tet10", width=8 * radius, contact_radius=1.25 * radius, contact_size=0.3 * radius, growth=1.0
     )
-    model = fc.Model(mesh, "3d")
-    model.add_material(fc.LinearElastic(E=E, nu=NU))
-    model.fix("SYMMETRY_X", "x")
-    model.fix("SYMMETRY_Y", "y")
-    model.fix("BOTTOM", "z")
+    model = elastic_model(mesh, "3d", E=E, nu=NU, SYMMETRY_X="x", SYMMETRY_Y="y", BOTTOM="z")
     model.add_obstacle(
         "hertz", secondary="CONTACT", obstacle=fc.obstacles.paraboloid(100.0), motion={"z": -theory.approach}
     )

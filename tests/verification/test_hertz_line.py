@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 
@@ -24,10 +25,7 @@ def measured(contact, radius_of):
 def against_hertz(element, formulation, size):
     """Relative errors of pressure and half-width of a block under a parabola, in half-widths of 1 about; growth 0.3."""
     mesh = fc.generate.graded_block(element, width=20.0, contact_radius=1.25, contact_size=size, growth=0.3)
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(E=E, nu=NU))
-    model.fix("SYMMETRY_X", "x")
-    model.fix("BOTTOM", "y")
+    model = elastic_model(mesh, "plane_strain", E=E, nu=NU, SYMMETRY_X="x", BOTTOM="y")
     model.add_obstacle(
         "hertz", secondary="CONTACT", obstacle=fc.obstacles.paraboloid(R), motion={"y": -0.025}, formulation=formulation
     )

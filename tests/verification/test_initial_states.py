@@ -9,7 +9,7 @@ import fastcontact as fc
 from fastcontact.cases.case import read_case
 from fastcontact.model.fingerprint import different, fingerprint
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 PLANE = ("plane_strain", "plane_stress", "axisymmetric")
 ELEMENTS = [(k, e) for k in PLANE for e in ("tri3", "tri6", "quad4", "quad8", "quad9")]

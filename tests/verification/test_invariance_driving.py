@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 FORMULATIONS = [
     ("node_to_segment", {}),
@@ -23,10 +24,7 @@ FORMULATIONS = [
 def cylinder(element, kinematics="plane_strain"):
     """Half a cylinder (a half-sphere in axisymmetry) on a block."""
     mesh = fc.generate.cylinder_on_block(element, R=50.0, size=12.0, contact_size=1.5)
-    model = fc.Model(mesh, kinematics)
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("AXIS", "x")
-    model.fix("BLOCK_BOTTOM", "y")
+    model = elastic_model(mesh, kinematics, AXIS="x", BLOCK_BOTTOM="y")
     return model, "CYLINDER_TOP", ("CONT_CYLINDER", "CONT_BLOCK"), 0.8
 
 
@@ -35,11 +33,7 @@ def sphere(element):
     mesh = fc.generate.sphere_on_block(
         element, size=25.0, contact_size=4.0, contact_radius=6.0, block_size=(30.0, 30.0), growth=1.0
     )
-    model = fc.Model(mesh, "3d")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("SYMMETRY_X", "x")
-    model.fix("SYMMETRY_Z", "z")
-    model.fix("BLOCK_BOTTOM", "y")
+    model = elastic_model(mesh, "3d", SYMMETRY_X="x", SYMMETRY_Z="z", BLOCK_BOTTOM="y")
     return model, "SPHERE_TOP", ("CONT_SPHERE", "CONT_BLOCK"), 1.0
 
 
@@ -102,8 +96,7 @@ def alone(dim):
     else:
         mesh = fc.generate.sphere_octant("hex8", size=25.0, contact_size=4.0, contact_radius=6.0, growth=1.0)
         names, secondary, top = (("SYMMETRY_X", "x"), ("SYMMETRY_Z", "z")), "CONT_SPHERE", "SPHERE_TOP"
-    model = fc.Model(mesh, "plane_strain" if dim == 2 else "3d")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model = elastic_model(mesh, "plane_strain" if dim == 2 else "3d")
     for group, axis in names:
         model.fix(group, axis)
     return model, top, (secondary, ""), 1.0

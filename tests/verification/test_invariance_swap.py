@@ -4,18 +4,18 @@ from functools import cache
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 
 @cache
 def pressed(element, size, swap, multipliers="standard"):
     """Force and largest von Mises stress of a cylinder on a stiffer block."""
     mesh = fc.generate.cylinder_on_block(element, R=50.0, size=6.0, contact_size=size)
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model = elastic_model(mesh, "plane_strain")
     model.add_material(fc.LinearElastic(E=3000.0, nu=0.2), "BLOCK")
     model.fix("AXIS", "x")
     model.fix("BLOCK_BOTTOM", "y")
@@ -46,11 +46,7 @@ def test_swapping_the_sides_in_space():
         mesh = fc.generate.sphere_on_block(
             "hex8", size=12.5, contact_size=2.0, contact_radius=6.0, block_size=(30.0, 30.0)
         )
-        model = fc.Model(mesh, "3d")
-        model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-        model.fix("SYMMETRY_X", "x")
-        model.fix("SYMMETRY_Z", "z")
-        model.fix("BLOCK_BOTTOM", "y")
+        model = elastic_model(mesh, "3d", SYMMETRY_X="x", SYMMETRY_Z="z", BLOCK_BOTTOM="y")
         model.prescribe("SPHERE_TOP", y=-0.5)
         sides = ("CONT_BLOCK", "CONT_SPHERE")[:: 1 if swap else -1]
         model.add_contact("pair", secondary=sides[0], primary=sides[1], formulation="mortar")

@@ -10,6 +10,8 @@ from fastcontact.cases.case import read_case
 from fastcontact.mesh import elements
 from fastcontact.mesh.files.med import add_field, add_mesh, new_file
 
+pytestmark = pytest.mark.usefixtures("meshio_here")
+
 
 def middles_of(mesh):
     return np.concatenate([mesh.points[block].mean(axis=1) for block in mesh.solids.values()])

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact import obstacles
@@ -18,18 +19,16 @@ def lines(points, element, group="TOOL"):
 
 
 def half_sphere(obstacle, formulation="continuous", element="quad4"):
-    model = fc.Model(quarter_disc(element), "axisymmetric")
-    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
-    model.fix("A1A2", "x")
+    model = elastic_model(quarter_disc(element), "axisymmetric", E=20_000.0, A1A2="x")
     model.prescribe("A1B1", y=2.0)
     model.add_obstacle("tool", secondary="CONT1", obstacle=obstacle, formulation=formulation)
     return fc.solve(model, fc.linear_ramp(2))[-1]
 
 
 @pytest.mark.parametrize(
-    ("formulation", "element"), [("continuous", "quad8"), ("continuous", "quad4"), ("node_to_segment", "tri3")]
+    ("formulation", "element", "facet"),
+    [("continuous", "quad8", "line2"), ("continuous", "quad4", "line3"), ("node_to_segment", "tri3", "line2")],
 )
-@pytest.mark.parametrize("facet", ["line2", "line3"])
 def test_a_meshed_plane_is_a_plane(formulation, element, facet):
     x = np.linspace(0.0, 60.0, 41) + 0.2 * np.sin(np.arange(41) * np.pi / 2)  # facets of several lengths
     plane = lines(np.column_stack([x, np.zeros(41)]), facet)
@@ -41,10 +40,7 @@ def test_a_meshed_plane_is_a_plane(formulation, element, facet):
 
 def pressed_block(obstacle, formulation="continuous"):
     mesh = block((8.0, 4.0), (32, 16), "quad8", origin=(0.0, -4.0))
-    model = fc.Model(mesh, "axisymmetric")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("LEFT", "x")
-    model.fix("BOTTOM", "y")
+    model = elastic_model(mesh, "axisymmetric", LEFT="x", BOTTOM="y")
     model.add_obstacle("ball", secondary="TOP", obstacle=obstacle, motion={"y": -0.1}, formulation=formulation)
     return fc.solve(model, fc.linear_ramp(2))[-1].contact["ball"]
 
@@ -68,10 +64,7 @@ def test_a_meshed_plane_in_three_dimensions_is_a_plane(facet):
     tool = box((2.5, 1.0, 2.5), (3, 1, 4), facet, (0.0, -1.0, 0.0))
 
     def pressed(obstacle):
-        model = fc.Model(ball, "3d")
-        model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-        model.fix("SYMMETRY_X", "x")
-        model.fix("SYMMETRY_Z", "z")
+        model = elastic_model(ball, "3d", SYMMETRY_X="x", SYMMETRY_Z="z")
         model.prescribe("SPHERE_TOP", y=-0.04)
         model.add_obstacle("floor", secondary="CONT_SPHERE", obstacle=obstacle)
         return fc.solve(model, fc.linear_ramp(1))[-1]
@@ -89,11 +82,7 @@ def test_a_meshed_ball_presses_a_block_in_three_dimensions():
     body = box((2.0, 1.0, 2.0), (12, 4, 12), "hex8", (0.0, -1.0, 0.0))
 
     def pressed(obstacle):
-        model = fc.Model(body, "3d")
-        model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-        model.fix("XMIN", "x")
-        model.fix("ZMIN", "z")
-        model.fix("YMIN", "y")
+        model = elastic_model(body, "3d", XMIN="x", ZMIN="z", YMIN="y")
         model.add_obstacle("ball", secondary="YMAX", obstacle=obstacle, motion={"y": -0.05})
         return fc.solve(model, fc.linear_ramp(1))[-1].contact["ball"]
 
@@ -106,9 +95,7 @@ def test_a_rigid_surface_may_be_part_of_the_models_own_mesh():
     body = block((1.0, 1.0), (4, 4), "quad4")
     tool = lines(np.array([[-0.5, 1.02], [0.5, 1.0], [1.5, 1.02]]), "line2")
     mesh = union(body, tool)
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("BOTTOM", "xy")
+    model = elastic_model(mesh, "plane_strain", BOTTOM="xy")
     surface = obstacles.MeshedSurface(mesh, "TOOL")
     model.add_obstacle("tool", secondary="TOP", obstacle=surface, motion={"y": -0.02}, formulation="node_to_segment")
     last = fc.solve(model, fc.linear_ramp(1))[-1]

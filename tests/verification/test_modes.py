@@ -7,7 +7,7 @@ import fastcontact as fc
 from fastcontact.cli import main
 from fastcontact.mesh import elements
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 block, box, union = fc.generate.block, fc.generate.box, fc.generate.union
 FLAT = ("tri3", "quad4", "tri6", "quad8", "quad9")

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.mesh.generate import box, renamed, union
@@ -20,8 +21,7 @@ def two_boxes(lower_element, upper_element, tilt=None):
 
 
 def pressed(mesh, swap=False, **options):
-    model = fc.Model(mesh, "3d")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model = elastic_model(mesh, "3d")
     for side in "LU":
         model.fix(f"{side}_XMIN", "x")
         model.fix(f"{side}_YMIN", "y")
@@ -46,9 +46,7 @@ def test_friction_holds_or_slides_along_the_push():
     forces = {}
     for push in (1e-6, 1e-3):
         mesh = two_boxes("hex8", "hex8")
-        model = fc.Model(mesh, "3d")
-        model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
-        model.fix("L_ZMIN", "xyz")
+        model = elastic_model(mesh, "3d", nu=0.0, L_ZMIN="xyz")
         model.prescribe("U_ZMAX", x=push * np.cos(np.pi / 6), y=push * np.sin(np.pi / 6), z=-1e-4)
         model.add_contact("pair", secondary="U_ZMIN", primary="L_ZMAX", formulation="mortar", friction=0.3)
         contact = fc.solve(model, fc.linear_ramp(3))[-1].contact["pair"]

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.contact.configuration import Configuration
@@ -36,8 +37,7 @@ def two_boxes(lower, upper, divisions=((2, 3, 2), (3, 2, 2))):
 
 
 def pair_of(mesh, kinematics, swap, **options):
-    model = fc.Model(mesh, kinematics)
-    model.add_material(fc.LinearElastic(E=E, nu=NU))
+    model = elastic_model(mesh, kinematics, E=E, nu=NU)
     sides = ("U_BOTTOM", "L_TOP") if mesh.dim == 2 else ("U_ZMIN", "L_ZMAX")
     secondary, primary = sides if swap else sides[::-1]
     model.add_contact("pair", secondary=secondary, primary=primary, formulation="mortar", multipliers="dual", **options)
@@ -144,9 +144,7 @@ def test_tied_sides_follow_any_linear_field(kinds):
 @pytest.mark.parametrize("kinds", [("hex8", "hex8"), ("tet10", "hex20")], ids="-".join)
 def test_a_block_on_a_plane_of_symmetry_slides_at_the_limit(kinds):
     """Nodes in the plane have friction along it, and none across."""
-    model = fc.Model(two_boxes(*kinds), "3d")
-    model.add_material(fc.LinearElastic(E=E, nu=0.0))
-    model.fix("L_ZMIN", "xyz")
+    model = elastic_model(two_boxes(*kinds), "3d", E=E, nu=0.0, L_ZMIN="xyz")
     for group in ("L_YMIN", "U_YMIN", "U_ZMAX"):
         model.fix(group, "y")
     model.prescribe("U_ZMAX", x=1e-3, z=-1e-4)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 
@@ -11,8 +12,7 @@ QUADRATIC = ["tet10", "hex20", "wedge15"]
 def drawn(element, by, friction=0.3, **options):
     """A block pressed on a rigid plane and drawn along it by its top, with uniform pressure."""
     mesh = fc.generate.box((2.0, 1.0, 0.5), (3, 2, 1), element)
-    model = fc.Model(mesh, "3d")
-    model.add_material(fc.LinearElastic(1000.0, 0.0))
+    model = elastic_model(mesh, "3d", nu=0.0)
     model.prescribe("ZMAX", x=by, y=0.0, z=-0.01)
     model.prescribe("ZMIN", x=by, y=0.0)
     plane = fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
@@ -33,11 +33,7 @@ def test_uniform_pressure_and_full_friction_of_a_drawn_block(element, solver):
 
 def under_a_ball(element, size, **options):
     mesh = fc.generate.graded_block(element, width=10.0, contact_radius=2.5, contact_size=size, size=2.5)
-    model = fc.Model(mesh, "3d")
-    model.add_material(fc.LinearElastic(2e5, 0.3))
-    model.fix("BOTTOM", "z")
-    model.fix("SYMMETRY_X", "x")
-    model.fix("SYMMETRY_Y", "y")
+    model = elastic_model(mesh, "3d", E=2e5, BOTTOM="z", SYMMETRY_X="x", SYMMETRY_Y="y")
     ball = fc.obstacles.Sphere((0.0, 0.0, 50.0), 50.0)
     model.add_obstacle("ball", secondary="CONTACT", obstacle=ball, motion={"z": -0.1}, **options)
     return model
@@ -77,10 +73,7 @@ def test_the_remedy_for_a_full_compliance_that_is_too_large_works(monkeypatch):
 def test_in_the_plane_the_force_is_that_of_the_continuous_form(element, kinematics):
     def force(**options):
         mesh = fc.generate.graded_block(element, width=10.0, contact_radius=2.5, contact_size=0.25, size=2.5)
-        model = fc.Model(mesh, kinematics)
-        model.add_material(fc.LinearElastic(2e5, 0.3))
-        model.fix("BOTTOM", "xy")
-        model.fix("SYMMETRY_X", "x")
+        model = elastic_model(mesh, kinematics, E=2e5, BOTTOM="xy", SYMMETRY_X="x")
         model.add_obstacle(
             "ball", secondary="CONTACT", obstacle=fc.obstacles.Sphere((0.0, 50.0), 50.0), motion={"y": -0.1}, **options
         )
@@ -89,21 +82,13 @@ def test_in_the_plane_the_force_is_that_of_the_continuous_form(element, kinemati
     assert force(formulation="mortar") == pytest.approx(force(formulation="continuous"), rel=2e-3)
 
 
-def test_standard_multipliers_in_the_plane_are_refused_at_an_obstacle():
-    model = fc.Model(fc.generate.block((1.0, 1.0), (1, 1), "quad4"), "plane_strain")
-    wall = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
-    with pytest.raises(fc.ContactError, match="mortar in the plane needs multipliers='dual' at an obstacle"):
-        model.add_obstacle("wall", secondary="BOTTOM", obstacle=wall, formulation="mortar", multipliers="standard")
-
-
 def test_a_turning_obstacle_drags_with_the_torque_of_full_friction():
     """A plane that turns under a square block; the error is that of the nodes' places, of second order."""
     mean_radius = (np.sqrt(2) + np.log(1 + np.sqrt(2))) / 3  # of a square of half-width 1
     off = []
     for cells in (4, 8):
         mesh = fc.generate.box((2.0, 2.0, 0.5), (cells, cells, 1), "hex20", (-1.0, -1.0, 0.0))
-        model = fc.Model(mesh, "3d")
-        model.add_material(fc.LinearElastic(1000.0, 0.0))
+        model = elastic_model(mesh, "3d", nu=0.0)
         model.prescribe("ZMAX", x=0.0, y=0.0, z=-0.01)
         model.prescribe("ZMIN", x=0.0, y=0.0)
         plane = fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))

@@ -124,30 +124,36 @@ def test_left_solutions_and_extrapolated_starts_end_where_the_direct_solver_does
     assert np.array_equal(amg.contact["c"].active, direct.contact["c"].active)
 
 
+INTERFACES = [
+    ({}, 3.5),
+    ({"multipliers": "standard"}, 5.5),
+    ({"ratio": 1e4}, 3.5),
+    ({"ratio": 1e8}, 3.5),
+    ({"ratio": 1e-2}, 6.0),
+    ({"ratio": 1e-4}, 8.0),
+    ({"nu": 0.45}, 3.5),
+    ({"nu": 0.49}, 3.5),
+    ({"nu": 0.499}, 3.5),
+    ({"nu": 0.4999}, 3.5),
+    ({"element": "tet4"}, 3.5),
+    ({"element": "tet10", "divisions": 6}, 4.0),
+    ({"element": "hex20", "divisions": 6}, 4.0),
+    ({"element": "tet10", "divisions": 6, "multipliers": "standard"}, 4.0),
+    ({"element": "hex20", "divisions": 6, "multipliers": "standard"}, 4.0),
+    ({"curvature": 0.02}, 3.5),
+    ({"stretch": 20.0}, 3.5),
+]
+
+
 @pytest.mark.filterwarnings("ignore:Young's moduli")
 @pytest.mark.parametrize(
-    ("given", "most"),
-    [
-        ({}, 3.5),
-        ({"multipliers": "standard"}, 5.5),
-        ({"ratio": 1e4}, 3.5),
-        ({"ratio": 1e8}, 3.5),
-        ({"ratio": 1e-2}, 6.0),
-        ({"ratio": 1e-4}, 8.0),
-        ({"nu": 0.45}, 3.5),
-        ({"nu": 0.49}, 3.5),
-        ({"nu": 0.499}, 3.5),
-        ({"nu": 0.4999}, 3.5),
-        ({"element": "tet4"}, 3.5),
-        ({"element": "tet10", "divisions": 6}, 4.0),
-        ({"element": "hex20", "divisions": 6}, 4.0),
-        ({"element": "tet10", "divisions": 6, "multipliers": "standard"}, 4.0),
-        ({"element": "hex20", "divisions": 6, "multipliers": "standard"}, 4.0),
-        ({"curvature": 0.02}, 3.5),
-        ({"stretch": 20.0}, 3.5),
+    ("given", "most", "friction"),
+    [  # by default with friction and without in turn
+        pytest.param(given, most, friction, marks=() if (k + bool(friction)) % 2 else pytest.mark.slow)
+        for k, (given, most) in enumerate(INTERFACES)
+        for friction in (0.0, 0.3)
     ],
 )
-@pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_iterations_under_whole_interfaces_are_a_few_times_those_without_contact(given, most, friction):
     robustness = suite("subjects").load("robustness")
     found = robustness.figures(robustness.blocks(**{"divisions": 12, **given, "friction": friction}))
@@ -188,7 +194,10 @@ def test_warm_starts_go_on_to_what_is_right_for_what_is_soft():
     assert found["residual"] < 1e-6
 
 
-@pytest.mark.parametrize(("nu", "most"), [(0.49, 8), (0.499, 8), (0.4999, 9)])
+@pytest.mark.parametrize(
+    ("nu", "most"),
+    [pytest.param(0.49, 8, marks=pytest.mark.slow), (0.499, 8), pytest.param(0.4999, 9, marks=pytest.mark.slow)],
+)
 def test_friction_of_nearly_incompressible_bodies_is_paired_as_often_as_that_of_others(nu, most):
     robustness = suite("subjects").load("robustness")
     found = robustness.figures(robustness.blocks(12, 0.3, nu=nu))

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 
@@ -47,8 +48,7 @@ def pad(element, n, kinematics="plane_strain", solver="direct"):
         size, (2 * n,) * (2 * solid) + (n,) if solid else (2 * n, n), element
     )
     mesh = mesh.replace(points=mesh.points - mesh.points.min(axis=0))
-    model = fc.Model(mesh, kinematics)
-    model.add_material(fc.LinearElastic(E=3.0, nu=NU))
+    model = elastic_model(mesh, kinematics, E=3.0, nu=NU)
     bottom, top, up = ("ZMIN", "ZMAX", "z") if solid else ("BOTTOM", "TOP", "y")
     model.fix(bottom, "xyz"[: mesh.dim])
     model.fix(top, "xy" if solid else "x")
@@ -82,9 +82,7 @@ def hertz(element, nu, coarseness):
     mesh = fc.generate.half_spheres(
         element, arc_sizes=(0.2 * coarseness, 2 * coarseness), segments=int(15 / coarseness)
     )
-    model = fc.Model(mesh, "axisymmetric")
-    model.add_material(fc.LinearElastic(E=20_000.0, nu=nu))
-    model.fix("A1A2", "x")
+    model = elastic_model(mesh, "axisymmetric", E=20_000.0, nu=nu, A1A2="x")
     model.prescribe("A2B2", y=-1.0)
     model.prescribe("A1B1", y=1.0)
     model.add_contact("hertz", secondary="CONT1", primary="CONT2")

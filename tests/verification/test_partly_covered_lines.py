@@ -4,6 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.analysis import step_result
@@ -12,7 +13,7 @@ from fastcontact.contact.formulations._determined_field import DETERMINED, Whole
 from fastcontact.contact.integration import nodal_areas
 from fastcontact.mesh.generate import block, renamed, union
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 
 def named(*meshes):
@@ -45,9 +46,7 @@ def random_model(seed):
     above = up.points.copy()
     above[:, 1] += lean * (above[:, 0] - above[:, 0].mean()) * (2.0 - 2.0 * above[:, 1])
     kinematics = "axisymmetric" if above[:, 0].min() >= 0.0 and rng.random() < 0.3 else "plane_strain"
-    model = fc.Model(named(low.replace(points=points), up.replace(points=above)), kinematics)
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("L_BOTTOM", "xy")
+    model = elastic_model(named(low.replace(points=points), up.replace(points=above)), kinematics, L_BOTTOM="xy")
     model.prescribe("U_TOP", x=0.0, y=-rng.uniform(0.005, 0.04))
     sides = ("U_BOTTOM", "L_TOP")[:: 1 if rng.random() < 0.5 else -1]
     options = [{}, {}, {"multipliers": "dual"}, {"friction": 0.3}, {"n_gauss": 2}][rng.integers(5)]
@@ -113,10 +112,7 @@ def test_a_uniform_pressure_passes_up_to_the_end_of_the_primary_side(element, ki
     """The primary side ends inside a secondary facet after any part of it."""
     width = 0.5 + covered * 0.25
     lower, upper = block((1.0, 0.5), (4, 2), element), block((width, 0.5), (3, 2), element, (0.0, 0.5))
-    model = fc.Model(named(lower, upper), kinematics)
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
-    model.fix("U_LEFT", "x")
-    model.fix("L_LEFT", "x")
+    model = elastic_model(named(lower, upper), kinematics, nu=0.0, U_LEFT="x", L_LEFT="x")
     # The lower block is held by its surface: it does not bend beside the upper one.
     for group in ("L_TOP", "L_BOTTOM"):
         model.fix(group, "y")
@@ -189,8 +185,7 @@ def test_fields_are_as_rich_as_what_takes_part_determines(element, axisymmetric)
 @pytest.mark.parametrize("element", ["quad4", "quad8", "tri3", "tri6"])
 def test_contact_at_the_nodes_holds_the_node_on_the_axis(element, kind):
     mesh = fc.generate.block_on_block(element, divisions_lower=(6, 3), divisions_upper=(5, 3))
-    model = fc.Model(mesh, "axisymmetric")
-    model.add_material(fc.LinearElastic(1000.0, 0.3))
+    model = elastic_model(mesh, "axisymmetric")
     for group in ("LOWER_LEFT", "UPPER_LEFT"):
         model.fix(group, "x")
     model.fix("LOWER_BOTTOM", "xy")
@@ -208,9 +203,7 @@ def test_contact_at_the_nodes_holds_the_node_on_the_axis(element, kind):
 
 def test_fewer_points_than_a_parabola_has_nodes_leave_a_line():
     mesh = fc.generate.block_on_block("quad8", divisions_lower=(3, 2), divisions_upper=(3, 2))
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(1000.0, 0.0))
-    model.fix("LOWER_BOTTOM", "xy")
+    model = elastic_model(mesh, "plane_strain", nu=0.0, LOWER_BOTTOM="xy")
     model.prescribe("UPPER_TOP", x=0.0, y=-0.02)
     model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", formulation="mortar", n_gauss=2)
     pair = model.bind(model.contact[0])

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 
@@ -12,8 +13,7 @@ ELEMENTS = ("tri3", "tri6", "quad4", "quad8", "quad9")
 
 def two_blocks(element, formulation, kinematics="plane_strain", swap=False, **options):
     mesh = fc.generate.block_on_block(divisions_lower=(3, 2), divisions_upper=(3, 2), element=element)
-    model = fc.Model(mesh, kinematics)
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model = elastic_model(mesh, kinematics)
     for side in ("LOWER", "UPPER"):
         model.fix(f"{side}_LEFT", "x")
     model.fix("LOWER_BOTTOM", "y")
@@ -50,9 +50,7 @@ def test_the_continuous_pressure_is_exact_with_every_rule(integration):
 @pytest.mark.filterwarnings("ignore:contact .* never closed")
 def test_bodies_apart_stay_open_and_carry_nothing(forma04):
     mesh = fc.generate.half_spheres("tri3", size=8.0)
-    model = fc.Model(mesh, "axisymmetric")
-    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
-    model.fix("A1A2", "x")
+    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x")
     model.prescribe("A2B2", y=1.0)
     model.fix("A1B1", "y")
     model.add_contact("hertz", secondary="CONT1", primary="CONT2")

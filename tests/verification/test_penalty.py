@@ -2,9 +2,12 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 from two_bodies import blocks, boxes, held, touching
 
 import fastcontact as fc
+
+pytestmark = pytest.mark.each_value
 
 FORMULATIONS = ("node_to_segment", "continuous", "mortar")
 MODULUS = {"plane_strain": 1000.0 / 0.91, "axisymmetric": 1000.0, "3d": 1000.0}
@@ -68,9 +71,7 @@ def test_friction_is_not_softened_by_a_penalty(formulation):
     """What sticks stays where it stuck, step after step: a penalty acts along the normal alone."""
     found = {}
     for penalty in (1e5, None):
-        model = fc.Model(blocks(), "plane_strain")
-        model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
-        model.fix("LOWER_BOTTOM", "xy")
+        model = elastic_model(blocks(), "plane_strain", nu=0.0, LOWER_BOTTOM="xy")
         model.prescribe("UPPER_TOP", x=1e-4, y=-0.02)
         touching(model, formulation, friction=0.5, penalty=penalty, normals="averaged")
         found[penalty] = fc.solve(model, fc.Ramp((1.0, 2.0, 3.0, 4.0), ((0.0, 0.0), (1.0, 1.0), (4.0, 1.0))))
@@ -84,9 +85,7 @@ def test_friction_is_not_softened_by_a_penalty(formulation):
 
 @pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
 def test_a_penalty_against_an_obstacle(formulation):
-    model = fc.Model(fc.generate.block((10.0, 5.0), (4, 2), "quad4"), "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("LEFT", "x")
+    model = elastic_model(fc.generate.block((10.0, 5.0), (4, 2), "quad4"), "plane_strain", LEFT="x")
     model.prescribe("TOP", y=-0.01)
     floor = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
     model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor, formulation=formulation, penalty=1e5)
@@ -108,10 +107,7 @@ def layered(formulation, element, approach, matching=True):
     low = fc.generate.block((1.0, 1.0), (4, 4), element=element)
     up = fc.generate.block((1.0, 1.0), (4 if matching else 3, 3), element=element, origin=(0.0, 1.0), name="UP")
     up = fc.generate.renamed(up, {name: "U" + name for name in ("BOTTOM", "TOP", "LEFT", "RIGHT")})
-    model = fc.Model(fc.generate.union(low, up), "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
-    model.fix("BOTTOM", "xy")
-    model.fix("UTOP", "x")
+    model = elastic_model(fc.generate.union(low, up), "plane_strain", nu=0.0, BOTTOM="xy", UTOP="x")
     model.prescribe("UTOP", y=-approach)
     model.add_contact("pair", secondary="UBOTTOM", primary="TOP", formulation=formulation, penalty=TABLE)
     return fc.solve(model, 3)[-1]
@@ -143,8 +139,7 @@ def test_a_table_of_pressures_in_every_formulation(formulation):
     "table", [[(0.0, 1.0), (1.0, 2.0)], [(0.0, 0.0)], [(0.0, 0.0), (1.0, 0.0)], [(0.0, 0.0), (0.0, 1.0)], [1.0, 2.0]]
 )
 def test_a_wrong_table_is_refused(table):
-    model = fc.Model(fc.generate.block(), "plane_strain")
-    model.add_material(fc.LinearElastic(E=1.0, nu=0.3))
+    model = elastic_model(fc.generate.block(), "plane_strain", E=1.0)
     wall = fc.obstacles.HalfSpace((0.0, 1.0), (0.0, -1.0))
     with pytest.raises(fc.ContactError, match="a number, or a table of overclosures and pressures that both ascend"):
         model.add_obstacle("wall", secondary="TOP", obstacle=wall, penalty=table)

@@ -11,7 +11,7 @@ from fastcontact.analysis.problem import prepare
 from fastcontact.cases.case import read_case
 from fastcontact.mesh.generate import block, box, merge_points, renamed, union
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 INNER, OUTER, E, NU = 1.0, 2.0, 1000.0, 0.3
 

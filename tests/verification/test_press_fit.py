@@ -4,11 +4,12 @@ import warnings
 
 import numpy as np
 import pytest
+from models import elastic_model
 from two_bodies import rings
 
 import fastcontact as fc
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 INTERFERENCE = 0.02
 SHAFT, HUB = fc.LinearElastic(E=1000.0, nu=0.3), fc.LinearElastic(E=500.0, nu=0.25)
@@ -154,10 +155,7 @@ def test_fits_settle_with_the_hollow_side_secondary(element, around, multipliers
         element, inner_radius=0.5, interface_radius=1.0, outer_radius=1.6, divisions_inner=(3, around[0]),
         divisions_outer=(3, around[1]),
     )  # fmt: skip
-    model = fc.Model(mesh, "plane_stress")
-    model.add_material(fc.LinearElastic(1000.0, 0.3))
-    model.fix("SYMMETRY_X", "x")
-    model.fix("SYMMETRY_Y", "y")
+    model = elastic_model(mesh, "plane_stress", SYMMETRY_X="x", SYMMETRY_Y="y")
     model.add_contact(
         "fit", secondary="CONT_OUTER", primary="CONT_INNER", clearance=-0.05, multipliers=multipliers, friction=friction
     )

@@ -6,6 +6,7 @@ import aster_spec
 import numpy as np
 import pytest
 from aster_mesh import MissingError
+from models import elastic_model
 from two_bodies import blocks, boxes, held, touching
 
 import fastcontact as fc
@@ -146,6 +147,7 @@ def test_options_change_nothing_about_it(method, options, space, carried):
     check(solved(made(model, **{"normals": "averaged", **METHODS[method], **options})), carried)
 
 
+@pytest.mark.each_value
 @EVERY
 @pytest.mark.parametrize("element", ["tri3", "quad4", "tri6", "quad8"])
 def test_the_training_case(method, element, carried, forma04):
@@ -170,10 +172,7 @@ def pin_in_hole(secondary, primary, **options):
     mesh = fc.generate.merge_points(mesh.replace(points=points), 1e-9)
     points, pin = mesh.points.copy(), mesh.points_of("INNER")
     points[pin, 1] += 0.05
-    model = fc.Model(mesh.replace(points=points), "plane_strain")
-    model.add_material(fc.LinearElastic(210_000.0, 0.3))
-    model.fix("SYMMETRY_X", "x")
-    model.fix("RIM", "y")
+    model = elastic_model(mesh.replace(points=points), "plane_strain", E=210_000.0, SYMMETRY_X="x", RIM="y")
     model.add_traction("BORE", y=2000.0 / (4.0 * np.pi))
     model.add_contact("pair", secondary=secondary, primary=primary, **options)
     return model
@@ -205,8 +204,7 @@ def test_barely_covered_faces_have_no_wild_pressure(element, multipliers, carrie
         up = box((1.0, 1.0, 1.0), (7, 3, 3), element, (0.5 + offset, 0.0, 0.0))
         parts = zip("LU", (low, up), strict=True)
         mesh = union(*(renamed(part, {group: f"{s}_{group}" for group in part.group_names}) for s, part in parts))
-        model = fc.Model(mesh, "3d")
-        model.add_material(fc.LinearElastic(1000.0, 0.0))
+        model = elastic_model(mesh, "3d", nu=0.0)
         for group in ("L_YMIN", "L_YMAX", "U_YMIN", "U_YMAX"):
             model.fix(group, "y")
         model.fix("L_ZMIN", "xz")

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact import obstacles
@@ -12,9 +13,7 @@ FORCE, PRESSURE, RADIUS = 659_773.142, 2910.4071, 10.358557
 
 
 def half_sphere_on_plane(mesh, formulation, **options):
-    model = fc.Model(mesh, "axisymmetric")
-    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
-    model.fix("A1A2", "x")
+    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x")
     model.prescribe("A1B1", y=2.0)
     plane = obstacles.HalfSpace((0.0, 0.0), (0.0, -1.0))
     model.add_obstacle("plane", secondary="CONT1", obstacle=plane, formulation=formulation, **options)
@@ -35,10 +34,7 @@ def test_a_half_sphere_on_a_plane_reaches_the_mesh_converged_solution(formulatio
 def test_moving_the_plane_is_moving_the_body():
     mesh = fc.generate.quarter_disc("quad4")
     held = half_sphere_on_plane(mesh, "continuous")
-    moved = fc.Model(mesh, "axisymmetric")
-    moved.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
-    moved.fix("A1A2", "x")
-    moved.fix("A1B1", "y")
+    moved = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x", A1B1="y")
     plane = obstacles.HalfSpace((0.0, 0.0), (0.0, -1.0))
     moved.add_obstacle("plane", secondary="CONT1", obstacle=plane, motion={"y": -2.0})
     one, other = (fc.solve(model, fc.linear_ramp(3))[-1] for model in (held, moved))
@@ -61,9 +57,7 @@ def hertz_box(element, n, kinematics="plane_strain"):
     """The manufactured problem: exact displacements on all sides but the top, a rigid parabola above it."""
     box = fc.analytic.hertz_box(kinematics=kinematics, E=1000.0, nu=0.3, radius=0.5123, pressure_max=50.0)
     mesh = fc.generate.block((1.0, 1.0), (n, n), element, origin=(0.0, -1.0))
-    model = fc.Model(mesh, kinematics)
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("LEFT", "x")
+    model = elastic_model(mesh, kinematics, LEFT="x")
     for side in ("RIGHT", "BOTTOM"):
         for k, axis in enumerate("xy"):
             if (side, axis) != ("BOTTOM", "x"):
@@ -91,10 +85,7 @@ def test_rates_on_hertz_in_a_box(element):
 
 def test_a_flat_punch_leaves_the_surface_beside_it_free():
     mesh = fc.generate.block((4.0, 4.0), (32, 32), "quad4", origin=(0.0, -4.0))
-    model = fc.Model(mesh, "axisymmetric")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("LEFT", "x")
-    model.fix("BOTTOM", "y")
+    model = elastic_model(mesh, "axisymmetric", LEFT="x", BOTTOM="y")
     punch = obstacles.FlatPunch(0.5)
     model.add_obstacle("punch", secondary="TOP", obstacle=punch, motion={"y": -0.01}, formulation="node_to_segment")
     last = fc.solve(model, fc.linear_ramp(1))[-1]
@@ -108,9 +99,7 @@ def test_a_flat_punch_leaves_the_surface_beside_it_free():
 
 def test_a_plane_drawn_along_drags_by_friction():
     mesh = fc.generate.block((1.0, 1.0), (4, 4), "quad4")
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
-    model.fix("TOP", "xy")
+    model = elastic_model(mesh, "plane_strain", nu=0.0, TOP="xy")
     plane = obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
     model.add_obstacle("plane", secondary="BOTTOM", obstacle=plane, motion={"x": 0.01, "y": 1e-3}, friction=0.2)
     contact = fc.solve(model, fc.linear_ramp(5))[-1].contact["plane"]
@@ -119,8 +108,7 @@ def test_a_plane_drawn_along_drags_by_friction():
 
 
 def test_wrong_obstacles_are_refused():
-    model = fc.Model(fc.generate.block((1.0, 1.0), (2, 2), "quad4"), "plane_strain")
-    model.add_material(fc.LinearElastic(E=1.0, nu=0.3))
+    model = elastic_model(fc.generate.block((1.0, 1.0), (2, 2), "quad4"), "plane_strain", E=1.0)
     plane = obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
     with pytest.raises(fc.ModelError, match="motion of obstacle 'p'"):
         model.add_obstacle("p", secondary="BOTTOM", obstacle=plane, motion={"z": 1.0})

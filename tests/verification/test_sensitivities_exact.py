@@ -7,6 +7,7 @@ of the mesh; Hertz's powers of the force to 7 %.
 from __future__ import annotations
 
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 
@@ -16,10 +17,7 @@ LAME = 1e-3
 
 def test_a_bar():
     length, E, traction = 10.0, 1000.0, 2.0
-    model = fc.Model(fc.generate.block((length, 1.0), (5, 2)), kinematics="plane_stress")
-    model.add_material(fc.LinearElastic(E=E, nu=0.3))
-    model.fix("LEFT", "x")
-    model.fix("BOTTOM", "y")
+    model = elastic_model(fc.generate.block((length, 1.0), (5, 2)), "plane_stress", E=E, LEFT="x", BOTTOM="y")
     model.add_traction("RIGHT", x=traction)
     step = fc.solve(model, 1)[-1]
     corner = int(model.mesh.points_of("TOP_RIGHT")[0])
@@ -100,7 +98,7 @@ def test_hertz_and_what_scaling_leaves_the_same():
 
 
 def test_prescribed_displacements_scale_forces_with_moduli():
-    mesh = fc.generate.sphere_on_block("hex8", R=10.0, contact_size=1.0, size=4.0)
+    mesh = fc.generate.sphere_on_block("hex8", R=10.0, contact_size=2.0, size=5.0)
     model = fc.Model(mesh, kinematics="3d")
     model.add_material(fc.LinearElastic(E=1000.0, nu=0.3), "SPHERE")
     model.add_material(fc.LinearElastic(E=3000.0, nu=0.2), "BLOCK")

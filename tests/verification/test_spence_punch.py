@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from graded import graded_block, lines
+from models import elastic_model
 
 import fastcontact as fc
 
@@ -24,10 +25,7 @@ def pressed(nu, friction, n=60, formulation="node_to_segment", steps=1):
     shortest = beneath[-1] - beneath[-2]
     x = np.concatenate([beneath, 1.0 + lines(shortest, 0.0, EXTENT - 1.0, growth=1.3)[1:]])
     y = -lines(shortest, 0.0, EXTENT, growth=1.3)[::-1]
-    model = fc.Model(graded_block(x, y, "quad4"), "plane_strain")
-    model.add_material(fc.LinearElastic(E=E, nu=nu))
-    model.fix("LEFT", "x")
-    model.fix("BOTTOM", "y")
+    model = elastic_model(graded_block(x, y, "quad4"), "plane_strain", E=E, nu=nu, LEFT="x", BOTTOM="y")
     model.add_obstacle(
         "punch", secondary="TOP", obstacle=fc.obstacles.FlatPunch(1.0), motion={"y": -DEPTH},
         formulation=formulation, friction=friction,

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.cases.case import read_case
@@ -20,9 +21,7 @@ MESHES = {
 
 
 def model_on(mesh):
-    model = fc.Model(mesh, "plane_stress" if mesh.dim == 2 else "3d")
-    model.add_material(fc.LinearElastic(1000.0, 0.3))
-    return model
+    return elastic_model(mesh, "plane_stress" if mesh.dim == 2 else "3d")
 
 
 def resultants(mesh, forces, place):
@@ -135,8 +134,7 @@ def test_springs_join_the_nodes_of_two_groups(element, kind):
 def test_columns_and_springs_in_series():
     """Stiffness E A / L of both columns and n k of the springs, one after the other; nu = 0."""
     mesh = two_blocks("quad4")
-    model = fc.Model(mesh, "plane_stress")
-    model.add_material(fc.LinearElastic(1000.0, 0.0))
+    model = elastic_model(mesh, "plane_stress", nu=0.0)
     groups = {}
     for name, side in (("A", "TOP"), ("B", "BOTTOM2")):
         points = mesh.points_of(side)

@@ -7,7 +7,7 @@ from two_bodies import YOUNG, blocks, boxes
 import fastcontact as fc
 from fastcontact.analysis.criteria import Criteria
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 EVERY = [("node_to_segment", {}), ("continuous", {}), ("mortar", {}), ("mortar", {"multipliers": "dual"})]
 each = pytest.mark.parametrize(("formulation", "options"), EVERY, ids=["node", "continuous", "mortar", "dual"])

@@ -12,6 +12,8 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.files.med import add_field, add_mesh, new_file
 from fastcontact.model.fingerprint import fingerprint
 
+pytestmark = pytest.mark.usefixtures("meshio_here")
+
 STEEL = fc.LinearElastic(E, 0.3, expansion=ALPHA)
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 from two_bodies import SIDES, blocks, boxes, held, rings, touching
 
 import fastcontact as fc
@@ -17,8 +18,7 @@ SKEW = np.array([[2e-3, 1e-3, -4e-4], [3e-3, -1e-3, 7e-4], [5e-4, -2e-3, 1e-3]])
 def stretched(mesh, **options):
     """The outside of both bodies moves as a linear function of position: so must everything."""
     dim = mesh.dim
-    model = fc.Model(mesh, "3d" if dim == 3 else "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model = elastic_model(mesh, "3d" if dim == 3 else "plane_strain")
     ends = ("L_ZMIN", "U_ZMAX") if dim == 3 else ("LOWER_BOTTOM", "UPPER_TOP")
     for group in ends:
         model.prescribe(group, **{axis: linear(k, dim) for k, axis in enumerate("xyz"[:dim])})
@@ -94,8 +94,7 @@ def test_matching_meshes_are_tied_as_if_they_were_one(make, formulation):
 def test_curved_sides_are_tied_without_stress_as_they_lie(formulation, turn):
     """Facets of two circles leave gaps and overlaps, which the tie keeps: exactly when moved, nearly when turned."""
     mesh = rings("quad4", divisions=((6, 2), (8, 2)))
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model = elastic_model(mesh, "plane_strain")
     model.prescribe("HUB_OUTER", x=lambda x: 0.1 - turn * x[:, 1], y=lambda x: 0.2 + turn * x[:, 0])
     model.add_contact("pair", secondary="SHAFT_OUTER", primary="HUB_INNER", formulation=formulation, kind="tied")
     last = fc.solve(model, ONCE)[-1]
@@ -115,10 +114,7 @@ def test_a_tied_pair_is_linear_and_sits_beside_contact_with_friction():
         assert step.iterations["geometry_updates"] <= 1
     mesh = fc.generate.union(blocks(), moved(blocks(), 20.0))
     secondary, primary = SIDES["plane"]
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("LOWER_BOTTOM", "xy")
-    model.fix("R_LOWER_BOTTOM", "xy")
+    model = elastic_model(mesh, "plane_strain", LOWER_BOTTOM="xy", R_LOWER_BOTTOM="xy")
     for side in ("UPPER_TOP", "R_UPPER_TOP"):
         model.prescribe(side, x=0.05, y=-0.02)
     model.add_contact("slides", secondary=secondary, primary=primary, formulation="node_to_segment", friction=0.2)
@@ -133,9 +129,7 @@ def test_a_tied_pair_is_linear_and_sits_beside_contact_with_friction():
 
 
 def held_and_pulled(mesh):
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("LOWER_BOTTOM", "xy")
+    model = elastic_model(mesh, "plane_strain", LOWER_BOTTOM="xy")
     model.add_traction("UPPER_TOP", y=2.0)
     return touching(model, "mortar", kind="tied")
 
@@ -155,10 +149,3 @@ def moved(mesh, by):
 def test_what_contradicts_itself_is_refused(options, words):
     with pytest.raises(fc.ContactError, match=words):
         touching(held(blocks()), "mortar", **options)
-
-
-def test_an_obstacle_cannot_be_tied():
-    model = fc.Model(fc.generate.block((1.0, 1.0), (2, 2), "quad4"), "plane_strain")
-    floor = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
-    with pytest.raises(fc.ContactError, match="'floor' cannot be tied to a rigid obstacle: prescribe"):
-        model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor, kind="tied")

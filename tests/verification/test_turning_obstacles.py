@@ -12,7 +12,7 @@ from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.obstacles.rotation import Rotation
 from fastcontact.mesh.generate import block, box
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 FRICTION, RADIUS = 0.3, 10.0
 PRESS, PRESS_AND_TURN = [(0.0, 0.0), (1.0, 1.0), (9.0, 1.0)], [(0.0, 0.0), (1.0, 0.0), (9.0, 1.0)]
@@ -41,8 +41,16 @@ def normal_forces(contact):
     return np.einsum("nd,nd->n", contact.force_vectors, contact.normal)
 
 
-@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
-@pytest.mark.parametrize("driving", [{}, {"force": {"z": -240.0}}], ids=["moved", "pushed"])
+PUSHED = {"force": {"z": -240.0}}
+
+
+@pytest.mark.parametrize(
+    ("formulation", "driving"),
+    [
+        ("node_to_segment", {}), ("node_to_segment", PUSHED), ("continuous", {}),
+        pytest.param("continuous", PUSHED, marks=pytest.mark.slow),
+    ],
+)  # fmt: skip
 @pytest.mark.filterwarnings("ignore:contact 'ball' has only")
 def test_a_twisted_ball_slides_with_the_torque_of_full_slip(formulation, driving):
     """Full slip: the integral of mu p r, of Hertz's pressures 3 pi mu P a / 16 (Lubkin, J. Appl. Mech. 18, 1951)."""

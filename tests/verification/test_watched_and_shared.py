@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 from two_bodies import SIDES, YOUNG, blocks, boxes, held, ring, touching
 
 import fastcontact as fc
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 EVERY = [("node_to_segment", {}), ("continuous", {}), ("mortar", {}), ("mortar", {"multipliers": "dual"})]
 each = pytest.mark.parametrize(("formulation", "options"), EVERY, ids=["node", "continuous", "mortar", "dual"])
@@ -120,10 +121,7 @@ def cracked(element="quad4"):
 @pytest.mark.parametrize("element", ["quad4", "quad8"])
 @pytest.mark.parametrize("swap", [False, True])
 def test_a_closed_crack_carries_uniform_stress_up_to_the_node_that_its_faces_share(formulation, options, element, swap):
-    model = fc.Model(cracked(element), "plane_strain")
-    model.add_material(fc.LinearElastic(E=YOUNG, nu=0.3))
-    model.fix("LOWER_LEFT", "x")
-    model.fix("LOWER_BOTTOM", "y")
+    model = elastic_model(cracked(element), "plane_strain", E=YOUNG, LOWER_LEFT="x", LOWER_BOTTOM="y")
     model.add_pressure("UPPER_TOP", 2.0)
     touching(model, formulation, swap=swap, excluded="TIP", normals="facet", **options)
     step = fc.solve(model, fc.linear_ramp(1))[-1]
@@ -133,12 +131,6 @@ def test_a_closed_crack_carries_uniform_stress_up_to_the_node_that_its_faces_sha
     assert tip in contact.points
     assert not contact.force_vectors[contact.points == tip].any()
     balanced(model, step)
-
-
-def test_shared_nodes_that_are_not_excluded_are_refused():
-    model = fc.Model(cracked(), "plane_strain")
-    with pytest.raises(fc.ContactError, match=r"share 1 nodes .* name the nodes .* `excluded`"):
-        touching(model, "node_to_segment")
 
 
 # Forces on both sides
@@ -234,10 +226,7 @@ def pin_in_hole(formulation, **options):
     inner = ring("quad4", 1.0, 2.0, (6, 2), "PIN")
     outer = ring("quad4", 2.0, 4.0, (9, 3), "HOLE")
     mesh = fc.generate.union(inner, outer)
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(E=YOUNG, nu=0.3))
-    model.fix("XAXIS", "y")
-    model.fix("YAXIS", "x")
+    model = elastic_model(mesh, "plane_strain", E=YOUNG, XAXIS="y", YAXIS="x")
     model.add_pressure("PIN_INNER", 5.0)
     model.add_contact("pair", secondary="PIN_OUTER", primary="HOLE_INNER", formulation=formulation, **options)
     return model

@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.cases.case import read_case
 from fastcontact.mesh.generate import block, block_on_block, box, renamed, union
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 COEFFICIENT, FORCE = 2e-5, 40.0
 PRESS, SLIDE = [(0.0, 0.0), (1.0, 1.0), (100.0, 1.0)], [(0.0, 0.0), (1.0, 0.0), (100.0, 99.0)]
@@ -17,9 +18,7 @@ def shoe(formulation="continuous", wear=COEFFICIENT, stroke=2.0, crown=0.004, el
     """A crowned block of width 2 pressed on a plane that slides `stroke` along it in every unit of time."""
     mesh = block((2.0, 1.0), (20, 8), element, (-1.0, 0.0))
     mesh = mesh.replace(points=mesh.points + np.column_stack([0.0 * mesh.points[:, 0], crown * mesh.points[:, 0] ** 2]))
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("TOP", "x")
+    model = elastic_model(mesh, "plane_strain", TOP="x")
     model.couple("TOP", "y")
     model.add_force("TOP", y=-FORCE, distribute=True, ramp=PRESS)
     plane = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
@@ -95,9 +94,7 @@ def test_bodies_wear_on_the_secondary_side(multipliers):
     upper = mesh.points_of("UPPER")
     points = mesh.points.copy()
     points[upper, 1] += 0.002 * (points[upper, 0] - 5.0) ** 2
-    model = fc.Model(mesh.replace(points=points), "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("LOWER_BOTTOM", "xy")
+    model = elastic_model(mesh.replace(points=points), "plane_strain", LOWER_BOTTOM="xy")
     model.couple("UPPER_TOP", "y")
     model.add_force("UPPER_TOP", y=-FORCE, distribute=True, ramp=PRESS)
     there = [(0.0, 0.0), (1.0, 0.0), (2.0, 1.0), (3.0, -1.0), (4.0, 1.0), (5.0, -1.0)]
@@ -170,9 +167,7 @@ def test_a_block_in_space_wears_along_any_way(formulation):
     mesh = box((2.0, 2.0, 1.0), (6, 6, 2), origin=(-1.0, -1.0, 0.0))
     points = mesh.points.copy()
     points[:, 2] += 0.03 * (1.0 - points[:, 2]) * (points[:, 0] ** 2 + 0.5 * points[:, 1] ** 2)
-    model = fc.Model(mesh.replace(points=points), "3d")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("ZMAX", "xy")
+    model = elastic_model(mesh.replace(points=points), "3d", ZMAX="xy")
     model.couple("ZMAX", "z")
     model.add_force("ZMAX", z=-FORCE, distribute=True, ramp=PRESS)
     plane = fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
@@ -206,9 +201,7 @@ def test_bodies_in_space_that_slide_over_their_edges():
     mesh = union(*parts)
     points, upper = mesh.points.copy(), mesh.points_of("U_BOX")
     points[upper, 2] += 0.02 * (1.0 - points[upper, 2]) * (points[upper, 0] ** 2 + points[upper, 1] ** 2)
-    model = fc.Model(mesh.replace(points=points), "3d")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("L_ZMIN", "xyz")
+    model = elastic_model(mesh.replace(points=points), "3d", L_ZMIN="xyz")
     model.couple("U_ZMAX", "z")
     model.add_force("U_ZMAX", z=-FORCE, distribute=True, ramp=PRESS)
     model.prescribe("U_ZMAX", x=0.1, y=0.05, ramp=[(0.0, 0.0), (1.0, 0.0), (2.0, 1.0), (3.0, -1.0), (4.0, 1.0)])

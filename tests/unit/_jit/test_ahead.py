@@ -67,6 +67,7 @@ def started(monkeypatch):
     """What `expect` starts, in a process that has two threads and has compiled nothing yet."""
     found = []
     monkeypatch.setattr(ahead, "start", lambda runs, helpers: found.append((runs, helpers)))
+    monkeypatch.setattr(ahead, "MOST", 3)
     monkeypatch.setattr(ahead.numba, "get_num_threads", lambda: 2)
     monkeypatch.setattr(ahead.kernel_files, "kept", True)
     monkeypatch.setattr(compiling, "count", 0)

@@ -1,11 +1,18 @@
 """Kernels on disk: compiled anew when a kernel of another file that they call has changed."""
 
+import logging
 import os
+import shutil
 import subprocess
 import sys
+from importlib import import_module
 
+import numba
 import pytest
 
+from fastcontact._jit import cache, decorators
+
+jitted = pytest.mark.skipif(not decorators.compiled(), reason="kernels are not compiled")
 CALLER = """
 from callee import part
 from fastcontact._jit.decorators import kernel
@@ -22,87 +29,108 @@ def part(x):
     return x + {number}
 """
 ASK = "import caller; print(caller.whole(1.0), sum(caller.whole.stats.cache_hits.values()))"
+CALLED, CALLS = ("callee", "part"), ("caller", "whole")
 
 
-def answers(folder, question):
-    """Return the words that Python prints in a new process, kernels on disk in `folder`."""
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder / "cache"), "NUMBA_DISABLE_JIT": "0"}
-    done = subprocess.run(
-        [sys.executable, "-c", question], capture_output=True, text=True, check=True, env=environment, cwd=folder
-    )
-    return done.stdout.split()
+def write(folder, decorator="kernel", number=1, caller=CALLER):
+    (folder / "caller.py").write_text(caller)
+    (folder / "callee.py").write_text(CALLEE.format(decorator=decorator, number=number))
 
 
-@pytest.mark.parametrize("decorator", ["kernel", "inlined_kernel"])
-def test_the_cache_notices_changes_in_other_files(tmp_path, decorator):
-    (tmp_path / "caller.py").write_text(CALLER)
-    (tmp_path / "callee.py").write_text(CALLEE.format(decorator=decorator, number=1))
-    assert answers(tmp_path, ASK) == ["20.0", "0"]
-    assert answers(tmp_path, ASK) == ["20.0", "1"]
-    (tmp_path / "callee.py").write_text(CALLEE.format(decorator=decorator, number=22))
-    assert answers(tmp_path, ASK) == ["230.0", "0"]
+def test_a_new_process_finds_kernels_and_notices_changes_in_other_files(tmp_path):
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "NUMBA_DISABLE_JIT": "0"}
+    for number, expected in ((1, "20.0 0\n"), (1, "20.0 1\n"), (22, "230.0 0\n")):
+        write(tmp_path, number=number)
+        done = subprocess.run(
+            [sys.executable, "-c", ASK], capture_output=True, text=True, check=True, env=environment, cwd=tmp_path
+        )
+        assert done.stdout == expected
+
+
+def forget():
+    """Forget what a process remembers of modules and of the cache."""
+    for name in ("caller", "callee", "constants"):
+        sys.modules.pop(name, None)
+    for remembered in (cache.folder_of, cache.is_trusted, cache._tell, cache._digest_of_file):
+        remembered.cache_clear()
+    decorators._cache_reported = False
+
+
+def asked(folder, kernel=CALLS):
+    """Return what a kernel of a folder gives for 1, and how often it was found on disk, as in a new process."""
+    forget()
+    kept = cache.kept
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(numba.config, "CACHE_DIR", str(folder / "cache"))
+        patch.setattr(sys, "dont_write_bytecode", True)
+        patch.syspath_prepend(folder)
+        function = getattr(import_module(kernel[0]), kernel[1])
+        found = function(1.0), sum(function.stats.cache_hits.values())
+    forget()
+    cache.kept = kept
+    return found
+
+
+@pytest.fixture(scope="module")
+def compiled(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("compiled")
+    write(folder)
+    assert asked(folder, CALLED) == (2.0, 0)
+    return folder
 
 
 @pytest.fixture
-def written(tmp_path):
-    """A folder with both files, and the called kernel on disk."""
-    (tmp_path / "caller.py").write_text(CALLER)
-    (tmp_path / "callee.py").write_text(CALLEE.format(decorator="kernel", number=1))
-    assert answers(tmp_path, "import callee; print(callee.part(1.0))") == ["2.0"]
-    return tmp_path
+def written(compiled, tmp_path):
+    """A folder with both files, and the called kernel on disk: it outlives an installation of the same sources."""
+    shutil.copytree(compiled, tmp_path / "again", copy_function=shutil.copy)
+    return tmp_path / "again"
 
 
+@jitted
+def test_the_cache_notices_changes_of_inlined_kernels(tmp_path):
+    write(tmp_path, "inlined_kernel")
+    assert asked(tmp_path) == (20.0, 0)
+    assert asked(tmp_path) == (20.0, 1)
+    write(tmp_path, "inlined_kernel", 2)
+    assert asked(tmp_path) == (30.0, 0)
+
+
+@jitted
 def test_a_kernel_on_disk_can_be_called_by_one_that_is_compiled(written):
-    assert answers(written, f"import callee; callee.part(1.0); {ASK}") == ["20.0", "0"]
+    assert asked(written, CALLED) == (2.0, 1)
+    assert asked(written) == (20.0, 0)
+    assert asked(written) == (20.0, 1)
 
 
+@jitted
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="needs owners and modes of files")
 @pytest.mark.parametrize(
     ("inside", "mode", "used"), [(True, 0o777, False), (False, 0o777, False), (False, 0o1777, True)]
 )
-def test_a_cache_that_others_may_write_to_is_not_used(written, inside, mode, used):
+def test_a_cache_that_others_may_write_to_is_not_used(written, inside, mode, used, caplog):
     """What lies in a cache is run: somebody else could have put it there. A sticky folder keeps the names of each owner."""
-    cache = written / "cache"
-    for folder in (path for path in cache.rglob("*") if path.is_dir()) if inside else [cache]:
-        folder.chmod(mode)
-    question = (
-        f"import logging; logging.basicConfig(level=20); {ASK.replace('caller', 'callee').replace('whole', 'part')}"
-    )
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache), "NUMBA_DISABLE_JIT": "0"}
-    done = subprocess.run(
-        [sys.executable, "-c", question], capture_output=True, text=True, check=True, env=environment, cwd=written
-    )
-    assert done.stdout.split() == ["2.0", "1" if used else "0"]
-    assert ("others may write to the folder of compiled kernels" in done.stderr) != used
+    folder = written / "cache"
+    for path in (path for path in folder.rglob("*") if path.is_dir()) if inside else [folder]:
+        path.chmod(mode)
+    with caplog.at_level(logging.INFO, "fastcontact"):
+        assert asked(written, CALLED) == (2.0, int(used))
+    assert ("others may write to the folder of compiled kernels" in caplog.text) != used
 
 
-@pytest.mark.parametrize("option", ["NUMBA_OPT", "NUMBA_BOUNDSCHECK"])
+@jitted
+@pytest.mark.parametrize("option", ["OPT", "BOUNDSCHECK"])
 def test_the_cache_notices_how_kernels_are_compiled(written, option, monkeypatch):
-    monkeypatch.setenv(option, "1")
-    ask = ASK.replace("caller", "callee").replace("whole", "part")
-    assert answers(written, ask) == ["2.0", "0"]
-    assert answers(written, ask) == ["2.0", "1"]
+    monkeypatch.setattr(numba.config, option, 1)
+    assert asked(written, CALLED) == (2.0, 0)
+    assert asked(written, CALLED) == (2.0, 1)
 
 
+@jitted
 def test_the_cache_notices_a_constant_of_another_file(tmp_path):
-    (tmp_path / "caller.py").write_text("from constants import NUMBER\n" + CALLER.replace("10.0 *", "NUMBER *"))
-    (tmp_path / "callee.py").write_text(CALLEE.format(decorator="kernel", number=1))
+    write(tmp_path, caller="from constants import NUMBER\n" + CALLER.replace("10.0 *", "NUMBER *"))
     for number in (3.0, 5.0):
         (tmp_path / "constants.py").write_text(f"NUMBER = {number}\n")
-        assert answers(tmp_path, ASK) == [str(2 * number), "0"]
-
-
-def test_kernels_outlive_an_installation(written):
-    """Of the same sources in another folder, written at another time."""
-    again = written / "again"
-    again.mkdir()
-    for name in ("caller.py", "callee.py"):
-        (again / name).write_text((written / name).read_text())
-    os.replace(written / "cache", again / "cache")
-    assert answers(again, "import callee; print(callee.part(1.0), sum(callee.part.stats.cache_hits.values()))") == [
-        "2.0",
-        "1",
-    ]
+        assert asked(tmp_path) == (2 * number, 0)
 
 
 HARM = {
@@ -115,23 +143,16 @@ HARM = {
 }
 
 
+@jitted
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="needs owners and modes of files")
 @pytest.mark.parametrize("harm", HARM)
-def test_a_file_that_is_damaged_or_of_others_costs_a_compilation_and_a_line(written, harm):
+def test_a_file_that_is_damaged_or_of_others_costs_a_compilation_and_a_line(written, harm, caplog):
     (path,) = (written / "cache").rglob("*.nbc")
     HARM[harm](path)
-    question = (
-        "import logging, sys; logging.basicConfig(level=20, stream=sys.stderr); import callee; print(callee.part(1.0))"
-    )
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(written / "cache"), "NUMBA_DISABLE_JIT": "0"}
-    done = subprocess.run(
-        [sys.executable, "-c", question], capture_output=True, text=True, check=True, env=environment, cwd=written
-    )
-    assert done.stdout == "2.0\n"
-    assert sum("compiling instead" in line for line in done.stderr.splitlines()) == 1 + (harm == "a folder"), (
-        done.stderr
-    )
-    assert str(path.parent) in done.stderr
+    with caplog.at_level(logging.INFO, "fastcontact"):
+        assert asked(written, CALLED) == (2.0, 0)
+    told = [line for line in caplog.messages if "compiling instead" in line]
+    assert len(told) == 1 + (harm == "a folder"), told
+    assert str(path.parent) in told[0]
     if harm != "a folder":
-        ask = ASK.replace("caller", "callee").replace("whole", "part")
-        assert answers(written, ask) == ["2.0", "1"]
+        assert asked(written, CALLED) == (2.0, 1)

@@ -25,18 +25,12 @@ print(hashlib.sha256(axes.tobytes()).hexdigest(), sum(planes.stats.cache_hits.va
 """
 
 
-@pytest.mark.parametrize("threads", ["1", "2"])
-def test_the_process_that_compiles_has_the_bits_of_the_others(tmp_path, threads):
-    environment = {
-        **os.environ,
-        "NUMBA_CACHE_DIR": str(tmp_path),
-        "NUMBA_NUM_THREADS": threads,
-        "NUMBA_DISABLE_JIT": "0",
-    }
+def test_the_process_that_compiles_has_the_bits_of_another_of_fewer_threads(tmp_path):
     answers = []
-    for _ in range(2):
+    for threads in "21":
+        environment = {"NUMBA_CACHE_DIR": str(tmp_path), "NUMBA_NUM_THREADS": threads, "NUMBA_DISABLE_JIT": "0"}
         done = subprocess.run(
-            [sys.executable, "-c", ASK], capture_output=True, text=True, check=True, env=environment, timeout=300
+            [sys.executable, "-c", ASK], capture_output=True, text=True, check=True, env=os.environ | environment
         )
         answers.append(done.stdout.split())
     assert [hits for _, hits in answers] == ["0", "1"]

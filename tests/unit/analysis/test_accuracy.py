@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from models import elastic_model
 from stepping import Stepping
 
 import fastcontact as fc
@@ -137,8 +138,7 @@ def test_a_stiff_body_that_moves_until_it_just_touches(solver, kinematics):
 @pytest.mark.parametrize("solver", ["direct", "amg", "pyamg"])
 def test_bodies_that_only_move_have_no_forces_to_balance(solver):
     model = stacked(friction=0.0, dim=2, unit="N-m")
-    moved = fc.Model(model.mesh, "plane_strain")
-    moved.add_material(fc.LinearElastic(2e11, 0.3))
+    moved = elastic_model(model.mesh, "plane_strain", E=2e11)
     for group in ("L_BOTTOM", "U_TOP"):
         moved.prescribe(group, x=1.0, y=2.0)
     step = solved(moved, solver)
@@ -197,9 +197,7 @@ def test_a_lowered_tolerance_is_remembered():
 @pytest.mark.parametrize("criteria", [{"geometry": 1e-2}, {"relative": 1e-2}])
 def test_what_loose_criteria_leave_is_told_with_its_number(criteria):
     mesh = fc.generate.half_spheres("tri3", size=5.0)
-    model = fc.Model(mesh, "axisymmetric")
-    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
-    model.fix("A1A2", "x")
+    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x")
     model.prescribe("A2B2", y=-2.0)
     model.prescribe("A1B1", y=+2.0)
     model.add_contact("hertz", secondary="CONT1", primary="CONT2")

@@ -5,7 +5,7 @@ import pytest
 
 import fastcontact as fc
 
-pytestmark = [pytest.mark.pairwise, pytest.mark.filterwarnings("ignore:.*raise its penalty")]
+pytestmark = [pytest.mark.each_value, pytest.mark.filterwarnings("ignore:.*raise its penalty")]
 CUTS = {1: (-9.0, 9.0), 2: (-9.0, 0.6, 9.0), 3: (-9.0, 0.4, 0.8, 9.0)}
 PENALTIES = {"none": {}, "normal": {"penalty": 1e5}, "tangential": {"tangential_penalty": 1e5}}
 PENALTIES["both"] = PENALTIES["normal"] | PENALTIES["tangential"]

@@ -4,6 +4,7 @@ import logging
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 
@@ -24,9 +25,7 @@ def pressed(pairs, element="hex8", **options):
     bottom = mesh.cell_groups["UZMIN"]
     left = np.intersect1d(bottom, mesh.cell_groups["LEFT"])
     groups = {**mesh.cell_groups, "LEFT": left, "RIGHT": np.setdiff1d(bottom, left)}
-    model = fc.Model(mesh.replace(cell_groups=groups), "3d")
-    model.add_material(fc.LinearElastic(1000.0, 0.3))
-    model.fix("LZMIN", "xyz")
+    model = elastic_model(mesh.replace(cell_groups=groups), "3d", LZMIN="xyz")
     model.prescribe("UZMAX", x=0.004, y=0.0, z=-0.01)
     clearances = options.pop("clearances", (0.0, 0.0))
     for name, clearance in zip(["LEFT", "RIGHT"] if pairs == 2 else ["UZMIN"], clearances, strict=False):
@@ -109,10 +108,7 @@ def beside_a_third_body(formulation):
     """The two blocks, and a third one that the upper block touches with part of a side."""
     third = fc.generate.box((0.4, 0.4, 0.3), (2, 2, 2), "hex8", (0.3, 1.0, 0.1), name="THIRD")
     third = fc.generate.renamed(third, {name: f"T{name}" for name in third.group_names if len(name) == 4})
-    model = fc.Model(fc.generate.union(pressed(2).mesh, third), "3d")
-    model.add_material(fc.LinearElastic(1000.0, 0.3))
-    model.fix("LZMIN", "xyz")
-    model.fix("TYMAX", "xyz")
+    model = elastic_model(fc.generate.union(pressed(2).mesh, third), "3d", LZMIN="xyz", TYMAX="xyz")
     model.prescribe("UZMAX", x=0.004, y=0.0, z=-0.01)
     for name in ("LEFT", "RIGHT"):
         model.add_contact(name, secondary=name, primary="LZMAX", formulation="node_to_segment", normals="facet")

@@ -4,6 +4,7 @@ import logging
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.analysis.scatter import SHORT_WINDOW, WINDOW, Watch
@@ -66,9 +67,7 @@ def test_what_matters_is_not_let_pass(level, force):
 def side_by_side(element="tri6", unit=(1000.0, 1.0), **options):
     mesh = fc.generate.block_on_block(element, divisions_lower=(3, 3), divisions_upper=(3, 2), shift=3.26)
     mesh = fc.Mesh(mesh.points * unit[1], mesh.cells, mesh.cell_groups, mesh.point_groups)
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(unit[0], 0.3))
-    model.fix("LOWER_BOTTOM", "xy")
+    model = elastic_model(mesh, "plane_strain", E=unit[0], LOWER_BOTTOM="xy")
     model.prescribe("UPPER_TOP", x=0.0, y=-0.05 * unit[1])
     options = {"formulation": "mortar", "kind": "bilateral", **options}
     model.add_contact("c", secondary="CONT_UPPER", primary="CONT_LOWER", **options)
@@ -95,10 +94,7 @@ def slender():
             for m, letter in ((low, "L_"), (up, "U_"))
         )
     )
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(1e3, 0.3))
-    model.fix("L_BOTTOM", "xy")
-    model.fix("U_LEFT", "x")
+    model = elastic_model(mesh, "plane_strain", L_BOTTOM="xy", U_LEFT="x")
     model.add_body_force(["U_BLOCK"], y=-1e-3)
     model.add_contact("c", secondary="U_BOTTOM", primary="L_TOP")
     return model

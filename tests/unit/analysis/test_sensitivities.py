@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 
@@ -30,25 +31,22 @@ def measured(model: fc.Model, step: fc.StepResult, quantity: tuple, node: int) -
     return float(step.contact[place].pressure[node])
 
 
-def compare(make: Make, quantity: tuple, changes: Changes, *, within: float = 1e-6, **options) -> fc.Sensitivities:
-    """Compare sensitivities with differences of fourth order, each of four solutions."""
+def compare(make: Make, quantities: list[tuple], changes: Changes, *, within: float = 1e-6, **options):
+    """Compare sensitivities with differences of fourth order, each of four solutions; return those of the last quantity."""
     model, solve = make(), {"criteria": TIGHT, **options}
     step = fc.solve(model, 1, **solve)[-1]
-    found = fc.sensitivities(model, step, quantity, [own for own, _, _ in changes.values()], ramp=1, **solve)
-    node = 0
-    if quantity[0].startswith("pressure"):
-        contact = step.contact[quantity[1]]
-        node = int(
-            contact.pressure.argmax() if len(quantity) == 2 else np.flatnonzero(contact.points == quantity[2])[0]
-        )
-    assert found.value == pytest.approx(measured(model, step, quantity, node), rel=1e-9)
-    for name, (parameter, at, by) in changes.items():
-        values = []
-        for place in (-2, -1, 1, 2):
-            other = make(**{name: at + place * by})
-            values.append(measured(other, fc.solve(other, 1, **solve)[-1], quantity, node))
-        difference = (8.0 * (values[2] - values[1]) - (values[3] - values[0])) / (12.0 * by)
-        assert found.derivatives[parameter] == pytest.approx(difference, rel=within), (quantity, parameter)
+    moved = {}
+    for name, (_, at, by) in changes.items():
+        others = [make(**{name: at + place * by}) for place in (-2, -1, 1, 2)]
+        moved[name] = [(other, fc.solve(other, 1, **solve)[-1]) for other in others]
+    for quantity in quantities:
+        found = fc.sensitivities(model, step, quantity, [own for own, _, _ in changes.values()], ramp=1, **solve)
+        node = step.contact[quantity[1]].pressure.argmax() if quantity[0] == "pressure_max" else 0
+        assert found.value == pytest.approx(measured(model, step, quantity, node), rel=1e-9)
+        for name, (parameter, _, by) in changes.items():
+            values = [measured(other, last, quantity, node) for other, last in moved[name]]
+            difference = (8.0 * (values[2] - values[1]) - (values[3] - values[0])) / (12.0 * by)
+            assert found.derivatives[parameter] == pytest.approx(difference, rel=within), (quantity, parameter)
     return found
 
 
@@ -80,16 +78,17 @@ def two_blocks(element: str = "quad4", kinematics: str = "plane_strain", press: 
     return make
 
 
-MOVED: Changes = {**STEEL, "moved": (("prescribed", "UPPER_TOP", "y"), 1.0, 1e-4)}
+# Poisson's ratio enters as Young's modulus does: it is tried where bodies are held otherwise, below.
+MOVED: Changes = {"E": STEEL["E"], "moved": (("prescribed", "UPPER_TOP", "y"), 1.0, 1e-4)}
 CLEAR = (("clearance", "c"), 0.0, 1e-5)
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("element", ["quad4", "tri6"])
 @pytest.mark.parametrize("formulation", ["node_to_segment", "continuous", "mortar"])
 def test_every_formulation_between_bodies(formulation, element):
     make = two_blocks(element, formulation=formulation, **({"multipliers": "dual"} if formulation == "mortar" else {}))
-    compare(make, ("contact_force", "c", "y"), {**MOVED, "clearance": CLEAR})
-    found = compare(make, ("pressure_max", "c"), {**MOVED, "clearance": CLEAR})
+    found = compare(make, [("contact_force", "c", "y"), ("pressure_max", "c")], {**MOVED, "clearance": CLEAR})
     assert 1 < found.solutions < 20  # the geometry moves
 
 
@@ -111,8 +110,7 @@ def test_axisymmetric_spheres():
         "nu": (("nu", "SPHHAU"), 0.3, 3e-5),
         "moved": (("prescribed", "A2B2"), 1.0, 1e-4),
     }
-    for quantity in (("reaction", "A2B2", "y"), ("pressure_max", "hertz")):
-        compare(make, quantity, changes)
+    compare(make, [("reaction", "A2B2", "y"), ("pressure_max", "hertz")], changes)
 
 
 @pytest.mark.parametrize("solver", ["direct", "amg"])
@@ -132,9 +130,10 @@ def test_in_space_with_factors_and_with_a_hierarchy(solver):
         model.add_contact("c", secondary="UZMIN", primary="LZMAX", clearance=clearance)
         return model
 
-    changes = {**STEEL, "moved": (("prescribed", "UZMAX", "z"), 1.0, 1e-4), "clearance": CLEAR}
-    compare(make, ("contact_force", "c", "z"), changes, linear_solver=solver)
-    compare(make, ("pressure_max", "c"), changes, linear_solver=solver)
+    changes = {"nu": STEEL["nu"], "moved": (("prescribed", "UZMAX", "z"), 1.0, 1e-4)}
+    if solver == "direct":
+        changes["clearance"] = CLEAR
+    compare(make, [("contact_force", "c", "z"), ("pressure_max", "c")], changes, linear_solver=solver)
 
 
 def test_points_that_are_moved_together_give_what_each_gives_alone(monkeypatch):
@@ -158,26 +157,26 @@ def test_bodies_held_by_contact_alone():
     loaded = {**STEEL, "load": (("load", "UPPER_TOP"), 1.0, 1e-4)}
     make = two_blocks(press=True)
     corner = int(make().mesh.points_of("UPPER_TOP_RIGHT")[0])
-    compare(make, ("pressure_max", "c"), loaded)
-    compare(make, ("displacement", corner, "y"), {**loaded, "clearance": CLEAR})
+    compare(make, [("pressure_max", "c"), ("displacement", corner, "y")], {**loaded, "clearance": CLEAR})
 
 
 @pytest.mark.filterwarnings("ignore:contact 'c' penetrates by")
 @pytest.mark.parametrize("options", [{"kind": "tied"}, {"kind": "bilateral"}, {"penalty": 1e5}], ids=str)
 def test_other_kinds_of_contact(options):
-    compare(two_blocks(**options), ("reaction", "UPPER_TOP", "y"), MOVED)
-    compare(two_blocks("tri6", "plane_stress", **options), ("contact_force", "c", "y"), MOVED)
+    compare(two_blocks(**options), [("reaction", "UPPER_TOP", "y")], MOVED)
+    compare(two_blocks("tri6", "plane_stress", **options), [("contact_force", "c", "y")], MOVED)
 
 
 def test_pairing_that_is_kept_takes_one_solution():
     criteria = fc.Criteria(relative=1e-10, keep_pairing=True)
-    found = compare(two_blocks(), ("pressure_max", "c"), MOVED, criteria=criteria)
+    found = compare(two_blocks(), [("pressure_max", "c")], MOVED, criteria=criteria)
     assert found.solutions == 1
-    moving = compare(two_blocks(), ("pressure_max", "c"), MOVED)
     by = ("prescribed", "UPPER_TOP", "y")
+    moving = asked(two_blocks()(), parameters=[by])
     assert abs(found.derivatives[by] / moving.derivatives[by] - 1.0) > 1e-3  # what the moving geometry makes
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
 @pytest.mark.parametrize("kinematics", ["plane_strain", "axisymmetric", "3d"])
 def test_rigid_obstacles_that_are_moved_and_pushed(kinematics, formulation):
@@ -187,25 +186,24 @@ def test_rigid_obstacles_that_are_moved_and_pushed(kinematics, formulation):
     centre = {"plane_strain": (4.3, 13.0), "axisymmetric": (0.0, 13.0), "3d": (3.3, 4.1, 13.0)}[kinematics]
 
     def make(pushed=False, E=1000.0, nu=0.3, motion=1.0, force=1.0):
-        model = fc.Model(mesh, kinematics=kinematics)
-        model.add_material(fc.LinearElastic(E=E, nu=nu))
+        model = elastic_model(mesh, kinematics, E=E, nu=nu)
         model.fix(bottom, "xyz"[:dim])
         driving = {"force": {up: -60.0 * force}} if pushed else {"motion": {up: -0.3 * motion}}
         ball = fc.obstacles.Sphere(centre=centre, R=8.0)
         model.add_obstacle("ball", secondary=top, obstacle=ball, formulation=formulation, **driving)
         return model
 
-    moved = {**STEEL, "motion": (("motion", "ball"), 1.0, 1e-6)}
-    compare(make, ("contact_force", "ball", up), moved)
+    moved = {"nu": STEEL["nu"], "motion": (("motion", "ball"), 1.0, 1e-6)}
+    compare(make, [("contact_force", "ball", up)], moved)
 
     def pushed(**changes):
         return make(True, **changes)
 
-    compare(pushed, ("pressure_max", "ball"), {**STEEL, "force": (("load", "ball"), 1.0, 1e-5)}, within=2e-6)
+    compare(pushed, [("pressure_max", "ball")], {"E": STEEL["E"], "force": (("load", "ball"), 1.0, 1e-5)}, within=2e-6)
 
 
 def test_heat_normals_and_loads_by_volume():
-    mesh = fc.generate.rings("quad8", divisions_inner=(3, 7), divisions_outer=(3, 9))
+    mesh = fc.generate.rings("quad8", divisions_inner=(2, 5), divisions_outer=(2, 6))
 
     def make(E=2e5, nu=0.3, moved=1.0, expansion=1e-5, warm=1.0, speed=300.0, weight=1.0, pulled=1.0):
         model = fc.Model(mesh, kinematics="plane_strain")
@@ -218,7 +216,7 @@ def test_heat_normals_and_loads_by_volume():
         model.add_gravity(y=-9810.0 * weight)
         model.add_body_force("OUTER", x=1e-3 * pulled)
         model.prescribe("BORE", normal=-0.01 * moved)
-        model.add_contact("c", secondary="CONT_INNER", primary="CONT_OUTER", clearance=-0.02)
+        model.add_contact("c", secondary="CONT_INNER", primary="CONT_OUTER", clearance=-0.02, formulation="continuous")
         return model
 
     changes = {
@@ -236,7 +234,7 @@ def test_heat_normals_and_loads_by_volume():
     for group, load in zip(("INNER", "OUTER"), whole, strict=True):  # force goes with the square of the speed
         assert 300.0 * found["speed", group] == pytest.approx(2.0 * found[load], rel=1e-9)
     del changes["pulled"]
-    compare(make, ("pressure_max", "c"), changes)
+    compare(make, [("pressure_max", "c")], changes)
 
     def turned(speed=300.0, pulled=1.0):
         made = make(speed=speed, pulled=pulled)
@@ -244,7 +242,7 @@ def test_heat_normals_and_loads_by_volume():
         return made
 
     by_factor = {"speed": (("speed", "all solid cells"), 300.0, 3.0), "pulled": (("load", "OUTER"), 1.0, 1.0)}
-    compare(turned, ("pressure_max", "c"), by_factor)
+    compare(turned, [("pressure_max", "c")], by_factor)
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -272,7 +270,7 @@ def test_constants_along_the_axes_of_a_material(dim):
         "G12": (("G", 0, "12"), 600.0, 0.6),
         "expansion": (("expansion", 0, "2"), 2e-4, 1e-5),
     } | ({"G13": (("G", 0, "13"), 500.0, 0.5)} if dim == 3 else {})
-    compare(make, ("contact_force", "c", "xyz"[dim - 1]), changes)
+    compare(make, [("contact_force", "c", "xyz"[dim - 1])], changes)
 
 
 @pytest.mark.parametrize("given", ["force", "shortening"])
@@ -283,15 +281,12 @@ def test_pretension(given):
     mesh = fc.generate.cut(mesh, "CUT")
 
     def make(E=1000.0, pulled=1.0):
-        model = fc.Model(mesh, "plane_stress")
-        model.add_material(fc.LinearElastic(E=E, nu=0.3))
-        model.fix("BOTTOM", "xy")
-        model.fix("TOP", "xy")
+        model = elastic_model(mesh, "plane_stress", E=E, BOTTOM="xy", TOP="xy")
         model.add_pretension("bolt", "CUT", **{given: {"force": 3.0, "shortening": 0.01}[given] * pulled})
         return model
 
     compare(
-        make, ("reaction", "TOP", "y"), {"E": (("E", 0), 1000.0, 1.0), "pulled": (("pretension", "bolt"), 1.0, 0.1)}
+        make, [("reaction", "TOP", "y")], {"E": (("E", 0), 1000.0, 1.0), "pulled": (("pretension", "bolt"), 1.0, 0.1)}
     )
 
 
@@ -300,56 +295,47 @@ def asked(model: fc.Model, quantity=("pressure_max", "c"), parameters=(("E", 0),
     return fc.sensitivities(model, step, quantity, parameters, ramp=1, criteria=criteria, **options)
 
 
-@pytest.mark.parametrize(
-    ("quantity", "text"),
-    [
-        (("presure", "c"), "unknown quantity 'presure': did you mean 'pressure'"),
-        (("pressure_max", "d"), "unknown contact pair 'd'"),
-        (("pressure_max",), r"must have the form \(\"pressure_max\", pair\)"),
-        (("pressure", "c", 0), "point 0 is no node of the secondary side of contact 'c'"),
-        (("displacement", 10**6, "y"), "point 1000000 is not in the mesh of"),
-        (("displacement", 0, "w"), "unknown component"),
-        (("reaction", "CONT_UPPER", "x"), "no support acts along x on group 'CONT_UPPER'"),
-    ],
-)
-def test_quantities_that_are_none(quantity, text):
-    with pytest.raises(fc.ModelError, match=text):
-        asked(two_blocks()(), quantity)
+NO_QUANTITIES = [
+    (("presure", "c"), "unknown quantity 'presure': did you mean 'pressure'"),
+    (("pressure_max", "d"), "unknown contact pair 'd'"),
+    (("pressure_max",), r"must have the form \(\"pressure_max\", pair\)"),
+    (("pressure", "c", 0), "point 0 is no node of the secondary side of contact 'c'"),
+    (("displacement", 10**6, "y"), "point 1000000 is not in the mesh of"),
+    (("displacement", 0, "w"), "unknown component"),
+    (("reaction", "CONT_UPPER", "x"), "no support acts along x on group 'CONT_UPPER'"),
+]
+NO_PARAMETERS = [
+    (("g", 0), "unknown parameter 'g'"),
+    (("G", 0, "12"), "the material 0 has no G, or one that varies: there is no sensitivity by that"),
+    (("E", 0, "1"), "unknown component of E '1': there is none here"),
+    (("friction", "c"), "no sensitivity by friction: where all sticks"),
+    (("speed", "UPPER"), "unknown group with a centrifugal force 'UPPER': there is none here"),
+    (("temperature", "UPPER"), "unknown group with a temperature 'UPPER'"),
+    (("pretension", "bolt"), "unknown pretension 'bolt'"),
+    (("E",), r"must have the form \(\"E\", material\)"),
+    (("E", "STEEL"), "unknown material 'STEEL'"),
+    (("load", "UPPER_TOP"), "unknown group with a load, or obstacle with a force, 'UPPER_TOP'"),
+    (("prescribed", "UPPER_LEFT"), "unknown group whose displacement is prescribed 'UPPER_LEFT'"),
+    (("motion", "c"), "unknown rigid obstacle with a motion 'c'"),
+    (("clearance", "d"), "unknown contact pair 'd'"),
+]
+# What depends on the path, or keeps its gaps.
+NO_SUCH_CONTACT = [
+    ({"friction": 0.2}, "contact 'c' has friction: its results depend on all load steps"),
+    ({"kind": "bilateral_once_closed"}, "never opens what was closed in earlier load steps"),
+]
 
 
-@pytest.mark.parametrize(
-    ("parameter", "text"),
-    [
-        (("g", 0), "unknown parameter 'g'"),
-        (("G", 0, "12"), "the material 0 has no G, or one that varies: there is no sensitivity by that"),
-        (("E", 0, "1"), "unknown component of E '1': there is none here"),
-        (("friction", "c"), "no sensitivity by friction: where all sticks"),
-        (("speed", "UPPER"), "unknown group with a centrifugal force 'UPPER': there is none here"),
-        (("temperature", "UPPER"), "unknown group with a temperature 'UPPER'"),
-        (("pretension", "bolt"), "unknown pretension 'bolt'"),
-        (("E",), r"must have the form \(\"E\", material\)"),
-        (("E", "STEEL"), "unknown material 'STEEL'"),
-        (("load", "UPPER_TOP"), "unknown group with a load, or obstacle with a force, 'UPPER_TOP'"),
-        (("prescribed", "UPPER_LEFT"), "unknown group whose displacement is prescribed 'UPPER_LEFT'"),
-        (("motion", "c"), "unknown rigid obstacle with a motion 'c'"),
-        (("clearance", "d"), "unknown contact pair 'd'"),
-    ],
-)
-def test_parameters_that_are_none(parameter, text):
-    with pytest.raises(fc.ModelError, match=text):
-        asked(two_blocks()(), parameters=[parameter])
-
-
-@pytest.mark.parametrize(
-    ("options", "text"),
-    [
-        ({"friction": 0.2}, "contact 'c' has friction: its results depend on all load steps"),
-        ({"kind": "bilateral_once_closed"}, "never opens what was closed in earlier load steps"),
-    ],
-)
-def test_what_depends_on_the_path_is_refused(options, text):
-    with pytest.raises(fc.ModelError, match=text):
-        asked(two_blocks(**options)())
+def test_what_has_no_sensitivity_is_named():
+    model = two_blocks()()
+    step = fc.solve(model, 1, criteria=TIGHT)[-1]
+    tried = [(quantity, [("E", 0)], text) for quantity, text in NO_QUANTITIES]
+    for quantity, by, text in [*tried, *((("pressure_max", "c"), [name], text) for name, text in NO_PARAMETERS)]:
+        with pytest.raises(fc.ModelError, match=text):
+            fc.sensitivities(model, step, quantity, by, ramp=1, criteria=TIGHT)
+    for options, text in NO_SUCH_CONTACT:
+        with pytest.raises(fc.ModelError, match=text):
+            asked(two_blocks(**options)())
 
 
 def test_other_refusals():
@@ -374,8 +360,7 @@ def test_a_constraint_about_to_change_is_named():
     mesh = fc.generate.block((4.0, 1.0), (4, 1))
 
     def model(depth):
-        made = fc.Model(mesh, kinematics="plane_strain")
-        made.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+        made = elastic_model(mesh, "plane_strain", nu=0.0)
         made.prescribe("TOP", x=0.0, y=lambda x: np.where(x[:, 0] < 3.5, -0.01, depth))
         plane = fc.obstacles.HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
         made.add_obstacle("plane", secondary="BOTTOM", obstacle=plane, formulation="node_to_segment")
@@ -384,7 +369,7 @@ def test_a_constraint_about_to_change_is_named():
     whole = fc.solve(model(-0.01), 1)[-1].contact["plane"]
     assert whole.active.all()
     low, high = 0.0, 0.1  # where the last node lifts off
-    for _ in range(60):
+    for _ in range(36):
         middle = 0.5 * (low + high)
         closed = fc.solve(model(middle), 1)[-1].contact["plane"].active.all()
         low, high = (middle, high) if closed else (low, middle)
@@ -425,8 +410,7 @@ def test_bolts_before_and_after_their_lock():
         "CUT", lambda x: np.abs(x[:, 1] - 1.0) < 1e-9, between=True
     )
     mesh = fc.generate.cut(mesh, "CUT")
-    model = fc.Model(mesh, "plane_stress")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    model = elastic_model(mesh, "plane_stress", nu=0.0)
     for end in ("BOTTOM", "TOP"):
         model.fix(end, "xy")
     model.add_pretension("bolt", "CUT", force=3.0, locked_from=1.0, ramp=[(0.0, 0.0), (1.0, 1.0), (2.0, 1.0)])
@@ -445,9 +429,7 @@ def test_quantities_that_cannot_be_told():
     with pytest.raises(fc.ModelError, match="reactions of a model with springs"):
         asked(springy, ("reaction", "UPPER_TOP", "y"))
     mesh = fc.generate.block((10.0, 5.0), (8, 4))
-    model = fc.Model(mesh, kinematics="axisymmetric")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("BOTTOM", "xy")
+    model = elastic_model(mesh, "axisymmetric", BOTTOM="xy")
     ball = fc.obstacles.Sphere(centre=(0.0, 13.0), R=8.0)
     model.add_obstacle("ball", secondary="TOP", obstacle=ball, motion={"y": -0.3}, formulation="node_to_segment")
     rim = int(mesh.points_of("TOP_RIGHT")[0])
@@ -462,8 +444,7 @@ def test_quantities_that_cannot_be_told():
 
 def test_nodes_of_two_pairs_are_named():
     mesh = fc.generate.block((10.0, 5.0), (8, 4))
-    model = fc.Model(mesh, kinematics="plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model = elastic_model(mesh, "plane_strain")
     model.prescribe("RIGHT", x=-0.05, y=0.0)
     for name, side, normal in (("floor", "BOTTOM", (0.0, 1.0)), ("wall", "LEFT", (1.0, 0.0))):
         plane = fc.obstacles.HalfSpace(point=(0.0, 0.0), normal=normal)

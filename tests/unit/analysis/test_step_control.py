@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from models import elastic_model
 from stepping import Stepping
 
 import fastcontact as fc
@@ -18,9 +19,7 @@ FEW = 6  # geometry updates: too few for the whole load, enough for a part of it
 
 def spheres(friction=0.3, **options):
     mesh = fc.generate.half_spheres("quad4", arc_sizes=(3.0, 6.0), segments=3)
-    model = fc.Model(mesh, "axisymmetric")
-    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
-    model.fix("A1A2", "x")
+    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x")
     model.prescribe("A2B2", y=-2.0)
     model.prescribe("A1B1", y=+2.0)
     options = {"formulation": "node_to_segment", "friction": friction, **options}
@@ -120,9 +119,7 @@ def test_the_remedy_follows_from_how_the_geometry_moves(changes, words, enough):
 
 
 def driven(**options):
-    model = fc.Model(block((2.0, 1.0), (16, 8), "quad4", origin=(-1.0, -1.0)), "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("BOTTOM", "xy")
+    model = elastic_model(block((2.0, 1.0), (16, 8), "quad4", origin=(-1.0, -1.0)), "plane_strain", BOTTOM="xy")
     ball = fc.obstacles.Sphere((0.0, 3.0), 3.0)
     model.add_obstacle("ball", secondary="TOP", obstacle=ball, friction=0.2, **options)
     return model
@@ -130,10 +127,7 @@ def driven(**options):
 
 def floating():
     mesh = fc.generate.half_spheres("quad4", arc_sizes=(3.0, 6.0), segments=3)
-    model = fc.Model(mesh, "axisymmetric")
-    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
-    model.fix("A1A2", "x")
-    model.fix("A1B1", "y")
+    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x", A1B1="y")
     model.add_force("A2B2", y=-3e5)
     model.couple("A2B2", "y")
     model.add_contact("hertz", secondary="CONT1", primary="CONT2")

@@ -45,7 +45,7 @@ def test_pressure_carries_the_force_and_vanishes_at_the_edge(ratio, load):
     assert edge[1] / edge[0] == pytest.approx(2.0, rel=1e-2)  # grows with the root of the distance
 
 
-@pytest.mark.parametrize(("ratio", "load"), [(0.0, 10.0), (1.0, 0.0), (100.0, 0.0), (100.0, 1.0)])
+@pytest.mark.parametrize(("ratio", "load"), [(0.0, 10.0), (100.0, 1.0)])
 def test_series_is_long_enough(ratio, load, monkeypatch):
     found = layer(ratio, load)
     monkeypatch.setattr(receding, "_TERMS", 160)

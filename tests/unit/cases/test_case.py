@@ -142,16 +142,6 @@ def test_theories_out_of_the_range_of_numbers_are_told(write):
         read_case(write(GOOD.replace("approach = 4.0", "approach = 1e300")))
 
 
-def test_a_missing_file_is_told(tmp_path):
-    with pytest.raises(fc.CaseError, match=r"does not exist"):
-        read_case(tmp_path / "none.toml")
-
-
-def test_a_wrong_group_is_a_mesh_error(write):
-    with pytest.raises(fc.MeshError, match=r"'A1A3'"):
-        read_case(write(GOOD.replace('"A1A2"', '"A1A3"')))
-
-
 def test_a_table_alone_sets_the_end_of_the_ramp(write):
     case = read_case(write(GOOD.replace("steps = 2", "steps = 4\ntable = [[0.0, 0.0], [2.0, 1.0]]")))
     assert case.ramp.instants == (0.5, 1.0, 1.5, 2.0)

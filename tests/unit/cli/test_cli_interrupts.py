@@ -251,8 +251,20 @@ WHEN = {
 }
 
 
-@pytest.mark.parametrize("when", [*list(WHEN)[:3], pytest.param(list(WHEN)[3], marks=pytest.mark.slow)])
-@pytest.mark.parametrize("command", COMMANDS)
+# By default every command when NumPy is imported, and one each later on; studies start workers of their own.
+BY_DEFAULT = [
+    ("run", "a kernel is compiled"),
+    ("sweep", "a kernel is compiled"),
+    ("converge", "the compiler is loaded"),
+]
+INTERRUPTED = [
+    pytest.param(command, when, marks=() if "NumPy" in when or (command, when) in BY_DEFAULT else pytest.mark.slow)
+    for command in COMMANDS
+    for when in WHEN
+]
+
+
+@pytest.mark.parametrize(("command", "when"), INTERRUPTED)
 def test_no_traceback_is_printed(command, when, tmp_path):
     """A terminal sends the signal to all processes of a command; here as soon as something is seen to happen."""
     if "compiled" not in when and not os.path.exists("/proc/self/maps"):
@@ -276,7 +288,7 @@ def test_no_traceback_is_printed(command, when, tmp_path):
     )
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [pytest.param(signal.SIGINT, marks=pytest.mark.slow), signal.SIGTERM])
 def test_no_half_written_file_stays(number, solved_case, tmp_path):
     """Two signals come while a picture is written to a file that is to take the place of another."""
     (tmp_path / "out.png").write_bytes(b"before")

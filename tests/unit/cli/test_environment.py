@@ -38,18 +38,19 @@ def test_a_working_folder_that_is_gone(tmp_path):
 
 
 def test_an_unknown_backend_and_no_docstrings(tmp_path):
-    """Python without assertions and docstrings solves, and tells a backend of matplotlib that nobody knows."""
+    """Python without assertions and docstrings solves and draws; a backend of matplotlib that nobody knows is told."""
     model = fc.Model(fc.generate.block((1.0, 1.0), (1, 1), "quad4"), "plane_strain")
     fc.write_mesh(tmp_path / "block.med", model.mesh)
     (tmp_path / "case.toml").write_text(CASE, encoding="utf-8")
-    assert run(["run", "case.toml", "-q"], tmp_path, ["-OO"]) == (0, "")
-    code, told = run(["plot", "case.vtkhdf", "--png", "a.png"], tmp_path, ["-OO"], MPLBACKEND="nonsense")
+    both = "import sys; from fastcontact.cli import main; plot = ['plot', 'case.vtkhdf', '--png', 'b.png', '-q']"
+    both += "; sys.exit(main(['run', 'case.toml', '-q']) or main(plot))"
+    assert run([], tmp_path, ["-OO", "-c", both]) == (0, "")
+    code, told = run(["plot", "case.vtkhdf", "--png", "a.png"], tmp_path, MPLBACKEND="nonsense")
     assert code == 1
     assert told == (
         "error: matplotlib does not know the backend 'nonsense' of the environment variable MPLBACKEND: unset it, or set it "
         "to Agg\n"
     )
-    assert run(["plot", "case.vtkhdf", "--png", "a.png", "-q"], tmp_path, ["-OO"]) == (0, "")
 
 
 CASE = """title = "a block"

@@ -4,6 +4,7 @@ import csv
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.analytic.pressure_curve import pressure_curve
@@ -34,8 +35,7 @@ def pressed(x0, facing, half):
     mesh = fc.generate.transformed(mesh if half else whole(mesh), rotate=angle, translate=(x0, -2 * x0))
     centre = np.array([x0, -2 * x0])
     centre["xy".index(axis)] += sign * R
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(E, 0.3))
+    model = elastic_model(mesh, "plane_strain", E=E)
     if half:
         model.fix("SYMMETRY_X", "x" if axis == "y" else "y")
     model.fix(f"{prefix}BOTTOM", "xy" if not half else axis)
@@ -73,10 +73,7 @@ def test_the_middle_of_two_bodies_is_the_same_from_either_side(swapped):
     mesh = fc.generate.transformed(
         fc.generate.cylinder_on_block("quad4", size=8.0, contact_size=0.5), translate=(20.0, 0)
     )
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(1e5, 0.3))
-    model.fix("AXIS", "x")
-    model.fix("BLOCK_BOTTOM", "y")
+    model = elastic_model(mesh, "plane_strain", E=1e5, AXIS="x", BLOCK_BOTTOM="y")
     model.prescribe("CYLINDER_TOP", y=-0.5)
     sides = ["CONT_CYLINDER", "CONT_BLOCK"]
     secondary, primary = reversed(sides) if swapped else sides
@@ -90,10 +87,7 @@ def test_the_middle_of_two_bodies_is_the_same_from_either_side(swapped):
 def rings():
     """Return contact and step of a press fit: a quarter of two rings."""
     mesh = fc.generate.rings("quad8", divisions_inner=(2, 6), divisions_outer=(2, 6))
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(210e3, 0.3))
-    model.fix("SYMMETRY_X", "x")
-    model.fix("SYMMETRY_Y", "y")
+    model = elastic_model(mesh, "plane_strain", E=210e3, SYMMETRY_X="x", SYMMETRY_Y="y")
     model.add_contact("c", secondary="CONT_INNER", primary="CONT_OUTER", clearance=-0.05)
     step = fc.solve(model, fc.linear_ramp(1))[-1]
     return step.contact["c"], step
@@ -129,8 +123,7 @@ def test_in_space_distances_are_from_the_centre_of_pressure_or_the_planes_of_sym
     n = 8 if quarter else 16
     at = np.array([20.0, -5.0, 3.0])
     mesh = fc.generate.box((size, size, 1.0), (n, n, 4), "hex8", (at[0] + low, at[1] + low, at[2] - 1.0))
-    model = fc.Model(mesh, "3d")
-    model.add_material(fc.LinearElastic(E, 0.3))
+    model = elastic_model(mesh, "3d", E=E)
     if quarter:
         model.fix("XMIN", "x")
         model.fix("YMIN", "y")
@@ -148,17 +141,12 @@ def test_in_space_distances_are_from_the_centre_of_pressure_or_the_planes_of_sym
 
 def test_in_axisymmetry_places_are_radii_unless_the_surface_runs_along_the_axis():
     shaft = fc.generate.block((1.0, 2.0), (4, 8), "quad4", (1.0, 5.0), name="SHAFT")
-    model = fc.Model(shaft, "axisymmetric")
-    model.add_material(fc.LinearElastic(E, 0.3))
-    model.fix("LEFT", "x")
-    model.fix("BOTTOM", "y")
+    model = elastic_model(shaft, "axisymmetric", E=E, LEFT="x", BOTTOM="y")
     hub = fc.obstacles.HalfSpace(point=(2.0, 0.0), normal=(-1.0, 0.0))
     model.add_obstacle("c", secondary="RIGHT", obstacle=hub, motion={"x": -0.01})
     contact = fc.solve(model, fc.linear_ramp(1))[-1].contact["c"]
     assert np.ptp(contact.place) == pytest.approx(2.0)
-    ends = fc.Model(shaft, "axisymmetric")
-    ends.add_material(fc.LinearElastic(E, 0.3))
-    ends.fix("BOTTOM", "y")
+    ends = elastic_model(shaft, "axisymmetric", E=E, BOTTOM="y")
     plate = fc.obstacles.HalfSpace(point=(0.0, 7.0), normal=(0.0, -1.0))
     ends.add_obstacle("c", secondary="TOP", obstacle=plate, motion={"y": -0.01})
     contact = fc.solve(ends, fc.linear_ramp(1))[-1].contact["c"]

@@ -4,6 +4,7 @@ import logging
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.mesh.generate import box, renamed, union
@@ -38,9 +39,7 @@ def test_rings_that_match_turn_by_nothing(element, swapped):
         named(fc.generate.merge_points(bent(element, radii, (40, 6), whole), 1e-6), name)
         for name, radii in (("IN", (20.0, 50.0)), ("OUT", (50.0, 100.0)))
     ]
-    model = fc.Model(union(*parts), "plane_strain")
-    model.add_material(fc.LinearElastic(E, NU))
-    model.fix("OUT_TOP", "xy")
+    model = elastic_model(union(*parts), "plane_strain", E=E, nu=NU, OUT_TOP="xy")
     model.prescribe(
         "IN_BOTTOM", x=lambda X: 0.02 * X[:, 0] / np.hypot(*X.T), y=lambda X: 0.02 * X[:, 1] / np.hypot(*X.T)
     )
@@ -86,9 +85,7 @@ def test_what_matches_at_first_is_right_after_sliding(part, swapped):
 @pytest.mark.parametrize("upper", [8, 11])
 def test_a_uniform_pressure_in_the_plane(element, upper, swapped):
     mesh = fc.generate.block_on_block(element, divisions_upper=(upper, 4))
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(E, 0.0))
-    model.fix("LOWER_BOTTOM", "xy")
+    model = elastic_model(mesh, "plane_strain", E=E, nu=0.0, LOWER_BOTTOM="xy")
     model.prescribe("UPPER_TOP", x=0.0, y=-0.1)
     sides = ("CONT_LOWER", "CONT_UPPER") if swapped else ("CONT_UPPER", "CONT_LOWER")
     model.add_contact("pair", secondary=sides[0], primary=sides[1])
@@ -103,9 +100,7 @@ def test_a_uniform_pressure_in_space(element, upper, swapped):
         named(box((1.0, 1.0, 0.5), (n, n, 1), element, (0.0, 0.0, z)), name)
         for name, n, z in (("LOW", 3, -0.5), ("UP", upper, 0.0))
     ]
-    model = fc.Model(union(*parts), "3d")
-    model.add_material(fc.LinearElastic(E, 0.0))
-    model.fix("LOW_ZMIN", "xyz")
+    model = elastic_model(union(*parts), "3d", E=E, nu=0.0, LOW_ZMIN="xyz")
     model.prescribe("UP_ZMAX", x=0.0, y=0.0, z=-0.01)
     sides = ("LOW_ZMAX", "UP_ZMIN") if swapped else ("UP_ZMIN", "LOW_ZMAX")
     model.add_contact("pair", secondary=sides[0], primary=sides[1])
@@ -117,9 +112,7 @@ def test_sides_that_mix_linear_and_quadratic_facets():
         named(fc.generate.block((1.0, 1.0), (4, 4), element, (x, y)), "LOW" if y < 0 else "UP")
         for element, x, y in (("quad4", 0.0, -1.0), ("quad8", 1.1, -1.0), ("quad8", 0.0, 0.0), ("tri3", 1.1, 0.0))
     ]
-    model = fc.Model(union(*parts), "plane_strain")
-    model.add_material(fc.LinearElastic(E, 0.0))
-    model.fix("LOW_BOTTOM", "xy")
+    model = elastic_model(union(*parts), "plane_strain", E=E, nu=0.0, LOW_BOTTOM="xy")
     model.prescribe("UP_TOP", x=0.0, y=-0.02)
     model.add_contact("pair", secondary="UP_BOTTOM", primary="LOW_TOP")
     np.testing.assert_allclose(solved(model).pressure, 0.01 * E, rtol=1e-8)

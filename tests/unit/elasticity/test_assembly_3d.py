@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact import recovery
@@ -111,8 +112,7 @@ def stress_at_points(mesh, u):
 def with_field(mesh, field):
     """A model with the displacement `field` prescribed at every outer node, and the inner nodes."""
     outer = np.unique(np.concatenate([facets.ravel() for facets in outer_facets(mesh).values()]))
-    model = fc.Model(mesh.with_groups(points={f"P{p}": [p] for p in outer}), "3d")
-    model.add_material(fc.LinearElastic(E, NU))
+    model = elastic_model(mesh.with_groups(points={f"P{p}": [p] for p in outer}), "3d", E=E, nu=NU)
     for p, (x, y, z) in zip(outer, field(mesh.points[outer])):
         model.prescribe(f"P{p}", x=x, y=y, z=z)
     return model, np.setdiff1d(np.arange(mesh.n_points), outer)
@@ -181,9 +181,7 @@ def test_bar_in_tension_is_exact(element, linear_solver):
 @pytest.mark.parametrize("element", QUADRATIC)
 def test_cantilever_against_timoshenko(element):
     length, tip = 10.0, 0.01
-    model = fc.Model(box((length, 1.0, 1.0), (10, 2, 2), element), "3d")
-    model.add_material(fc.LinearElastic(E, 0.0))  # no lateral strain for the clamped end to hinder
-    model.fix("XMIN", "xyz")
+    model = elastic_model(box((length, 1.0, 1.0), (10, 2, 2), element), "3d", E=E, nu=0.0, XMIN="xyz")
     model.prescribe("XMAX", z=tip)
     (step,) = fc.solve(model, fc.linear_ramp(1))
     # Bending and shear; shear coefficient of a rectangle 10 (1 + nu) / (12 + 11 nu) (Cowper, 1966).
@@ -306,16 +304,8 @@ def test_corner_volumes_are_those_of_the_cells_with_straight_edges(element):
 # Models --------------------------------------------------------------------------------------------------------------
 
 
-def test_kinematics_must_fit_the_dimension():
-    with pytest.raises(fc.ModelError, match=r"'plane_strain' do not fit a mesh in 3 dimensions: use '3d'"):
-        fc.Model(box(divisions=(1, 1, 1)), "plane_strain")
-    with pytest.raises(fc.ModelError, match=r"'3d' do not fit a mesh in 2 dimensions: use 'axisymmetric'"):
-        fc.Model(fc.generate.block(), "3d")
-
-
 def test_six_rigid_motions_are_counted_and_named():
-    model = fc.Model(box(divisions=(1, 1, 1)), "3d")
-    model.add_material(fc.LinearElastic(E, NU))
+    model = elastic_model(box(divisions=(1, 1, 1)), "3d", E=E, nu=NU)
     with pytest.raises(fc.ModelError, match=r"6 rigid-body motions .*'BOX'.*translation along z.*rotation about x"):
         model.check()
     model.fix("XMIN", "xy")

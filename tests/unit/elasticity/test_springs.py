@@ -5,6 +5,7 @@ import tomllib
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.cases.case import build_case
@@ -14,8 +15,7 @@ E, WIDTH, HEIGHT, PRESSURE = 1000.0, 2.0, 3.0, 10.0
 
 def block_on_springs(stiffness=50.0, kinematics="plane_strain", element="quad4"):
     """One element wide, so that equal springs at both bottom corners bear a uniform pressure uniformly."""
-    model = fc.Model(fc.generate.block((WIDTH, HEIGHT), (1, 3), element), kinematics)
-    model.add_material(fc.LinearElastic(E=E, nu=0.0))
+    model = elastic_model(fc.generate.block((WIDTH, HEIGHT), (1, 3), element), kinematics, E=E, nu=0.0)
     model.add_pressure("TOP", PRESSURE)
     model.add_spring("BOTTOM_LEFT", y=stiffness)
     model.add_spring("BOTTOM_RIGHT", y=stiffness)
@@ -71,8 +71,7 @@ def test_springs_alone_hold_a_body():
 
 
 def test_stiffness_is_that_of_the_full_circle():
-    model = fc.Model(fc.generate.block((WIDTH, HEIGHT), (4, 3)), "axisymmetric")
-    model.add_material(fc.LinearElastic(E=E, nu=0.0))
+    model = elastic_model(fc.generate.block((WIDTH, HEIGHT), (4, 3)), "axisymmetric", E=E, nu=0.0)
     model.couple("BOTTOM", "y")
     model.add_spring("BOTTOM_LEFT", y=70.0)
     model.fix("LEFT", "x")
@@ -88,10 +87,7 @@ def test_two_blocks_joined_by_springs_hang_in_series(kind):
     )
     apart = mesh.points.copy()
     apart[mesh.points_of("UPPER"), 1] += 0.5
-    model = fc.Model(mesh.replace(points=apart), "plane_strain")
-    model.add_material(fc.LinearElastic(E=E, nu=0.0))
-    model.fix("LOWER_BOTTOM", "xy")
-    model.fix("UPPER_LEFT", "x")
+    model = elastic_model(mesh.replace(points=apart), "plane_strain", E=E, nu=0.0, LOWER_BOTTOM="xy", UPPER_LEFT="x")
     model.add_traction("UPPER_TOP", y=PRESSURE)
     for lower, upper in (("LOWER_TOP_LEFT", "UPPER_BOTTOM_LEFT"), ("LOWER_TOP_RIGHT", "UPPER_BOTTOM_RIGHT")):
         model.add_spring(lower, upper, **{kind: 40.0})
@@ -187,10 +183,7 @@ def test_a_far_end_without_a_body_may_be_fixed_or_is_told():
     mesh = mesh.replace(points=points, point_groups={**mesh.point_groups, "ANCHOR": [len(points) - 1]})
 
     def pulled(anchored):
-        model = fc.Model(mesh, "plane_strain")
-        model.add_material(fc.LinearElastic(E=E, nu=0.0))
-        model.fix("BOTTOM_LEFT", "y")
-        model.fix("BOTTOM_RIGHT", "y")
+        model = elastic_model(mesh, "plane_strain", E=E, nu=0.0, BOTTOM_LEFT="y", BOTTOM_RIGHT="y")
         model.add_spring("ANCHOR", "BOTTOM_LEFT", axial=5.0)
         model.add_force("BOTTOM_LEFT", x=2.0, distribute=False)
         if anchored:
@@ -206,9 +199,7 @@ def test_a_far_end_without_a_body_may_be_fixed_or_is_told():
 
 def test_a_spring_shares_the_load_with_a_contact():
     # Pushed 0.2 down onto a plane 0.1 below, the springs bear 0.1 each way and the contact the rest.
-    model = fc.Model(fc.generate.block((WIDTH, HEIGHT), (1, 3)), "plane_strain")
-    model.add_material(fc.LinearElastic(E=E, nu=0.0))
-    model.fix("LEFT", "x")
+    model = elastic_model(fc.generate.block((WIDTH, HEIGHT), (1, 3)), "plane_strain", E=E, nu=0.0, LEFT="x")
     model.prescribe("TOP", y=-0.2)
     model.add_spring("BOTTOM_LEFT", y=50.0)
     model.add_spring("BOTTOM_RIGHT", y=50.0)

@@ -9,7 +9,7 @@ import pytest
 import fastcontact as fc
 from fastcontact.model.fingerprint import different, fingerprint
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 STEEL = {"E": 200_000.0, "nu": 0.3}
 KINDS = (("tri3", 4e-3), ("tri6", 3e-5), ("quad4", 3e-3), ("quad8", 1e-5), ("quad9", 1e-5))

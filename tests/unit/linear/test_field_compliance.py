@@ -164,7 +164,11 @@ def step_of(model, name):
     return problem.solver, load_step(problem, problem.initial_state(), 1, 1.0)[1].contact["c"]
 
 
-@pytest.mark.parametrize("case", CASES)
+# As others, but for one more option.
+LONG = ("few", "soft penalty", "penalty beside", "tet10", "hex20", "hex20, penalty", "hex20 on a wall")
+
+
+@pytest.mark.parametrize("case", [pytest.param(c, marks=pytest.mark.slow) if c in LONG else c for c in CASES])
 def test_continuous_contact_costs_multigrid_no_columns(case):
     make, most = CASES[case]
     solver, found = step_of(make(), "amg")

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 
@@ -10,10 +11,7 @@ def bolt(**options):
     """Return a bar of length 10 that is held at both ends and cut across in its middle."""
     bar = fc.generate.box((1.0, 1.0, 10.0), (1, 1, 4), "hex8")
     bar = bar.with_facet_group("CUT", lambda x: abs(x[:, 2] - 5.0) < 1e-9, between=True)
-    model = fc.Model(fc.generate.cut(bar, "CUT"), "3d")
-    model.add_material(fc.LinearElastic(E=210e3, nu=0.0))
-    model.fix("ZMIN", "xyz")
-    model.fix("ZMAX", "xyz")
+    model = elastic_model(fc.generate.cut(bar, "CUT"), "3d", E=210e3, nu=0.0, ZMIN="xyz", ZMAX="xyz")
     model.add_pretension("bolt", "CUT", force=1000.0, **options)
     return model
 

@@ -1,7 +1,6 @@
 """What will be solved, in words."""
 
 import numpy as np
-import pytest
 
 import fastcontact as fc
 
@@ -78,19 +77,6 @@ def test_a_number_of_steps_solves_so_many():
     assert [step.load_factor for step in by_number] == [0.5, 1.0]
     for steps in (by_number, by_array):
         assert all((a.displacement == b.displacement).all() for a, b in zip(steps, by_ramp, strict=True))
-
-
-@pytest.mark.parametrize("call", ["add_contact", "add_pressure", "add_traction"])
-def test_a_group_of_points_is_no_surface(call):
-    model = fc.Model(fc.generate.half_spheres(size=25.0), kinematics="axisymmetric")
-    arguments = {
-        "add_contact": ("pair",),
-        "add_pressure": ("C1", 1.0),
-        "add_traction": ("C1",),
-    }[call]
-    more = {"add_contact": {"secondary": "C1", "primary": "CONT2"}, "add_traction": {"y": 1.0}}.get(call, {})
-    with pytest.raises(fc.FastcontactError, match=r"'C1' (is a group of|holds) points"):
-        getattr(model, call)(*arguments, **more)
 
 
 def test_every_material_load_and_connection_is_told():

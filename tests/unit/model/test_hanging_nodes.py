@@ -4,6 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.mesh import generate
@@ -116,15 +117,13 @@ def test_a_slit_is_none_where_it_is_open_or_a_contact_or_relation_joins_its_side
         numbers = mesh.cell_groups[group]
         inside[name] = numbers[mesh.points[facets[numbers - mesh.offsets["line2"]], 0].min(axis=1) > 6.0]
     mesh = mesh.with_groups(cells=inside)
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model = elastic_model(mesh, "plane_strain")
     before = hanging_nodes_warning(model)
     model.add_contact("slit", secondary="LOW", primary="HIGH")
     after = hanging_nodes_warning(model)
     count = [int(text.split()[0]) if text else 0 for text in (before, after)]
     assert count[1] < count[0]
-    related = fc.Model(mesh, "plane_strain")
-    related.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    related = elastic_model(mesh, "plane_strain")
     for node in hanging(mesh):
         related.relate([(node, "y", 1.0), (0, "y", -1.0)])
     assert not hanging_nodes_warning(related)
@@ -133,9 +132,7 @@ def test_a_slit_is_none_where_it_is_open_or_a_contact_or_relation_joins_its_side
 @pytest.mark.parametrize("fine", [4, 8])
 def test_the_warning_comes_before_the_solution_and_a_mesh_that_fits_is_silent(fine):
     mesh = plates("quad4", 4, fine)
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(E=2e5, nu=0.3))
-    model.fix("L_BOTTOM", "xy")
+    model = elastic_model(mesh, "plane_strain", E=2e5, L_BOTTOM="xy")
     model.add_traction("U_TOP", y=100.0)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")

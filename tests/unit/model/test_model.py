@@ -1,6 +1,7 @@
 """A model is checked whole before any numerics: one clear line each."""
 
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 
@@ -12,10 +13,7 @@ def spheres():
 
 @pytest.fixture
 def model(spheres):
-    model = fc.Model(spheres, "axisymmetric")
-    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
-    model.fix("A1A2", "x")
-    return model
+    return elastic_model(spheres, "axisymmetric", E=20_000.0, A1A2="x")
 
 
 @pytest.mark.parametrize(
@@ -26,13 +24,6 @@ def model(spheres):
 def test_constants_out_of_range(constants, message):
     with pytest.raises(fc.ModelError, match=message):
         fc.LinearElastic(**{"E": 1.0, "nu": 0.3, **constants})
-
-
-def test_an_unknown_group_offers_near_names(model):
-    with pytest.raises(fc.MeshError, match=r"'A1A3'.*'A1A2'"):
-        model.fix("A1A3", "x")
-    with pytest.raises(fc.MeshError, match=r"'SPHHAUT'.*'SPHHAU'"):
-        model.add_material(fc.LinearElastic(1.0, 0.3), ["SPHHAUT"])
 
 
 def test_groups_without_material_are_named(spheres):
@@ -56,11 +47,7 @@ def test_bodies_that_overlap_without_contact_are_refused(spheres):
     moved = spheres.points.copy()
     upper = spheres.points_of("SPHHAU")
     moved[upper, 1] -= 3.0
-    model = fc.Model(spheres.replace(points=moved), "axisymmetric")
-    model.add_material(fc.LinearElastic(1.0, 0.3))
-    model.fix("A1A2", "x")
-    model.fix("A1B1", "y")
-    model.fix("A2B2", "y")
+    model = elastic_model(spheres.replace(points=moved), "axisymmetric", E=1.0, A1A2="x", A1B1="y", A2B2="y")
     with pytest.raises(fc.ModelError, match=r"overlaps body .* by 2.99"):
         model.check()
     model.add_contact("pair", secondary="CONT1", primary="CONT2")
@@ -84,15 +71,3 @@ def test_wrong_contact_options(model, options, message):
     arguments = {"secondary": "CONT1", "primary": "CONT2", **options}
     with pytest.raises(fc.ContactError, match=message):
         model.add_contact("pair", **arguments)
-
-
-def test_a_second_pair_of_the_same_name_is_refused(model):
-    model.add_contact("pair", secondary="CONT1", primary="CONT2")
-    with pytest.raises(fc.ContactError, match=r"already"):
-        model.add_contact("pair", secondary="CONT2", primary="CONT1")
-
-
-@pytest.mark.parametrize("kinematics", ["axisymetric", "3d"])
-def test_wrong_kinematics(spheres, kinematics):
-    with pytest.raises(fc.ModelError):
-        fc.Model(spheres, kinematics)

@@ -4,18 +4,15 @@ import warnings
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 
 SIZES = [1e61, 1e160, 1e308, 10**400, -1e300]
-RANGE = "is out of range: its size must be at most"
 
 
 def spheres(y=-0.1, E=20_000.0):
-    model = fc.Model(fc.generate.half_spheres("tri3", size=12.0), kinematics="axisymmetric")
-    model.add_material(fc.LinearElastic(E=E, nu=0.3))
-    model.fix("A1A2", "x")
-    model.fix("A1B1", "y")
+    model = elastic_model(fc.generate.half_spheres("tri3", size=12.0), "axisymmetric", E=E, A1A2="x", A1B1="y")
     model.prescribe("A2B2", y=y)
     return model
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from models import elastic_model
 from scipy.spatial.transform import Rotation
 
 import fastcontact as fc
@@ -87,10 +88,7 @@ def test_an_overlap_without_contact_is_refused():
         box((2.0, 2.0, 1.0), (2, 2, 1), name="LOWER"),
         box((0.6, 0.6, 1.0), (2, 2, 2), "hex8", (0.2, 0.1, 0.9), name="UPPER"),
     )
-    model = fc.Model(mesh, "3d")
-    model.add_material(fc.LinearElastic(E=1.0, nu=0.3))
-    model.fix("LOWER", "xyz")
-    model.fix("UPPER", "xyz")
+    model = elastic_model(mesh, "3d", E=1.0, LOWER="xyz", UPPER="xyz")
     with pytest.raises(fc.ModelError, match=r"body 'UPPER' overlaps body 'LOWER' by 0\.1 near"):
         model.check()
 

@@ -96,14 +96,6 @@ def test_one_side_may_meet_two_obstacles():
     assert len(model.contact) == 3
 
 
-def test_the_same_obstacle_twice_is_refused():
-    model = pressed_in_a_corner()
-    with pytest.raises(
-        fc.ContactError, match="contact 'again' presses facets of 'BOTTOM' on the rigid obstacle on which"
-    ):
-        model.add_obstacle("again", secondary="BOTTOM", obstacle=fc.obstacles.HalfSpace((5.0, 0.0), (0.0, 2.0)))
-
-
 def test_an_obstacle_and_a_pair_may_share_facets(mesh):
     model = model_of(mesh)
     model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER")

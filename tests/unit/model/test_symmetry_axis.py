@@ -3,14 +3,14 @@
 import logging
 
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.mesh.generate import block, half_spheres
 
 
 def spheres(mesh, held, **contact):
-    model = fc.Model(mesh, "axisymmetric")
-    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+    model = elastic_model(mesh, "axisymmetric", E=20_000.0)
     if held:
         model.fix("A1A2", "x")
     model.prescribe("A2B2", y=-0.2)
@@ -34,10 +34,7 @@ def test_results_are_those_of_the_model_whose_axis_is_held(element, formulation)
 
 
 def cylinder(inner=0.0):
-    model = fc.Model(block((1.0, 1.0), (2, 2), origin=(inner, 0.0)), "axisymmetric")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("BOTTOM", "y")
-    return model
+    return elastic_model(block((1.0, 1.0), (2, 2), origin=(inner, 0.0)), "axisymmetric", BOTTOM="y")
 
 
 def test_one_line_says_which_nodes_are_held(caplog):

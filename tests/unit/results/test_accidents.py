@@ -60,15 +60,28 @@ def write_until(path: Path, fail: Callable[[], list[int]]) -> list[int]:
     return calls
 
 
+@pytest.fixture
+def little_garbage() -> Iterator[None]:
+    """Collections look at what is made from here on only."""
+    gc.collect()
+    gc.freeze()
+    yield
+    gc.unfreeze()
+
+
+@pytest.mark.usefixtures("little_garbage")
 @pytest.mark.parametrize("shared", [write_arrays.SHARED, 0], ids=["steps share a chunk", "a chunk a step"])
 @pytest.mark.parametrize("error", [OSError(errno.EIO, "Input/output error"), KeyboardInterrupt()], ids=["disk", "user"])
-def test_any_write_may_fail(error: BaseException, shared: int, path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("apart", [9, pytest.param(1, marks=pytest.mark.slow)])
+def test_any_write_may_fail(
+    apart: int, error: BaseException, shared: int, path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """HDF5, which does not take exceptions well, never sees one."""
     monkeypatch.setattr(write_arrays, "SHARED", shared)
     with monkeypatch.context() as patch:
         total, lengths = len(write_until(path, lambda: failing_after(10**9, error, patch, "_put"))), set()
     assert total > 60
-    for count in range(0, total, 4):
+    for count in range(0, total, apart):
         with monkeypatch.context() as patch:
             refused = pytest.raises(FileError if isinstance(error, OSError) else type(error))
             with refused as caught:

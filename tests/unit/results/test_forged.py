@@ -102,17 +102,6 @@ def test_tables_of_another_kind(sound, tmp_path):
         out.write(step)
 
 
-def test_a_file_that_is_cut_while_it_is_written(sound, tmp_path):
-    path = tmp_path / "cut.vtkhdf"
-    model = spheres()
-    steps = list(fc.solve_steps(model, RAMP))
-    out = fc.ResultWriter(path, model)
-    out.write(steps[0])
-    os.truncate(path, 20_000)
-    with pytest.raises(fc.FileError, match=r"^(?!.*\n).*was changed by another program after 1 steps"):
-        out.write(steps[1])
-
-
 @pytest.mark.parametrize("lost", ["case", "pairs", "numbers", "solver", "active", "obstacles"])
 def test_restart_data_that_lack_a_part(lost, sound):
     last = fc.open_results(sound)[-1]

@@ -12,7 +12,7 @@ from fastcontact.results import reader, write_arrays, writer
 from fastcontact.results.committed_file import CommittedFile
 
 
-@pytest.mark.parametrize("synchronise", [False, True])
+@pytest.mark.parametrize("synchronise", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_a_step_writes_what_it_adds_and_little_more(
     synchronise: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -38,7 +38,7 @@ def test_a_step_writes_what_it_adds_and_little_more(
     assert late < 1.1 * early
 
 
-@pytest.mark.parametrize("shared", [write_arrays.SHARED, 0])
+@pytest.mark.parametrize("shared", [pytest.param(write_arrays.SHARED, marks=pytest.mark.slow), 0])
 def test_indices_do_not_gather_in_memory(shared: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """However little HDF5 may keep, the file holds every step."""
     monkeypatch.setattr(write_arrays, "SHARED", shared)

@@ -10,6 +10,7 @@ import subprocess
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.cli import main
@@ -22,7 +23,7 @@ from fastcontact.results.plot.patches import fill, outlines
 from fastcontact.results.plot.section import _cut_tetrahedra
 from fastcontact.results.step import StepResult
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 SOLIDS = sorted(name for name, kind in elements.ELEMENTS.items() if kind.dim == 3)
@@ -260,9 +261,7 @@ def pressed(element="hex8", friction=0.0, turned=False, steps=1):
     up, along = ("y", "z") if turned else ("z", "y")
     if turned:
         mesh = mesh.replace(points=mesh.points[:, [0, 2, 1]] * [1.0, 1.0, -1.0])
-    model = fc.Model(mesh, "3d")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("ZMIN", "xyz")
+    model = elastic_model(mesh, "3d", ZMIN="xyz")
     ball = fc.obstacles.Sphere((0.0, 5.0, 0.0) if turned else (0.0, 0.0, 5.0), 5.0)
     motion = {up: -0.04, **({along: 0.02} if friction else {})}
     model.add_obstacle("ball", secondary="ZMAX", obstacle=ball, motion=motion, friction=friction)
@@ -404,9 +403,7 @@ def test_a_history_begins_at_zero_and_names_its_theory(steps_of_disc):
 
 @pytest.fixture(scope="module")
 def steps_of_disc():
-    model = fc.Model(fc.generate.half_spheres(size=10.0), kinematics="axisymmetric")
-    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
-    model.fix("A1A2", "x")
+    model = elastic_model(fc.generate.half_spheres(size=10.0), "axisymmetric", E=20_000.0, A1A2="x")
     model.prescribe("A2B2", y=-2.0)
     model.prescribe("A1B1", y=2.0)
     model.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation="node_to_segment")
@@ -444,9 +441,8 @@ def result(tmp_path_factory):
     [
         ["--map"],
         ["--section", "z=0", "--field", "stress.yy", "--zoom", "8"],
-        ["--section", "x = 12.5"],
         ["--field", "displacement.y", "--scale", "10"],
-        ["--history"],
+        pytest.param(["--history"], marks=pytest.mark.slow),
     ],
 )
 def test_the_command_draws_solids(result, tmp_path, options):
@@ -568,9 +564,7 @@ def test_a_contact_map_is_seen_along_what_carries():
 
 def test_a_history_of_a_contact_that_is_closed_everywhere():
     mesh = block((1.0, 1.0), (2, 2), "quad4")
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
-    model.fix("BOTTOM", "xy")
+    model = elastic_model(mesh, "plane_strain", nu=0.0, BOTTOM="xy")
     floor = fc.obstacles.HalfSpace((0.0, 1.0), (0.0, -1.0))
     model.add_obstacle("floor", secondary="TOP", obstacle=floor, motion={"y": -0.01})
     steps = fc.solve(model, 2)

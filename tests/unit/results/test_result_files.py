@@ -402,13 +402,6 @@ def test_pyvista_shows_what_vtk_shows(path: Path) -> None:
     np.testing.assert_allclose(deformed.points[:, :2], MESH.points + step_result(0).displacement, atol=1e-6)
 
 
-def test_without_pyvista_the_message_names_the_extra(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    results = open_results(write(path))
-    monkeypatch.setitem(sys.modules, "pyvista", None)
-    with pytest.raises(FileError, match=r"pip install 'fastcontact\[view\]'"):
-        results.to_pyvista(0)
-
-
 def test_bodies_are_those_of_the_topology(path: Path) -> None:
     write(path)
     body_of_point = topology.bodies(MESH)[1]

@@ -66,7 +66,7 @@ def recorded(path: Path, n_steps: int, monkeypatch: pytest.MonkeyPatch) -> tuple
 
     monkeypatch.setattr(committed_file.CommittedFile, "_put", record)
     ends = []
-    with ResultWriter(path, MESH) as out:
+    with ResultWriter(path, MESH, synchronise=False) as out:  # as runs begin, whatever this machine takes
         shutil.copy(path, path.with_name("crashed.vtkhdf"))
         for number in range(n_steps):
             out.write(nth_step(number))
@@ -74,9 +74,10 @@ def recorded(path: Path, n_steps: int, monkeypatch: pytest.MonkeyPatch) -> tuple
     return writes, ends
 
 
+@pytest.mark.parametrize("apart", [4, pytest.param(1, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("n_steps", "from_step"), [(2, 0), (65, 64)])
 def test_every_write_may_be_the_last_one(
-    n_steps: int, from_step: int, path: Path, monkeypatch: pytest.MonkeyPatch
+    n_steps: int, from_step: int, apart: int, path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """With step 65 the nodes of HDF5's indices are full and fall in two."""
     writes, ends = recorded(path, n_steps, monkeypatch)
@@ -88,7 +89,7 @@ def test_every_write_may_be_the_last_one(
         for number, (place, data) in enumerate(writes, start=1):
             file.seek(place)
             file.write(data)
-            if number < begin:
+            if number < begin or number % apart:
                 continue
             finished = sum(end <= number for end in ends)
             with open_results(crashed) as results:

@@ -9,6 +9,7 @@ import sys
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact._jit import compiling
@@ -22,9 +23,7 @@ SCREEN = 4000
 
 @pytest.fixture(scope="module")
 def model():
-    found = fc.Model(fc.generate.half_spheres(size=10.0), kinematics="axisymmetric")
-    found.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
-    found.fix("A1A2", "x")
+    found = elastic_model(fc.generate.half_spheres(size=10.0), "axisymmetric", E=20_000.0, A1A2="x")
     found.prescribe("A2B2", y=-2.0)
     found.prescribe("A1B1", y=2.0)
     found.add_contact("hertz & co", secondary="CONT1", primary="CONT2", formulation="node_to_segment")
@@ -85,8 +84,7 @@ def test_the_table_of_steps_has_a_row_a_pair(steps):
 
 
 def test_a_step_without_contact_is_shown():
-    block = fc.Model(fc.generate.block(), kinematics="plane_strain")
-    block.add_material(fc.LinearElastic(E=1.0, nu=0.3))
+    block = elastic_model(fc.generate.block(), "plane_strain", E=1.0)
     left = block.mesh.group_names
     for name in left:
         if name.endswith(("BOTTOM", "TOP")):

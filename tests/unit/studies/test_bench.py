@@ -45,6 +45,7 @@ def test_the_table_tells_what_failed():
     assert suite("subjects").load("robustness").lines([failed])[1].endswith("failed: no way")
 
 
+@pytest.mark.slow
 def test_the_table_of_threads(tmp_path, capsys):
     path = tmp_path / "run.json"
     assert main(["bench", "threads", "--smallest", "--json", str(path)]) == 0
@@ -106,7 +107,18 @@ def test_smallest_size_runs_and_is_recorded(name, tmp_path, capsys):
     assert name in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("problem", ["sphere-on-block", "forma04c", "pressed-blocks", "pushed-blocks"])
+SLOW = pytest.mark.slow
+
+
+@pytest.mark.parametrize(
+    "problem",
+    [
+        pytest.param("sphere-on-block", marks=SLOW),
+        "forma04c",
+        pytest.param("pressed-blocks", marks=SLOW),
+        "pushed-blocks",
+    ],
+)
 def test_contact_in_detail(problem, tmp_path):
     path = tmp_path / "contact.json"
     assert main(["bench", "contact", "--problem", problem, "--dofs", "1500", "--json", str(path), "-q"]) == 0
@@ -119,7 +131,6 @@ def test_contact_in_detail(problem, tmp_path):
     assert set(found["from_assembly"]) == {"linear_cpu_s", "cold_step_cpu_s", "ratio_to_linear"}
     assert set(found["twenty_steps"]) == {"cpu_s", "ratio_to_linear", "setups", "linear_iterations"}
     assert 750 < found["n_dofs"] < 4000
-    assert found["linear"]["setup_cpu_s"] < found["linear"]["cpu_s"]
     assert found["twenty_steps"]["linear_iterations"] > found["linear"]["iterations"]
 
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.elasticity.stiffness import stiffness
@@ -38,9 +39,7 @@ def solid(element, kinematics, shift=1.0):
         mesh = fc.generate.box((2.0, 1.5, 1.0), (2, 2, 2), element, (shift, 0.0, 0.0))
     else:
         mesh = fc.generate.block((2.0, 1.5), (4, 3), element, (shift, 0.0), distortion=0.2)
-    model = fc.Model(mesh, kinematics)
-    model.add_material(fc.LinearElastic(E=E, nu=NU))
-    return model
+    return elastic_model(mesh, kinematics, E=E, nu=NU)
 
 
 def moduli(kinematics):
@@ -100,8 +99,7 @@ def test_a_quadratic_field_has_no_error_on_quadratic_elements(element):
         mesh = fc.generate.box((2.0, 1.5, 1.0), (2, 2, 2), element)
     else:
         mesh = fc.generate.block((2.0, 1.5), (4, 3), element)
-    model = fc.Model(mesh, "plane_strain" if mesh.dim == 2 else "3d")
-    model.add_material(fc.LinearElastic(E=E, nu=NU))
+    model = elastic_model(mesh, "plane_strain" if mesh.dim == 2 else "3d", E=E, nu=NU)
     field = quadratic(mesh.dim)
     norms = fc.error_against(field, model, field.displacement(mesh.points))
     assert norms.relative_energy < 1e-12
@@ -113,8 +111,7 @@ def test_a_quadratic_field_has_no_error_on_quadratic_elements(element):
 ])  # fmt: skip
 def test_the_energy_of_a_displacement_is_that_of_the_stiffness_matrix(element, kinematics):
     mesh = fc.generate.box(element=element) if kinematics == "3d" else fc.generate.block(element=element)
-    model = fc.Model(mesh, kinematics)
-    model.add_material(fc.LinearElastic(E=E, nu=NU))
+    model = elastic_model(mesh, kinematics, E=E, nu=NU)
     u = np.random.default_rng(3).normal(size=mesh.points.shape)
     nothing = Field(lambda *x: np.zeros((len(x), len(x[0]))), None, None)
     nothing.stress = lambda points: np.zeros((len(points), 4 if mesh.dim == 2 else 6))
@@ -147,8 +144,7 @@ def test_materials_are_those_of_the_cells_and_groups_add_up():
 def test_more_points_hardly_change_the_error():
     """Three more points than the order are enough, also where the pressure ends like a square root."""
     box = fc.analytic.hertz_box()
-    model = fc.Model(fc.generate.block((1.0, 1.0), (8, 8), "quad8", origin=(0.0, -1.0)), "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model = elastic_model(fc.generate.block((1.0, 1.0), (8, 8), "quad8", origin=(0.0, -1.0)), "plane_strain")
     u = box.displacement(model.mesh.points)
     usual, many = fc.error_against(box, model, u), fc.error_against(box, model, u, n_points=12)
     assert usual.energy == pytest.approx(many.energy, rel=0.01)

@@ -35,6 +35,7 @@ def numbers(points):
     return [(point.n_dofs, point.values, point.profile) for point in points]
 
 
+@pytest.mark.slow
 def test_two_dask_workers(case, here):
     distributed = pytest.importorskip("distributed", reason="needs Dask: pip install 'fastcontact[dask]'")
     with (

@@ -5,6 +5,7 @@ import math
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 
@@ -17,10 +18,7 @@ def tube(size, solved=True, element="quad4"):
     """Tube of Lame's."""
     n = round(1 / size)
     mesh = fc.generate.block(divisions=(n, 1), size=(1.0, size), origin=(A, 0.0), element=element)
-    model = fc.Model(mesh, kinematics="axisymmetric")
-    model.add_material(fc.LinearElastic(E=E, nu=NU))
-    model.fix("BOTTOM", "y")
-    model.fix("TOP", "y")
+    model = elastic_model(mesh, "axisymmetric", E=E, nu=NU, BOTTOM="y", TOP="y")
     model.add_pressure("LEFT", 1.0)
     return fc.solve(model, 1) if solved else model
 
@@ -32,9 +30,7 @@ def bore(step):
 def overlap(size, friction=0.0):
     """Half-spheres, loaded by Hertz."""
     sizes = {"arc_sizes": (size, 4 * size), "radial_sizes": (size, 4 * size), "segments": 8}
-    model = fc.Model(fc.generate.half_spheres("quad4", **sizes), kinematics="axisymmetric")
-    model.add_material(fc.LinearElastic(E=20_000.0, nu=NU))
-    model.fix("A1A2", "x")
+    model = elastic_model(fc.generate.half_spheres("quad4", **sizes), "axisymmetric", E=20_000.0, nu=NU, A1A2="x")
     model.prescribe("A2B2", y=-0.5)
     model.prescribe("A1B1", y=0.5)
     model.add_contact("hertz", secondary="CONT1", primary="CONT2", friction=friction)

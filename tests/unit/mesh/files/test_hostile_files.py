@@ -188,11 +188,6 @@ def test_names_that_no_file_can_have(name):
     assert len(str(caught.value)) < 400
 
 
-def test_case_names_that_no_file_can_have():
-    with pytest.raises(fc.CaseError, match="cannot"):
-        read_case("a" * 5000)
-
-
 def test_points_that_are_no_numbers(tmp_path):
     path = tmp_path / "points.obj"
     path.write_text("f 1 2 3\n")

@@ -88,6 +88,7 @@ def test_clockwise_cells_are_turned_and_counted(tmp_path, name, caplog):
     assert_same(read_mesh(tmp_path / "turned.med", orient=False), both)
 
 
+@pytest.mark.usefixtures("meshio_here")
 @settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(turned=st.lists(st.booleans(), min_size=6, max_size=6), suffix=st.sampled_from(["med", "vtu", "inp"]))
 def test_number_turned_is_the_number_that_was_clockwise(tmp_path, turned, suffix):
@@ -107,6 +108,7 @@ def test_number_turned_is_the_number_that_was_clockwise(tmp_path, turned, suffix
 # There and back -------------------------------------------------------------------------------------
 
 
+@pytest.mark.usefixtures("meshio_here")
 @pytest.mark.parametrize("suffix", ["med", "mmed", "MED", "vtu", "vtk", "inp"])
 def test_formats_that_keep_everything(tmp_path, suffix):
     mesh = row_of(sorted(FLAT, key=lambda name: elements.get(name).med))
@@ -137,6 +139,7 @@ def test_gmsh_keeps_groups_that_do_not_overlap(tmp_path):
     assert (report.format, dict(report.dropped)) == ("gmsh", {"vertex": 3})
 
 
+@pytest.mark.usefixtures("meshio_here")
 @pytest.mark.parametrize("name", FLAT)
 def test_gmsh_keeps_every_element(tmp_path, name):
     write_mesh(tmp_path / "one.msh", row_of([name], groups=False))

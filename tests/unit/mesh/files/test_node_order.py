@@ -15,6 +15,8 @@ from fastcontact.mesh.generate.box import box
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import corner_volumes
 
+pytestmark = pytest.mark.usefixtures("meshio_here")
+
 CASES = Path(__file__).resolve().parents[5] / "shared" / "cases"
 SOLIDS = {name: element for name, element in elements.ELEMENTS.items() if element.dim == 3}
 SHEAR = np.array([[1.0, 0.3, 0.0], [0.0, 1.2, 0.4], [0.2, 0.0, 0.9]])

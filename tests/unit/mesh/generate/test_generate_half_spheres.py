@@ -12,7 +12,7 @@ from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.generate import half_spheres, quarter_disc
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 ELEMENTS = ("tri3", "tri6", "quad4", "quad8", "quad9")
 R = 50.0
