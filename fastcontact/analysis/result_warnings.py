@@ -11,7 +11,6 @@ import numpy as np
 from fastcontact.analysis.facet_sag import sag_warnings
 from fastcontact.analysis.interpenetration import interpenetration
 from fastcontact.analysis.problem import Problem
-from fastcontact.analysis.seams import seam_warnings
 from fastcontact.analysis.state import State
 from fastcontact.analysis.stress_scatter import scatter_warnings
 from fastcontact.analysis.volumetric_locking import locking_warning
@@ -65,9 +64,7 @@ def result_warnings(problem: Problem, state: State, last: StepResult) -> list[st
         found += [*_deep(pair, contact, state.u), *_lost(pair, contact, name in state.touched, loaded)]
         found += [sagging[name]] if name in sagging else _unresolved(name, pair, contact)
         found += [*wavering(pair, contact), *_too_fast(name, pair, state)]
-    return [
-        *found, *seam_warnings(problem, last), *_unsettled(state), *_loose(problem, last), *_unbalanced(state)
-    ]  # fmt: skip
+    return [*found, *_unsettled(state), *_loose(problem, last), *_unbalanced(state)]
 
 
 def _deep(pair: Formulation, contact: ContactResult, displacement: Array) -> Iterator[str]:
