@@ -158,8 +158,8 @@ class WeightedMortar(Formulation):
         slips, beside = self._slips(rubbing, held, overlap, covered, kept, mean, own, weight)
         closing = self._closing(part, normal, at)
         drift = self._drift(mean, closing, rubbing, at)
-        for along, nodes, more in beside:
-            ours = closing - np.where(nodes, np.einsum("md,md->m", closing, along), 0.0)[:, None] * along
+        for along, still, more in beside:
+            ours = closing - np.where(still, np.einsum("md,md->m", closing, along), 0.0)[:, None] * along
             falsely = np.einsum("md,md->m", more @ ours, along)
             drift += np.stack([np.einsum("md,md->m", t, along) * falsely for t in rubbing])
         return replace(
