@@ -35,7 +35,7 @@ from fastcontact.contact.multiplier_field import Projection
 from fastcontact.contact.pairing import Candidates, Pairing, normals
 from fastcontact.errors import ContactError
 
-# The area of a node on the axis vanishes but for rounding errors; what is below this part of the largest is none.
+# The area of a node on the axis vanishes but for rounding errors; what is below this part of the largest counts as zero.
 NO_AREA = 1e-9
 # Corners of quadratic faces have next to none, or less.
 NO_SHARE = 1e-3
@@ -132,9 +132,9 @@ class PressureField(NodalField):
         weight = np.where(usable, self.projection.areas, 0.0)[:, None] * self.shape
         total = np.bincount(self.around.ravel(), weight.ravel(), n)
         sums = np.bincount(self.around.ravel(), (weight * np.where(usable, gaps, 0.0)[:, None]).ravel(), n)
-        own = total > NO_SHARE * total.max(initial=0.0)
-        near = np.where(own[self.around], self.shape, -np.inf).argmax(axis=1)
-        return np.divide(sums, total, out=np.full(n, np.inf), where=own), self.around[np.arange(len(gaps)), near]
+        kept = total > NO_SHARE * total.max(initial=0.0)
+        near = np.where(kept[self.around], self.shape, -np.inf).argmax(axis=1)
+        return np.divide(sums, total, out=np.full(n, np.inf), where=kept), self.around[np.arange(len(gaps)), near]
 
     def closed_nodes(self, active: Mask, gap: Array, pressure: Array) -> Mask:
         """Return the nodes with a pressure that an active point is nearest to; at least one of its facet, if any has one.
@@ -168,9 +168,9 @@ class PressureField(NodalField):
 
 def _nearest(around: Indices, shape: Array, n_nodes: int) -> Mask:
     """Return the nodes (n_nodes,) with the largest shape functions (m, n) at any of the points; several where equal."""
-    found = np.zeros(n_nodes, bool)
-    found[around[shape >= shape.max(axis=1, keepdims=True, initial=-np.inf) - ROUNDING]] = True
-    return found
+    nearest = np.zeros(n_nodes, bool)
+    nearest[around[shape >= shape.max(axis=1, keepdims=True, initial=-np.inf) - ROUNDING]] = True
+    return nearest
 
 
 def shapes_at(shape: Array, local: Indices, n_nodes: int) -> csr_array:
@@ -221,15 +221,15 @@ class PressureFieldFormulation(Formulation):
     ) -> Constraints:
         """Return the constraints of paired integration points whose forces make up a pressure field."""
         projection = replace(field.projection, eliminable=self.eliminable, quadratic=self.secondary.order > 1)
-        part = self.assembled(candidates, pairing, projection, at)
-        along, turning = part.directions, self.options.turning
-        if part.tangents and turning is not None:
-            axes = turning.axes(part.positions), turning.axes(self.points[self.secondary.points])
+        constraints = self.assembled(candidates, pairing, projection, at)
+        along, turning = constraints.directions, self.options.turning
+        if constraints.tangents and turning is not None:
+            axes = turning.axes(constraints.positions), turning.axes(self.points[self.secondary.points])
             field = replace(field, axes=axes)
             along = tuple(np.einsum("mde,md->me", axes[0], t) for t in along)
         undetermined = self._undetermined(field, along, at) if self.friction else None
         return replace(
-            part, low_rank_compliance=undetermined, areas=field.areas, nodal=field, coupled_directions=along
+            constraints, low_rank_compliance=undetermined, areas=field.areas, nodal=field, coupled_directions=along
         )  # fmt: skip
 
     def _undetermined(self, field: PressureField, directions: tuple[Array, ...], at: Configuration) -> Array | None:

@@ -13,31 +13,32 @@ import numpy as np
 from fastcontact.analysis.problem import Problem
 from fastcontact.arrays import Indices
 from fastcontact.contact.integration import lumped_areas
-from fastcontact.model.periodicity import Seam
+from fastcontact.model.periodicity import PeriodicInterface
 from fastcontact.results.step import ContactResult
 
 
 def joined(problem: Problem, results: dict[str, ContactResult]) -> dict[str, ContactResult]:
     """Return the results of contact pairs with one traction for both nodes of a point, closed where one of them is."""
-    found = dict(results)
-    for name, contact in results.items() if problem.model.seams else ():
+    results_of_pairs = dict(results)
+    for name, contact in results.items() if problem.model.periodic_interfaces else ():
         pair = problem.pairs[name]
         areas = lumped_areas(pair.secondary, pair.points, pair.axisymmetric)
         pressure, shear, active = contact.pressure.copy(), contact.shear.copy(), contact.active.copy()
-        for seam in problem.model.seams:
-            a, b = _rows(problem, contact, seam)
-            part, turn = areas[a] / (areas[a] + areas[b]), np.eye(shear.shape[1]) if seam.turn is None else seam.turn
-            pressure[a] = pressure[b] = part * pressure[a] + (1.0 - part) * pressure[b]
-            shear[a] = part[:, None] * shear[a] + (1.0 - part[:, None]) * (shear[b] @ turn)
+        for interface in problem.model.periodic_interfaces:
+            a, b = _rows(problem, contact, interface)
+            share = areas[a] / (areas[a] + areas[b])
+            turn = np.eye(shear.shape[1]) if interface.turn is None else interface.turn
+            pressure[a] = pressure[b] = share * pressure[a] + (1.0 - share) * pressure[b]
+            shear[a] = share[:, None] * shear[a] + (1.0 - share[:, None]) * (shear[b] @ turn)
             shear[b] = shear[a] @ turn.T
             active[a] = active[b] = active[a] | active[b]
-        found[name] = replace(contact, pressure=pressure, shear=shear, active=active)
-    return found
+        results_of_pairs[name] = replace(contact, pressure=pressure, shear=shear, active=active)
+    return results_of_pairs
 
 
-def _rows(problem: Problem, contact: ContactResult, seam: Seam) -> tuple[Indices, Indices]:
+def _rows(problem: Problem, contact: ContactResult, interface: PeriodicInterface) -> tuple[Indices, Indices]:
     """Return the rows of a contact that belong to the two nodes of one point."""
     row = np.full(problem.model.mesh.n_points, -1, np.intp)
     row[contact.points] = np.arange(len(contact.points))
-    both = (row[seam.first] >= 0) & (row[seam.second] >= 0)
-    return row[seam.first[both]], row[seam.second[both]]
+    both = (row[interface.first] >= 0) & (row[interface.second] >= 0)
+    return row[interface.first[both]], row[interface.second[both]]
