@@ -25,12 +25,13 @@ CANCELLED = 1e-12
 class PeriodicInterface(NamedTuple):
     """Nodes of two groups that are one and the same place of a part that repeats itself: each (m,).
 
-    Vectors at the second node are those at the first one times `turn` (dim, dim); None where nothing turns.
+    Vectors at the second node are those at the first one times `turn` (dim, dim), a `rotation`; None where nothing turns.
     """
 
     first: Indices
     second: Indices
     turn: Array | None = None
+    rotation: Rotation | None = None
 
 
 def same_place(interfaces: Sequence[PeriodicInterface], n_points: int) -> Indices | None:
@@ -117,7 +118,7 @@ def cyclic(
             f"{name}: point {first[far]} of '{ends[0]}', turned by 1/{sectors} of a turn, lies {distance[far]:.3g} from the "
             f"nearest node of '{ends[1]}': the ends need nodes upon nodes; check axis and sectors, or mesh them alike"
         )
-    interface = PeriodicInterface(first, second[match], turn)
+    interface = PeriodicInterface(first, second[match], turn, rotation)
     # u_second = Q u_first: rows (u_second - Q u_first) along the axes of the mesh, none for what lies along the axis on it.
     rows = csr_array(
         vstack([_differences(interface, np.column_stack([unit, -turn.T @ unit]), mesh) for unit in np.eye(mesh.dim)])
