@@ -238,7 +238,7 @@ def _nodal_shear(
     forces = np.einsum("nk,ndk->nd", tangential, np.stack(directions, axis=2))
     if along_normal is not None:
         forces += along_normal[:, None] * normals(directions)
-    traction = np.column_stack([nodal.pressure(component) * nodal.covered for component in forces.T])
+    traction = nodal.traction(forces) * np.reshape(nodal.covered, (-1, 1))
     return traction - np.einsum("nd,nd->n", traction, normal)[:, None] * normal
 
 

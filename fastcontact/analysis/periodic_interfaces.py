@@ -14,10 +14,7 @@ from fastcontact.analysis.problem import Problem
 from fastcontact.arrays import Indices
 from fastcontact.contact.integration import lumped_areas
 from fastcontact.model.periodicity import PeriodicInterface
-from fastcontact.results.step import ContactResult, StepResult
-
-# Pressures of the two nodes of one place differ by this part of the largest pressure where their split is arbitrary.
-APART = 0.02
+from fastcontact.results.step import ContactResult
 
 
 def joined(problem: Problem, results: dict[str, ContactResult]) -> dict[str, ContactResult]:
@@ -45,29 +42,3 @@ def _rows(problem: Problem, contact: ContactResult, interface: PeriodicInterface
     row[contact.points] = np.arange(len(contact.points))
     both = (row[interface.first] >= 0) & (row[interface.second] >= 0)
     return row[interface.first[both]], row[interface.second[both]]
-
-
-def periodicity_warnings(problem: Problem, last: StepResult) -> list[str]:
-    """Return a warning for each contact whose forces are split unevenly between the two nodes of a point.
-
-    Formulations with a condition a node know of such nodes (`shared_nodes`), fields of pressures unless tractions turn.
-    """
-    warnings = []
-    for name, contact in last.contact.items():
-        largest, pair = contact.pressure_max, problem.pairs[name]
-        if pair.options.gap_only or not hasattr(pair, "augmentation") or not largest > 0.0:
-            continue
-        for interface in problem.model.periodic_interfaces:
-            a, b = _rows(problem, contact, interface)
-            apart = np.where(contact.active[a], np.abs(contact.multiplier[a] - contact.multiplier[b]), 0.0)
-            wrong = apart > APART * largest
-            if wrong.any():
-                worst = int(np.argmax(apart))
-                warnings.append(
-                    f"contact '{name}' is closed where a period or sector begins and ends: at {int(wrong.sum())} places its "
-                    f"forces are split unevenly between the two nodes of one place, by {apart[worst]:.4g} in pressure "
-                    f"(points {contact.points[a[worst]]} and {contact.points[b[worst]]}). Their pressure is the mean, but "
-                    "that of neighbours may waver: let the period end where the contact is open, or use "
-                    'formulation="mortar" with multipliers="dual"'
-                )
-    return warnings

@@ -10,7 +10,6 @@ import numpy as np
 
 from fastcontact.analysis.facet_sag import sag_warnings
 from fastcontact.analysis.interpenetration import interpenetration
-from fastcontact.analysis.periodic_interfaces import periodicity_warnings
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
 from fastcontact.analysis.stress_scatter import scatter_warnings
@@ -65,9 +64,7 @@ def result_warnings(problem: Problem, state: State, last: StepResult) -> list[st
         warnings += [*_deep(pair, contact, state.u), *_lost(pair, contact, name in state.touched, loaded)]
         warnings += [sagging[name]] if name in sagging else _unresolved(name, pair, contact)
         warnings += [*wavering(pair, contact), *_too_fast(name, pair, state)]
-    return [
-        *warnings, *periodicity_warnings(problem, last), *_unsettled(state), *_loose(problem, last), *_unbalanced(state)
-    ]  # fmt: skip
+    return [*warnings, *_unsettled(state), *_loose(problem, last), *_unbalanced(state)]
 
 
 def _deep(pair: Formulation, contact: ContactResult, displacement: Array) -> Iterator[str]:

@@ -52,6 +52,10 @@ class NodalField(Protocol):
         """Return nodal pressures (n_nodes,) per reference area [pressure] from normal forces (m,) [force]."""
         ...
 
+    def traction(self, force: Array) -> Array:
+        """Return nodal tractions (n_nodes, dim) per reference area [pressure] from forces (m, dim) [force]."""
+        return np.column_stack([self.pressure(component) for component in force.T])
+
     def over_whole_side(self, force: Array) -> Array:
         """Return nodal pressures (n_nodes,) per area of the whole secondary side, whatever part of it faces the other.
 
@@ -133,6 +137,8 @@ class Constraints:
         Tangential motion relative to the primary side, a matrix for each tangent [-]; empty without friction.
     directions : tuple of ndarray (m, dim)
         The tangents themselves [-].
+    coupled_directions : tuple of ndarray (m, dim)
+        The same in the axes in which C couples the components of forces, where these are not those of the mesh [-].
     slip0 : ndarray (len(tangents), m), optional
         Slip of the step that the motion of a rigid primary side makes by itself [length]; None stands for zero.
     friction : ndarray (m,), optional
@@ -186,6 +192,7 @@ class Constraints:
     law: OverclosureLaw | None = None
     branches: AnyArray | None = None
     wetted: Wetted | None = None
+    coupled_directions: tuple[Array, ...] = ()
 
     def __len__(self) -> int:
         return len(self.gap0)
@@ -301,6 +308,7 @@ def stacked(parts: Mapping[str, Constraints]) -> StackedConstraints:
         _stacked_vectors([part.tangential_softness for part in pairs], pairs, float),
         _stacked_slips([part.elastic_slip for part in pairs], pairs),
         nodes=_stacked_nodes(pairs),
+        coupled_directions=_stacked_directions(pairs, coupled=True),
         parts=parts,
     )
 
@@ -337,12 +345,12 @@ def _stacked_tangents(parts: list[Constraints]) -> tuple[csr_array, ...]:
     )
 
 
-def _stacked_directions(parts: list[Constraints]) -> tuple[Array, ...]:
-    """Return the tangents of all parts, zero where a part has none."""
-    count = max(len(part.directions) for part in parts)
+def _stacked_directions(parts: list[Constraints], coupled: bool = False) -> tuple[Array, ...]:
+    """Return the tangents of all parts, zero where a part has none; those of compliances where they are `coupled`."""
+    found = [(part.coupled_directions if coupled else ()) or part.directions for part in parts]
     return tuple(
-        np.vstack([p.directions[j] if p.directions else np.zeros_like(p.positions) for p in parts])
-        for j in range(count)
+        np.vstack([own[j] if own else np.zeros_like(p.positions) for own, p in zip(found, parts, strict=True)])
+        for j in range(max(map(len, found)))
     )
 
 

@@ -11,6 +11,7 @@ from scipy.sparse import coo_array, csr_array, diags_array, eye_array
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.cohesion import CohesiveLaw
 from fastcontact.contact.conductance import Conductance
+from fastcontact.contact.obstacles.rotation import Rotation
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.contact.pairing import Candidates, Pairing, normals
 from fastcontact.contact.projection import places
@@ -58,6 +59,9 @@ class PairOptions:
         Nodes that fluid comes from; None without.
     same_place : ndarray of int (n_points,), optional
         For each node, the one whose multiplier it has, too, where the model repeats itself; None where it does not.
+    turning : Rotation, optional
+        About the axis of a sector, where tractions turn from one end of the pair to the other: a field of them has
+        cylindrical components.
     """
 
     clearance: Field | None = None
@@ -75,6 +79,7 @@ class PairOptions:
     cohesion: CohesiveLaw | None = None
     source: Mask | None = None
     same_place: Indices | None = None
+    turning: Rotation | None = None
 
     @property
     def gap_only(self) -> bool:

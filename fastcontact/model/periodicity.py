@@ -30,12 +30,13 @@ CANCELLED = 1e-12
 class PeriodicInterface(NamedTuple):
     """Nodes of two groups that are one and the same place of a part that repeats itself: each (m,).
 
-    Vectors at the second node are those at the first one times `turn` (dim, dim); None where nothing turns.
+    Vectors at the second node are those at the first one times `turn` (dim, dim), a `rotation`; None where nothing turns.
     """
 
     first: Indices
     second: Indices
     turn: Array | None = None
+    rotation: Rotation | None = None
 
 
 def same_place(interfaces: Sequence[PeriodicInterface], n_points: int) -> Indices | None:
@@ -116,7 +117,7 @@ def cyclic(
     size = float(np.ptp(mesh.points[first], axis=0).max())
     far = int(np.argmax(distance))
     if len(first) == len(second) == len(np.unique(match)) and distance[far] <= APART * size:
-        interface = PeriodicInterface(first, second[match], turn)
+        interface = PeriodicInterface(first, second[match], turn, rotation)
         rows = [_differences(interface, np.column_stack([unit, -turn.T @ unit]), mesh) for unit in np.eye(mesh.dim)]
         return [_without_zeros(name, csr_array(vstack(rows)))], interface
     dependent, facets = (ends[0], ends[1]) if len(first) >= len(second) else (ends[1], ends[0])

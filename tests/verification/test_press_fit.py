@@ -8,6 +8,7 @@ from models import elastic_model
 from two_bodies import rings
 
 import fastcontact as fc
+from fastcontact.mesh.generate import renamed, union
 
 pytestmark = pytest.mark.each_value
 
@@ -163,3 +164,58 @@ def test_fits_settle_with_the_hollow_side_secondary(element, around, multipliers
         warnings.simplefilter("ignore", fc.FastcontactWarning)
         steps = fc.solve(model, 1, criteria=fc.Criteria(max_halvings=0))
     assert steps[-1].iterations["geometry_updates"] <= 12
+
+
+@pytest.mark.filterwarnings("ignore:.*across its radius", "ignore:.*nodal pressures waver")
+@pytest.mark.parametrize("swap", [False, True])
+@pytest.mark.parametrize(("element", "pressures"), [("hex8", (0.80, 1.18)), ("tet4", (0.1, 1.9))])
+def test_a_strip_one_facet_wide_is_smoothed_as_one_two_facets_wide(element, pressures, swap):
+    """A slice of two rings: facets alone are open, the force on smooth surfaces is within 2 % of Lame's."""
+    width, found = 0.2, []
+    for across in (1, 2):
+        parts = []
+        for name, inside, facets in (("A", 1.0, 5), ("B", 2.0, 7)):
+            mesh = fc.generate.box((1.0, 1.0, width), (4, facets, across), element, name=name)
+            r, t, z = inside + mesh.points[:, 0], np.pi / 3.0 * mesh.points[:, 1], mesh.points[:, 2]
+            mesh = mesh.replace(points=np.column_stack([r * np.cos(t), r * np.sin(t), z]))
+            parts.append(renamed(mesh, {group: name + group for group in mesh.group_names if group != name}))
+        model = fc.Model(union(*parts), "3d")
+        model.add_material(SHAFT)
+        for name in "AB":
+            model.fix(f"{name}YMIN", "y")
+            model.fix(f"{name}YMAX", "normal")
+            model.fix(f"{name}ZMIN", "z")
+            model.fix(f"{name}ZMAX", "z")
+        sides = ("BXMIN", "AXMAX") if swap else ("AXMAX", "BXMIN")
+        model.add_contact("fit", secondary=sides[0], primary=sides[1], clearance=-1e-3)
+        found.append(fc.solve(model, 1)[-1].contact["fit"])
+    lame = 1e-3 * 1000.0 / (1.0 - 0.3**2) / (2.0 * (13.0 / 5.0 + 5.0 / 3.0))
+    for contact in found:
+        assert contact.normal_force == pytest.approx(lame * 2.0 * np.pi / 3.0 * width, rel=0.02)
+        assert pressures[0] * lame < contact.pressure.min() <= contact.pressure.max() < pressures[1] * lame
+    if element == "hex8":
+        ends = [np.ptp(contact.pressure) for contact in found]
+        assert ends[0] == pytest.approx(ends[1], rel=1e-3)
+
+
+@pytest.mark.filterwarnings("ignore:.*across its radius")
+@pytest.mark.parametrize(("options", "element", "count", "most"), [
+    ({}, "quad4", 12, 0.16), ({}, "quad8", 4, 0.051), ({"formulation": "continuous"}, "quad8", 4, 0.01),
+])  # fmt: skip
+def test_friction_between_planes_of_symmetry_has_no_shear(options, element, count, most):
+    """Closing is no slip: normals lean at the ends, where facets end, and clearances close along them."""
+    angle, parts = np.pi / 4.0, []
+    for name, inside in (("A", 1.0), ("B", 2.0)):
+        mesh = fc.generate.block((1.0, 1.0), (count, count), element, name=name)
+        r, t = inside + mesh.points[:, 0], angle * mesh.points[:, 1]
+        mesh = mesh.replace(points=np.column_stack([r * np.cos(t), r * np.sin(t)]))
+        parts.append(renamed(mesh, {group: name + group for group in mesh.group_names if group != name}))
+    model = fc.Model(union(*parts), "plane_strain")
+    model.add_material(SHAFT)
+    for name in "AB":
+        model.fix(f"{name}BOTTOM", "y")
+        model.fix(f"{name}TOP", "normal")
+    sides = {"secondary": "ARIGHT", "primary": "BLEFT"}
+    model.add_contact("fit", friction=0.3, clearance=-1e-3, **sides, **options)
+    contact = fc.solve(model, 1)[-1].contact["fit"]
+    assert np.linalg.norm(contact.shear, axis=1).max() < most * contact.pressure.mean()

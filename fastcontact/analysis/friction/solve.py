@@ -140,7 +140,7 @@ def _among(
 def _add_compliance(F: Array, constraints: Constraints, rows: Indices) -> None:
     """Add, in place, the own compliance of constraints `rows` to the Delassus operator F ((1 + k) m, (1 + k) m)."""
     if constraints.compliance is not None and len(rows):
-        along = np.stack([direction[rows] for direction in constraints.directions])
+        along = np.stack([direction[rows] for direction in constraints.coupled_directions or constraints.directions])
         F += _turned(constraints.compliance.block(rows), along)
     if constraints.low_rank_compliance is not None and len(rows):
         Z = constraints.low_rank_compliance[:, rows].reshape(len(F), -1)

@@ -341,8 +341,12 @@ class Formulation(ABC):
         else:
             rows = np.flatnonzero(pairing.paired)
             facing, theirs = places(self.primary, pairing.facet[rows], pairing.xi[rows]), np.zeros_like(both)
-            theirs[rows] = np.einsum("nk,nkde->nde", facing.shape, self.held.at(facing.nodes))
-            moved[rows] -= np.einsum("nk,nkd->nd", facing.shape, (at.displacement - at.start)[facing.nodes])
+            held, motion = self.held.at(facing.nodes), (at.displacement - at.start)[facing.nodes]
+            theirs[rows] = np.einsum("nk,nkde->nde", facing.shape, held)
+            mean = np.einsum("nk,nkd->nd", facing.shape, motion)
+            # Where a leaning normal leads a little past a held node, what moves beside it does not count.
+            beside = np.einsum("nk,nkde,nkd->ne", facing.shape, held, motion - mean[:, None])
+            moved[rows] -= mean + np.einsum("nde,ne->nd", np.linalg.pinv(theirs[rows], hermitian=True), beside)
             both = spanned(both @ theirs @ both, 0.5)
         along = np.einsum("nde,ne->nd", both, pairing.normal)
         both = without(both, pairing.normal, np.sqrt(0.5))

@@ -65,6 +65,8 @@ class PressureField(NodalField):
         Integrals of the nodes' shape functions over the whole secondary side, by the rule of the points [area].
     covered_areas : ndarray (n_nodes,)
         The same over the points that take part [area].
+    axes : (ndarray (m, dim, dim), ndarray (n_nodes, dim, dim)), optional
+        At points and nodes, the axes (in columns) along which a vector field has components; None for those of the mesh.
     """
 
     projection: Projection
@@ -75,6 +77,7 @@ class PressureField(NodalField):
     renewed: bool
     nodal_areas: Array
     covered_areas: Array
+    axes: tuple[Array, Array] | None = None
 
     @classmethod
     def of_points(
@@ -101,6 +104,13 @@ class PressureField(NodalField):
     def pressure(self, force: Array) -> Array:
         """Return the field at the nodes; it may be slightly negative beyond the edge of the contact."""
         return self.nodes @ self.projection.field(force)
+
+    def traction(self, force: Array) -> Array:
+        """See `NodalField`."""
+        if self.axes is None:
+            return super().traction(force)
+        at_points, at_nodes = self.axes
+        return np.einsum("nde,ne->nd", at_nodes, super().traction(np.einsum("mde,md->me", at_points, force)))
 
     @property
     def covered(self) -> Array:
@@ -212,17 +222,28 @@ class PressureFieldFormulation(Formulation):
         """Return the constraints of paired integration points whose forces make up a pressure field."""
         projection = replace(field.projection, eliminable=self.eliminable, quadratic=self.secondary.order > 1)
         constraints = self.assembled(candidates, pairing, projection, at)
-        undetermined = self._undetermined(field, constraints.directions, at) if self.friction else None
-        return replace(constraints, low_rank_compliance=undetermined, areas=field.areas, nodal=field)
+        along, turning = constraints.directions, self.options.turning
+        if constraints.tangents and turning is not None:
+            axes = turning.axes(constraints.positions), turning.axes(self.points[self.secondary.points])
+            field = replace(field, axes=axes)
+            along = tuple(np.einsum("mde,md->me", axes[0], t) for t in along)
+        undetermined = self._undetermined(field, along, at) if self.friction else None
+        return replace(
+            constraints, low_rank_compliance=undetermined, areas=field.areas, nodal=field, coupled_directions=along
+        )  # fmt: skip
 
     def _undetermined(self, field: PressureField, directions: tuple[Array, ...], at: Configuration) -> Array | None:
-        """Return a compliance of tangential fields that do no work on any slip, where both sides are held."""
+        """Return a compliance of tangential fields that do no work on any slip, where both sides are held.
+
+        `directions` are tangents in the axes of the field.
+        """
         factors = []
         for held, nodes in self.without_slip(at):
             columns = np.flatnonzero(nodes[field.independent])
             if len(columns):
                 Z = field.projection.compliant(columns)
-                at_points = field.projection.P @ held[field.independent]
+                own = held if field.axes is None else np.einsum("nde,nd->ne", field.axes[1], held)
+                at_points = field.projection.P @ own[field.independent]
                 parts = [np.einsum("nd,nd->n", along, at_points) for along in (normals(directions), *directions)]
                 factors.append(np.stack([part[:, None] * Z for part in parts]))
         return np.concatenate(factors, axis=2) if factors else None

@@ -155,25 +155,30 @@ class WeightedMortar(Formulation):
         candidates = Candidates(points[:, None], np.ones((len(constraints), 1)))
         held = self.without_slip(at)
         directions, rubbing = self.options.rubbing(_tangents(normal, held), candidates)
-        slips, apart = self._slips(rubbing, held, overlap, covered, kept, mean, weight, at)
+        slips, beside = self._slips(rubbing, held, overlap, covered, kept, mean, rows, weight)
+        closing = self._closing(constraints, normal, at)
+        slip0 = self._slip0(mean, closing, rubbing, at)
+        for along, still, more in beside:
+            ours = closing - np.where(still, np.einsum("md,md->m", closing, along), 0.0)[:, None] * along
+            falsely = np.einsum("md,md->m", more @ ours, along)
+            slip0 += np.stack([np.einsum("md,md->m", t, along) * falsely for t in rubbing])
         return replace(
             constraints,
             tangents=slips,
             directions=directions,
             friction=self.options.coefficients(self.friction, candidates),
-            slip0=self._slip0(mean, apart, normal, rubbing, at),
+            slip0=slip0,
         )
 
-    def _slip0(
-        self, mean: csr_array, apart: Array, normal: Array, directions: tuple[Array, ...], at: Configuration
-    ) -> Array | None:
-        """Return the slip (k, m) beside that by displacements: by a rigid obstacle, or see `_closing_slip_of_nodes`."""
+    def _slip0(self, mean: csr_array, closing: Array, directions: tuple[Array, ...], at: Configuration) -> Array:
+        """Return the slip (k, m) beside that by displacements: by a rigid obstacle, or minus the part of `closing`."""
         if not isinstance(self.primary, RigidSide):
-            return self._closing_slip_of_nodes(apart, normal, directions, at) if self.slip == "symmetric" else None
-        moved = np.tile(at.obstacle - at.obstacle_start, (len(normal), 1))
-        now, before = (mean @ (self.points + u) for u in (at.displacement, at.start))
-        turning = self.primary.turning(now, before, at.pose, at.pose_start)
-        moved = moved if turning is None else moved + turning
+            moved = -closing if self.slip == "symmetric" else np.zeros_like(closing)
+        else:
+            moved = np.tile(at.obstacle - at.obstacle_start, (len(closing), 1))
+            now, before = (mean @ (self.points + u) for u in (at.displacement, at.start))
+            turning = self.primary.turning(now, before, at.pose, at.pose_start)
+            moved = moved if turning is None else moved + turning
         return -np.stack([np.einsum("nd,nd->n", t, moved) for t in directions])
 
     def _nodal(self, weight: Array) -> WeightedPressures:
@@ -199,45 +204,48 @@ class WeightedMortar(Formulation):
             np.add.at(tested, block.local, full)
         return tested, whole
 
-    def _closing_slip_of_nodes(
-        self, apart: Array, normal: Array, directions: tuple[Array, ...], at: Configuration
-    ) -> Array:
-        """Return the slip (k, m) to add so that closing a gap is none, though the normal leans [length].
+    def _closing(self, part: Constraints, normal: Array, at: Configuration) -> Array:
+        """Return the gaps (m, dim) that the step closes, along the directions in which closing is no slip [length].
 
-        As in `Formulation`, for mean gaps; `apart` (m, dim) are those at the beginning of the step, as vectors [length].
+        As in `Formulation`: along the mean of both sides' normals, but along that of an obstacle.
         """
-        between = normal - nodal_normals(self.secondary, self.points + at.displacement)
-        between /= np.maximum(np.linalg.norm(between, axis=1, keepdims=True), 1e-300)  # zero where nothing is faced
-        closing = np.einsum("nd,nd->n", between, apart)
-        return np.stack([closing * np.einsum("nd,nd->n", along, between) for along in directions])
+        between = normal
+        if not isinstance(self.primary, RigidSide):
+            between = normal - nodal_normals(self.secondary, self.points + at.displacement)
+            between /= np.maximum(np.linalg.norm(between, axis=1, keepdims=True), 1e-300)  # zero where nothing is faced
+        lean = np.einsum("nd,nd->n", normal, between)
+        gap = np.where(part.usable & (lean > 0.0), part.gaps(at.start), 0.0)
+        return (gap / np.where(lean > 0.0, lean, 1.0))[:, None] * between
 
     def _slips(
         self, directions: Sequence[Array], without_slip: list[tuple[Array, Mask]], overlap: Overlap, covered: list[Array],
-        kept: Mask, mean: csr_array, weight: Array, at: Configuration,
-    ) -> tuple[tuple[csr_array, ...], Array]:  # fmt: skip
-        """Return rows (m, n_dofs) of the slips along tangents (m, dim), and how far apart nodes start (m, dim) [length].
+        kept: Mask, mean: csr_array, own: csr_array, weight: Array,
+    ) -> tuple[tuple[csr_array, ...], list[tuple[Array, Mask, csr_array]]]:  # fmt: skip
+        """Return rows (m, n_dofs) of the slips along tangents (m, dim).
 
         Mostly they are those of the `mean` relative motion. In a direction in which both sides are held at a node, as in a
         plane of symmetry, that would be the motion of the other side beside the plane, for want of any at the node: there
-        the functions of its neighbours take the place of the node's own (`Formulation.without_slip`).
+        the functions of its neighbours take the place of the node's own (`Formulation.without_slip`). For each such direction
+        (m, dim) also the matrix (m, m) of what these functions take more of the motion of the secondary nodes: on curved
+        sides these close their gaps along other normals.
         """
-        rows = [rows_of(mean, direction) for direction in directions]
-        start = self.points + at.start
-        apart = mean @ start
+        rows, beside = [rows_of(mean, direction) for direction in directions], []
         held = np.zeros((len(weight), *2 * self.points.shape[1:]))
         for along, nodes in without_slip:
             if not (nodes & kept).any():
                 continue
-            own, across, _ = self._weighted(overlap, covered, kept & ~nodes)
-            other = csr_array(scaled(csr_array(own - across), 1.0 / weight) - mean)
+            ours, across, _ = self._weighted(overlap, covered, kept & ~nodes)
+            other = csr_array(scaled(csr_array(ours - across), 1.0 / weight) - mean)
             other.eliminate_zeros()
             for k, direction in enumerate(directions):
                 slip = np.einsum("md,md->m", direction, along)
                 rows[k] = csr_array(rows[k] + rows_of(other, slip[:, None] * along))
-            apart += np.einsum("md,md->m", other @ start, along)[:, None] * along
+            beside.append(
+                (along, nodes, csr_array(scaled(csr_array(ours - own), 1.0 / weight)[:, self.secondary.points]))
+            )
             held[nodes] += np.einsum("md,me->mde", along[nodes], along[nodes])
         free = [1.0 - np.einsum("md,mde,me->m", t, held, t) >= FREE for t in directions]
-        return tuple(scaled(row, np.where(own, 1.0, 0.0)) for row, own in zip(rows, free, strict=True)), apart
+        return tuple(scaled(row, np.where(slips, 1.0, 0.0)) for row, slips in zip(rows, free, strict=True)), beside
 
     def _weighted(self, overlap: Overlap, covered: list[Array], kept: Mask) -> tuple[csr_array, csr_array, Array]:
         """Return the integrals of psi with secondary and with primary shape functions, both (m, n_points) [area].

@@ -10,6 +10,9 @@ import numpy as np
 
 from fastcontact.arrays import Array
 
+# Distance from the axis, by the largest one, that is round-off.
+ON_AXIS = 1e-9
+
 
 @dataclass(frozen=True)
 class Rotation:
@@ -41,6 +44,22 @@ class Rotation:
         turned = np.eye(3) + math.sin(angle) * across + (1.0 - math.cos(angle)) * (across @ across)
         dim = len(self.centre)
         return turned[:dim, :dim]
+
+    def axes(self, positions: Array) -> Array:
+        """Return cylindrical axes (n, dim, dim) at positions (n, dim) [length], in columns: radial, tangential, axial [-].
+
+        On the axis itself, where no direction is radial, any.
+        """
+        dim = positions.shape[1]
+        arm, along = np.zeros((len(positions), 3)), self.direction
+        arm[:, :dim] = positions - self.centre
+        radial = arm - (arm @ along)[:, None] * along
+        length = np.linalg.norm(radial, axis=1, keepdims=True)
+        some = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
+        on_axis = length <= ON_AXIS * length.max(initial=0.0)
+        radial = np.where(on_axis, some / np.linalg.norm(some), radial / np.where(on_axis, 1.0, length))
+        axes = np.stack([radial, np.cross(along, radial), np.broadcast_to(along, radial.shape)], axis=2)
+        return axes[:, :dim, :dim]
 
     def torque(self, arms: Array, forces: Array) -> float:
         """Return the moment about the axis of `forces` (n, dim) [force] at `arms` (n, dim) from its point [length]."""

@@ -356,12 +356,12 @@ class ModelContact(ModelConnections):
             check_sides(self.mesh, pair.name, secondary, primary, options.excluded)
         modulus = min((m.contact_modulus for m, _ in self.materials), default=1.0)
         axisymmetric = self.kinematics == "axisymmetric"
-        # Tangential fields that turn from one end to the other are not one field of components.
-        friction = pair.options.get("friction")
-        interfaces = [end for end in self.periodic_interfaces if end.turn is None or not friction]
-        options = dataclasses.replace(
-            options,
-            same_place=same_place(interfaces, self.mesh.n_points),
-            source=self._source(pair, secondary, options),
+        turning = next(
+            (s.rotation for s in self.periodic_interfaces if s.rotation and np.isin(s.second, secondary.points).any()),
+            None,
         )
+        options = dataclasses.replace(
+            options, same_place=same_place(self.periodic_interfaces, self.mesh.n_points), turning=turning,
+            source=self._source(pair, secondary, options),
+        )  # fmt: skip
         return kind(secondary, primary, self.mesh.points, axisymmetric, modulus, options=options, held=held, **specific)
