@@ -32,7 +32,8 @@ _MODULES = {
 _NAMES = {
     "analysis.contact_answers": ("ContactAnswers", "contact_answers", "contact_history", "contact_moment", "wear"),
     "analysis.criteria": ("Criteria",),
-    "analysis.modes": ("Modes", "modes"),
+    "analysis.modal.shapes": ("Modes", "RingModes"),
+    "analysis.modes": ("modes",),
     "analysis.run": ("solve", "solve_steps"),
     "analysis.sensitivities": ("Sensitivities", "sensitivities"),
     "analysis.support_forces": ("pretension_history", "spring_forces", "support_forces"),

@@ -8,7 +8,8 @@ from fastcontact.analysis.contact_answers import contact_history as contact_hist
 from fastcontact.analysis.contact_answers import contact_moment as contact_moment
 from fastcontact.analysis.contact_answers import wear as wear
 from fastcontact.analysis.criteria import Criteria as Criteria
-from fastcontact.analysis.modes import Modes as Modes
+from fastcontact.analysis.modal.shapes import Modes as Modes
+from fastcontact.analysis.modal.shapes import RingModes as RingModes
 from fastcontact.analysis.modes import modes as modes
 from fastcontact.analysis.run import solve as solve
 from fastcontact.analysis.run import solve_steps as solve_steps

@@ -18,7 +18,7 @@ from fastcontact.results.step import CANCELLED, ContactResult, StepResult
 from fastcontact.results.units import units_of_results, valued, with_unit
 
 if TYPE_CHECKING:
-    from fastcontact.analysis.modes import Modes
+    from fastcontact.analysis.modal.shapes import Modes
 
 # Numbers that a theory must have to be compared as a whole.
 COMPARED = ("force", "pressure_max", "radius")
@@ -91,7 +91,10 @@ def _sensitivity(case: Case, last: StepResult, quantity: Asked, by: Sequence[Ask
 
 
 def _modes(found: Modes) -> dict[str, Any]:
-    return {"frequencies": found.frequencies.tolist(), "effective_mass": found.effective_mass.tolist()}
+    table = {"frequencies": found.frequencies.tolist(), "effective_mass": found.effective_mass.tolist()}
+    if found.nodal_diameters is None or found.twins is None:
+        return table
+    return {**table, "nodal_diameters": found.nodal_diameters.tolist(), "twins": found.twins.tolist()}
 
 
 def of_step(step: StepResult) -> dict[str, Any]:
@@ -229,10 +232,26 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
     for found_here in summary["sensitivities"]:
         found += _sensitivity_lines(found_here)
     if "modes" in summary:
-        shown = ", ".join(f"{frequency:.6g}" for frequency in summary["modes"]["frequencies"])
-        found.append(f"  frequencies about the last step: {shown}")
+        found += _mode_lines(summary["modes"])
     for check in summary["checks"]:
         found += [_check_line(check, unit), *_why(check)]
+    return found
+
+
+def _mode_lines(table: Mapping[str, Any]) -> list[str]:
+    """Return the frequencies in lines, one for each number of nodal diameters, where pairs of modes are told once."""
+    frequencies = table["frequencies"]
+    diameters, twins = (
+        table.get("nodal_diameters", [None] * len(frequencies)),
+        table.get("twins", range(len(frequencies))),
+    )
+    found = []
+    for d in dict.fromkeys(diameters):
+        own = [k for k, other in enumerate(diameters) if other == d and k <= twins[k]]
+        shown = ", ".join(f"{frequencies[k]:.6g}" for k in own)
+        pairs = ", each of two modes" if any(twins[k] > k for k in own) else ""
+        where = "" if d is None else f", {count(d, 'nodal diameter')}{pairs}"
+        found.append(f"  frequencies about the last step{where}: {shown}")
     return found
 
 

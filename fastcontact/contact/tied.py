@@ -39,6 +39,8 @@ class TiedPair:
         What forces at the places of the formulation mean at its nodes.
     nodes : ndarray of int (q,), optional
         The secondary nodes that the gaps belong to, see `Constraints`.
+    areas : ndarray (q,), optional
+        Integrals of the functions that the equations are tested with [area].
     """
 
     moments: csr_array
@@ -47,6 +49,7 @@ class TiedPair:
     positions: Array
     nodal: NodalField
     nodes: Indices | None = None
+    areas: Array | None = None
 
     def constraints(self) -> Constraints:
         """Return the equations."""
@@ -66,24 +69,28 @@ class TiedPair:
 
 def tied(part: Constraints) -> TiedPair:
     """Return the tying equations of the constraints `part`, which have tangents."""
-    moments = moments_of(part)
+    moments, areas = moments_of(part)
     size = np.maximum(np.asarray(abs(moments).sum(axis=1)).ravel(), 1e-300)
     positions = abs(moments) @ part.positions / size[:, None]
     rows = tuple(_cleaned(csr_array(moments @ along)) for along in (part.B, *part.tangents))
     assert part.nodal is not None
-    return TiedPair(moments, rows, part.directions, positions, part.nodal, part.nodes)
+    return TiedPair(moments, rows, part.directions, positions, part.nodal, part.nodes, areas)
 
 
-def moments_of(part: Constraints) -> csr_array:
-    """Return the matrix (q, m) whose rows are the functions that the multipliers are combinations of."""
+def moments_of(part: Constraints) -> tuple[csr_array, Array | None]:
+    """Return the matrix (q, m) whose rows are the functions that the multipliers are combinations of.
+
+    Beside it the integrals (q,) of these functions, if known [area].
+    """
     if not isinstance(part.compliance, Projection):
-        return csr_array(eye_array(len(part.gap0), format="csr"))
+        return csr_array(eye_array(len(part.gap0), format="csr")), part.areas
     P, areas = part.compliance.P, part.compliance.areas
     weighted = csr_array(P.T @ diags_array(areas))
     scale = np.asarray(abs(weighted).sum(axis=1)).ravel()
     alone = np.flatnonzero((areas == 0.0) & part.usable)  # at the axis
     single = csr_array((np.ones(len(alone)), (np.arange(len(alone)), alone)), shape=(len(alone), len(areas)))
-    return csr_array(vstack([diags_array(1.0 / np.maximum(scale, 1e-300)) @ weighted, single]))
+    whole = np.concatenate([scale, np.zeros(len(alone))])
+    return csr_array(vstack([diags_array(1.0 / np.maximum(scale, 1e-300)) @ weighted, single])), whole
 
 
 def _cleaned(rows: csr_array) -> csr_array:

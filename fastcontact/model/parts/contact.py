@@ -323,10 +323,11 @@ class ModelContact(ModelConnections):
         self.contact.append(pair)
 
     @typed(ModelError)
-    def bind(self, pair: ContactPair, held: HeldMotions | None = None) -> Formulation:
+    def bind(self, pair: ContactPair, held: HeldMotions | None = None, *, sectors_alike: bool = True) -> Formulation:
         """Return the formulation of a contact pair on this mesh; see `add_contact` for the errors.
 
-        `held` are the motions of nodes that supports and relations prescribe, where they are known.
+        `held` are the motions of nodes that supports and relations prescribe, where they are known; `sectors_alike` tells
+        whether pressures are the same at both ends of a sector.
         """
         if pair.formulation not in FORMULATIONS:
             raise ContactError(unknown("contact formulation", pair.formulation, FORMULATIONS))
@@ -338,7 +339,8 @@ class ModelContact(ModelConnections):
                 raise ContactError(unknown(f"option of {pair.formulation}", option, known))
         own = {key: value for key, value in pair.options.items() if key not in SHARED_OPTIONS}
         check_fields(f"contact '{pair.name}'", own, kind, ContactError)
-        secondary = surface(self.mesh, pair.secondary)
+        ends = [(one.first, one.second, np.eye(self.mesh.dim) if one.turn is None else one.turn) for one in self.seams]
+        secondary = surface(self.mesh, pair.secondary).with_seams(ends)
         options = pair_options(
             pair.name, pair.options, self.mesh, secondary, against_obstacle=pair.obstacle is not None
         )
@@ -351,12 +353,13 @@ class ModelContact(ModelConnections):
             primary = RigidSide(pair.obstacle, np.array(pair.motion), pair.rotation)
             own.setdefault("surface_smoothing", False)
         else:
-            primary = surface(self.mesh, pair.primary)
+            primary = surface(self.mesh, pair.primary).with_seams(ends)
             check_sides(self.mesh, pair.name, secondary, primary, options.excluded)
         modulus = min((m.contact_modulus for m, _ in self.materials), default=1.0)
         axisymmetric = self.kinematics == "axisymmetric"
         # Tangential fields that turn from one end to the other are not one field of components.
-        seams = [seam for seam in self.seams if seam.turn is None or not pair.options.get("friction")]
+        turning = sectors_alike and not pair.options.get("friction")
+        seams = [seam for seam in self.seams if seam.turn is None or turning]
         options = dataclasses.replace(
             options, same_place=same_place(seams, self.mesh.n_points), source=self._source(pair, secondary, options)
         )
