@@ -96,7 +96,8 @@ class ModelContact(ModelConnections):
             - ``conductance``: of heat that crosses, by area and difference of temperatures: a number, where the sides touch;
               a function of pressures and gaps (m,); pairs (pressure, conductance); or a mapping of ``"pressure"``, ``"gap"``
               to pairs. Without one none crosses. ``friction_heat``: what part of the work of friction becomes heat, half of
-              it on each side, with load factors as times [-].
+              it on each side, with load factors as times [-]. ``obstacle_temperature``: of a rigid obstacle, to which heat
+              crosses by its conductance [temperature].
             - ``search_distance``: what is farther off than this, or deeper inside, now and as the load step begins, is not
               faced [length].
             - ``normals``: ``"facet"`` or ``"averaged"`` between the facets that meet at a node at less than 45 degrees, which
