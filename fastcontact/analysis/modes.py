@@ -23,7 +23,7 @@ from fastcontact.elasticity.constrained_system import System
 from fastcontact.elasticity.inertia_loads import Densities
 from fastcontact.elasticity.mass import mass, stress_stiffness
 from fastcontact.elasticity.material_field import MaterialField
-from fastcontact.elasticity.relations import stacked_rows
+from fastcontact.elasticity.multipoint_constraints import stacked_rows
 from fastcontact.elasticity.springs import stiffened
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.errors import ModelError, warn
@@ -215,13 +215,13 @@ def _stiffness(model: Model, step: StepResult | None, field: MaterialField) -> b
 
 def _uniform(model: Model, K: bsr_array, M: bsr_array) -> float:
     """Return the least quotient of energies [1 / time^2] of uniform deformations, which grow with one coordinate each."""
-    points, found = model.mesh.points - model.mesh.points.mean(axis=0), []
+    points, densities = model.mesh.points - model.mesh.points.mean(axis=0), []
     for component in range(model.mesh.dim):
         for axis in range(model.mesh.dim):
             u = np.zeros_like(points)
             u[:, component] = points[:, axis]
-            found.append(float(u.ravel() @ (K @ u.ravel())) / float(u.ravel() @ (M @ u.ravel())))
-    return min((own for own in found if own > 0.0), default=1.0)
+            densities.append(float(u.ravel() @ (K @ u.ravel())) / float(u.ravel() @ (M @ u.ravel())))
+    return min((own for own in densities if own > 0.0), default=1.0)
 
 
 def _modes(vibration: _Vibration, values: Array, vectors: Array) -> Modes:

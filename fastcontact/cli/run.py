@@ -70,9 +70,9 @@ def run(options: argparse.Namespace) -> int:
         caught += early
         done, last, steps = _solved(options, case, output)
     texts = list(dict.fromkeys([*done.warnings, *caught]))
-    found = _modes(options, case, last)
+    computed = _modes(options, case, last)
     timings = {"read": read - started, "solve": time.perf_counter() - read, "cpu": time.process_time()}
-    numbers = summary.summarise(case, last, steps, timings, texts, found)
+    numbers = summary.summarise(case, last, steps, timings, texts, computed)
     if options.json:
         write_json(options.json, numbers)
     if options.plot:
@@ -106,13 +106,13 @@ def _modes(options: argparse.Namespace, case: Case, last: StepResult) -> Any:
     from fastcontact.analysis.modes import modes
     from fastcontact.results.writer import ResultWriter
 
-    found = modes(case.model, last, **{"linear_solver": options.linear or case.linear_solver, **asked})
+    computed = modes(case.model, last, **{"linear_solver": options.linear or case.linear_solver, **asked})
     if options.modes:
-        shapes, of = (found, case.model) if found.twins is None else (found.whole_ring(),) * 2
+        shapes, of = (computed, case.model) if computed.twins is None else (computed.whole_ring(),) * 2
         with ResultWriter(options.modes, of, case_text=case.text) as writer:
             for mode in shapes:
                 writer.write(mode)
-    return found
+    return computed
 
 
 def _diameters(text: str | None) -> dict[str, Any]:

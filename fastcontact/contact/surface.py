@@ -49,7 +49,7 @@ class Surface:
         The nodes; in order along the line where the facets form one open line, else ascending.
     abscissa : ndarray (m,)
         Length along the surface to each node [length]; zero where there is no such order.
-    seams : tuple of (ndarray of int (k,), ndarray of int (k,), ndarray (dim, dim))
+    periodic_interfaces : tuple of (ndarray of int (k,), ndarray of int (k,), ndarray (dim, dim))
         Positions in `points` at both ends of a part that repeats itself, and the turn [-] from the first to the second: there
         the surface goes on.
     """
@@ -58,21 +58,21 @@ class Surface:
     blocks: tuple[FacetBlock, ...]
     points: Numbers
     abscissa: Array
-    seams: tuple[tuple[Indices, Indices, Array], ...] = ()
+    periodic_interfaces: tuple[tuple[Indices, Indices, Array], ...] = ()
 
     def with_seams(self, ends: Iterable[tuple[Indices, Indices, Array]]) -> Surface:
         """Return the surface that goes on at ends (k,) and (k,), by number of points, as far as it reaches them."""
         order = np.argsort(self.points)
-        seams = []
+        periodic_interfaces = []
         for first, second, turn in ends:
             both = np.isin(first, self.points) & np.isin(second, self.points) & (first != second)
             own = (order[np.searchsorted(self.points, end[both], sorter=order)] for end in (first, second))
-            seams.append((*own, turn))
-        return replace(self, seams=tuple(seams))
+            periodic_interfaces.append((*own, turn))
+        return replace(self, periodic_interfaces=tuple(periodic_interfaces))
 
     def add_across_seams(self, vectors: Array) -> None:
-        """Let vectors (m, dim) at both ends of each seam, sums over the facets there, be those over the facets of both."""
-        for first, second, turn in self.seams:
+        """Let vectors (m, dim) at both ends of each interface, sums over the facets there, be those over the facets of both."""
+        for first, second, turn in self.periodic_interfaces:
             vectors[first] += vectors[second] @ turn
             vectors[second] = vectors[first] @ turn.T
 
@@ -121,16 +121,16 @@ class Surface:
         rows = [np.repeat(block.local, block.local.shape[1], axis=1).ravel() for block in self.blocks]
         columns = [np.tile(block.local, block.local.shape[1]).ravel() for block in self.blocks]
         row, column, m = np.concatenate(rows), np.concatenate(columns), len(self.points)
-        found = csr_array(coo_array((np.ones(len(row)), (row, column)), shape=(m, m)))
-        found.data[:] = 1.0
-        return found
+        adjacency = csr_array(coo_array((np.ones(len(row)), (row, column)), shape=(m, m)))
+        adjacency.data[:] = 1.0
+        return adjacency
 
     @cached_property
     def near(self) -> csr_array:
         """One (m, m) where two nodes lie in one facet or in two facets that share a node."""
-        found = csr_array(self.beside @ self.beside)
-        found.data[:] = 1.0
-        return found
+        adjacency = csr_array(self.beside @ self.beside)
+        adjacency.data[:] = 1.0
+        return adjacency
 
     @cached_property
     def triangular(self) -> Mask:
@@ -144,11 +144,11 @@ class Surface:
         sizes = np.concatenate([np.full(len(block.local), block.local.shape[1]) for block in self.blocks])
         start = np.concatenate([[0], np.cumsum(sizes)])
         incidence = csr_array((np.ones(len(nodes)), nodes, start), shape=(self.n_facets, len(self.points)))
-        found = csr_array(incidence @ incidence.T)
-        found.setdiag(0.0)
-        found.eliminate_zeros()
-        found.sort_indices()
-        return found.indptr.astype(np.intp), found.indices.astype(np.intp)
+        adjacency = csr_array(incidence @ incidence.T)
+        adjacency.setdiag(0.0)
+        adjacency.eliminate_zeros()
+        adjacency.sort_indices()
+        return adjacency.indptr.astype(np.intp), adjacency.indices.astype(np.intp)
 
     def corners(self, coordinates: Array) -> list[Array]:
         """Return the nodes (n_facets, n_nodes, dim) of each block at nodal `coordinates` (n_points, dim)."""
@@ -165,13 +165,13 @@ def surface(mesh: Mesh, group: str) -> Surface:
     ContactError
         If the group holds no facets, or a facet inside a solid or without one.
     """
-    found = mesh.cells_of(group, dim=mesh.dim - 1)
-    if not found:
+    cells = mesh.cells_of(group, dim=mesh.dim - 1)
+    if not cells:
         raise ContactError(
             f"group '{group}' holds no facets (cells of dimension {mesh.dim - 1}): name a boundary group"
         )
     outer = outer_facets(mesh)
-    facets = {name: _outward(mesh, group, name, block, outer) for name, block in found.items()}
+    facets = {name: _outward(mesh, group, name, block, outer) for name, block in cells.items()}
     points, abscissa = _ordered(mesh, group, facets)
     position = np.full(mesh.n_points, -1, np.intp)
     position[points] = np.arange(len(points))

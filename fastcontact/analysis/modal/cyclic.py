@@ -16,10 +16,10 @@ from scipy.sparse import bmat, bsr_array, coo_array, csr_array
 
 from fastcontact.analysis.modal.held_contact import Conditions
 from fastcontact.arrays import AnyArray, Array, Indices
-from fastcontact.elasticity.relations import Relation
+from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.errors import ModelError
 from fastcontact.model.model import Model
-from fastcontact.model.periodicity import Seam, turned_rows
+from fastcontact.model.periodicity import PeriodicInterface, turned_rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class Sectors:
         N, of the whole ring.
     turn : ndarray (dim, dim)
         Of vectors, from one sector to the next [-].
-    seams : list of Seam
+    periodic_interfaces : list of PeriodicInterface
         Ends of the modelled sector.
     centre : ndarray (dim,)
         A point of the axis [length].
@@ -40,25 +40,27 @@ class Sectors:
 
     number: int
     turn: Array
-    seams: list[Seam]
+    periodic_interfaces: list[PeriodicInterface]
     centre: Array
 
     @classmethod
     def of(cls, model: Model) -> Sectors | None:
         """Return those of a model; None without cyclic symmetry. ModelError if it has several axes."""
-        seams = [seam for seam in model.seams if seam.turn is not None]
-        if not seams:
+        periodic_interfaces = [interface for interface in model.periodic_interfaces if interface.turn is not None]
+        if not periodic_interfaces:
             return None
-        first = seams[0]
+        first = periodic_interfaces[0]
         assert first.turn is not None
-        for seam in seams:
-            if seam.sectors != first.sectors or _sense(seam, first.turn) == 0:
+        for interface in periodic_interfaces:
+            if interface.sectors != first.sectors or _sense(interface, first.turn) == 0:
                 raise ModelError(
                     "nodal diameters need one axis and one number of sectors: the cyclic symmetries differ"
                 )
         points = model.mesh.points
         off = points[first.second].mean(axis=0) - first.turn @ points[first.first].mean(axis=0)
-        return cls(first.sectors, first.turn, seams, np.linalg.lstsq(np.eye(len(off)) - first.turn, off)[0])
+        return cls(
+            first.sectors, first.turn, periodic_interfaces, np.linalg.lstsq(np.eye(len(off)) - first.turn, off)[0]
+        )
 
     def diameters(self, asked: int | str | Sequence[int]) -> list[int]:
         """Return the nodal diameters asked for, ascending; ModelError if the ring has none of that number."""
@@ -74,10 +76,16 @@ class Sectors:
         return found
 
 
-def _sense(seam: Seam, turn: Array) -> int:
-    """Return 1 where a seam turns as `turn` (dim, dim) does, -1 where it turns back, 0 where it does neither."""
-    assert seam.turn is not None
-    return 1 if np.allclose(seam.turn, turn, atol=1e-9) else -1 if np.allclose(seam.turn, turn.T, atol=1e-9) else 0
+def _sense(interface: PeriodicInterface, turn: Array) -> int:
+    """Return 1 where a interface turns as `turn` (dim, dim) does, -1 where it turns back, 0 where it does neither."""
+    assert interface.turn is not None
+    return (
+        1
+        if np.allclose(interface.turn, turn, atol=1e-9)
+        else -1
+        if np.allclose(interface.turn, turn.T, atol=1e-9)
+        else 0
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,11 +105,11 @@ class Wave:
         """Whether it stands: modes of others come in pairs, a quarter of a wave apart."""
         return 2 * self.diameters in (0, self.sectors.number)
 
-    def phase(self, seam: Seam) -> complex:
-        """Return what the second end of a seam has more than the first one, beside the turn [-]."""
+    def phase(self, interface: PeriodicInterface) -> complex:
+        """Return what the second end of a interface has more than the first one, beside the turn [-]."""
         if self.single:
             return 1.0 if self.diameters == 0 else -1.0
-        return complex(np.exp(1j * _sense(seam, self.sectors.turn) * self.angle))
+        return complex(np.exp(1j * _sense(interface, self.sectors.turn) * self.angle))
 
     def real(self, A: AnyArray) -> csr_array:
         """Return the real form of a sparse matrix (m, n), complex or not."""
@@ -122,13 +130,15 @@ class Wave:
         """Return values (n, ...) of nodes or displacements of real and imaginary parts."""
         return values if self.single else np.concatenate([values, values])
 
-    def relations(self, model: Model, others: Sequence[Relation]) -> list[Relation]:
+    def relations(self, model: Model, others: Sequence[MultiPointConstraint]) -> list[MultiPointConstraint]:
         """Return the relations of real and imaginary parts: `others`, and those of the ends of the sector with phases."""
         ends = [
-            Relation("cyclic symmetry", self.real(turned_rows(seam, self.phase(seam), model.mesh)))
-            for seam in self.sectors.seams
+            MultiPointConstraint(
+                "cyclic symmetry", self.real(turned_rows(interface, self.phase(interface), model.mesh))
+            )
+            for interface in self.sectors.periodic_interfaces
         ]
-        return [*(Relation(own.name, self.real(own.rows)) for own in others), *ends]
+        return [*(MultiPointConstraint(own.name, self.real(own.rows)) for own in others), *ends]
 
     def joined(self, held: Conditions) -> Conditions:
         """Return conditions of contact in the real form, one at each place of the ring.
@@ -146,15 +156,15 @@ class Wave:
     def _combined(self, held: Conditions) -> tuple[csr_array, Indices]:
         """Return the matrix (k, q) from conditions to those of the ring, and the condition (k,) that each is most like."""
         left, blocks = np.ones(len(held.nodes), bool), []
-        for seam in self.sectors.seams:
-            own = np.flatnonzero(np.isin(held.nodes, seam.first) | np.isin(held.nodes, seam.second))
-            for a, b in zip(seam.first.tolist(), seam.second.tolist(), strict=True):
+        for interface in self.sectors.periodic_interfaces:
+            own = np.flatnonzero(np.isin(held.nodes, interface.first) | np.isin(held.nodes, interface.second))
+            for a, b in zip(interface.first.tolist(), interface.second.tolist(), strict=True):
                 here, there = own[held.nodes[own] == a], own[held.nodes[own] == b]
                 if a == b and len(here):
                     blocks.append((self._around(held, here), here, here))
                     left[here] = False
                 elif len(here) and len(there):
-                    block = self._across(held, seam, here, there)
+                    block = self._across(held, interface, here, there)
                     blocks.append((block, here, np.concatenate([here, there])))
                     left[here] = left[there] = False
         rest = np.flatnonzero(left)
@@ -170,16 +180,16 @@ class Wave:
         entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
         return csr_array(coo_array(entries, shape=(count, len(held.nodes)))), np.concatenate(kept)
 
-    def _across(self, held: Conditions, seam: Seam, here: Indices, there: Indices) -> AnyArray:
-        """Return the part (k, k + l) of conditions at the first node of a seam, and at the second, whose sector is behind."""
-        assert seam.turn is not None
+    def _across(self, held: Conditions, interface: PeriodicInterface, here: Indices, there: Indices) -> AnyArray:
+        """Return the part (k, k + l) of conditions at the first node of a interface, and at the second, whose sector is behind."""
+        assert interface.turn is not None
         share = np.nan_to_num(held.areas[np.concatenate([here, there])], posinf=0.0)
         first, second = share[: len(here)].max(), share[len(here) :].max()
         part = first / (first + second) if first + second > 0.0 else 0.5
         alike = np.ones((len(here), len(there)))
         if held.directions is not None:
-            alike = held.directions[here] @ (held.directions[there] @ seam.turn).T
-        return np.hstack([part * np.eye(len(here)), (1.0 - part) * np.conj(self.phase(seam)) * alike])
+            alike = held.directions[here] @ (held.directions[there] @ interface.turn).T
+        return np.hstack([part * np.eye(len(here)), (1.0 - part) * np.conj(self.phase(interface)) * alike])
 
     def _around(self, held: Conditions, here: Indices) -> AnyArray:
         """Return the combinations (k, q) of the conditions of a node on the axis that do not cancel round the ring."""
@@ -196,7 +206,11 @@ class Wave:
 def without_ends(model: Model, sectors: Sectors) -> Model:
     """Return the model without the relations of the ends of its sector."""
     made = copy.copy(model)
-    made.relations = [own for own in model.relations if not any(own is seam.relation for seam in sectors.seams)]
+    made.relations = [
+        own
+        for own in model.relations
+        if not any(own is interface.relation for interface in sectors.periodic_interfaces)
+    ]
     return made
 
 

@@ -60,7 +60,7 @@ class HeldContact:
     nodes : ndarray of int (m,)
         The secondary node of each.
     springs : list of (csr_array (m, n_dofs), ndarray (m, m))
-        Rows [-] that give way, and by how much [length / force].
+        Compliant rows [-], and their compliance [length / force].
     """
 
     rows: csr_array
@@ -100,8 +100,8 @@ def held_contact(model: Model, step: StepResult | None, held: HeldMotions, hold_
             raise ModelError(f"modes know no cohesion or adhesion: tie contact '{pair.name}', or leave it out")
         at = _configuration(model, step, contact)
         position = at.obstacle if contact is not None else np.zeros(model.mesh.dim)
-        part = model.force_driven.constraints(pair.name, bound.constraints(at), position)
-        found += _conditions(bound, part, contact, hold_sliding)
+        constraints = model.force_driven.constraints(pair.name, bound.constraints(at), position)
+        found += _conditions(bound, constraints, contact, hold_sliding)
     return found
 
 
@@ -178,15 +178,15 @@ def _compliance(tested: csr_array, softness: Array | None) -> csr_array | None:
     return csr_array(tested @ diags_array(softness) @ tested.T)
 
 
-def _nodes(pair: Formulation, part: Constraints, moments: csr_array) -> Indices:
+def _nodes(pair: Formulation, constraints: Constraints, moments: csr_array) -> Indices:
     """Return the secondary node (q,), as an index on its side, of each row of the moments (q, m)."""
-    if isinstance(part.nodal, PressureField):
-        field = part.nodal
+    if isinstance(constraints.nodal, PressureField):
+        field = constraints.nodal
         alone = moments.indices[moments.indptr[len(field.independent) : -1]]  # points on an axis
         nearest = field.around[alone, field.shape[alone].argmax(axis=1)]
         return np.concatenate([field.independent, nearest])
     points = pair.secondary.points
-    if part.nodes is None:
+    if constraints.nodes is None:
         return np.arange(len(points))
     order = np.argsort(points)
-    return np.asarray(order[np.searchsorted(points, part.nodes[: moments.shape[0]], sorter=order)])
+    return np.asarray(order[np.searchsorted(points, constraints.nodes[: moments.shape[0]], sorter=order)])
