@@ -25,12 +25,15 @@ CANCELLED = 1e-12
 class PeriodicInterface(NamedTuple):
     """Nodes of two groups that are one and the same place of a part that repeats itself: each (m,).
 
-    Vectors at the second node are those at the first one times `turn` (dim, dim); None where nothing turns.
+    Of the ends of one of several `sectors`, vectors at the second node are those at the first one times `turn` (dim, dim),
+    which `relation` says; None where nothing turns.
     """
 
     first: Indices
     second: Indices
     turn: Array | None = None
+    sectors: int = 1
+    relation: MultiPointConstraint | None = None
 
 
 def same_place(interfaces: Sequence[PeriodicInterface], n_points: int) -> Indices | None:
@@ -117,14 +120,24 @@ def cyclic(
             f"{name}: point {first[far]} of '{ends[0]}', turned by 1/{sectors} of a turn, lies {distance[far]:.3g} from the "
             f"nearest node of '{ends[1]}': the ends need nodes upon nodes; check axis and sectors, or mesh them alike"
         )
-    interface = PeriodicInterface(first, second[match], turn)
-    # u_second = Q u_first: rows (u_second - Q u_first) along the axes of the mesh, none for what lies along the axis on it.
+    interface = PeriodicInterface(first, second[match], turn, sectors)
+    relation = MultiPointConstraint(name, turned_rows(interface, 1.0, mesh))
+    return [relation], interface._replace(relation=relation)
+
+
+def turned_rows(interface: PeriodicInterface, phase: complex, mesh: Mesh) -> csr_array:
+    """Return the rows (m, n_dofs) of ``u_second = phase Q u_first`` along the axes of the mesh, Q being the turn of a interface.
+
+    None for what lies along the axis on it, without a phase.
+    """
+    assert interface.turn is not None
+    back = -phase * interface.turn.T
     rows = csr_array(
-        vstack([_differences(interface, np.column_stack([unit, -turn.T @ unit]), mesh) for unit in np.eye(mesh.dim)])
+        vstack([_differences(interface, np.column_stack([unit, back @ unit]), mesh) for unit in np.eye(mesh.dim)])
     )
     rows.data[np.abs(rows.data) < CANCELLED] = 0.0
     rows.eliminate_zeros()
-    return [MultiPointConstraint(name, csr_array(rows[np.diff(rows.indptr) > 0]))], interface
+    return csr_array(rows[np.diff(rows.indptr) > 0])
 
 
 def _turned(

@@ -96,7 +96,8 @@ class ModelContact(ModelConnections):
             - ``conductance``: of heat that crosses, by area and difference of temperatures: a number, where the sides touch;
               a function of pressures and gaps (m,); pairs (pressure, conductance); or a mapping of ``"pressure"``, ``"gap"``
               to pairs. Without one none crosses. ``friction_heat``: what part of the work of friction becomes heat, half of
-              it on each side, with load factors as times [-].
+              it on each side, with load factors as times [-]. ``obstacle_temperature``: of a rigid obstacle, to which heat
+              crosses by its conductance [temperature].
             - ``search_distance``: what is farther off than this, or deeper inside, now and as the load step begins, is not
               faced [length].
             - ``normals``: ``"facet"`` or ``"averaged"`` between the facets that meet at a node at less than 45 degrees, which
@@ -323,10 +324,11 @@ class ModelContact(ModelConnections):
         self.contact.append(pair)
 
     @typed(ModelError)
-    def bind(self, pair: ContactPair, held: HeldMotions | None = None) -> Formulation:
+    def bind(self, pair: ContactPair, held: HeldMotions | None = None, *, sectors_alike: bool = True) -> Formulation:
         """Return the formulation of a contact pair on this mesh; see `add_contact` for the errors.
 
-        `held` are the motions of nodes that supports and relations prescribe, where they are known.
+        `held` are the motions of nodes that supports and relations prescribe, where they are known; `sectors_alike` tells
+        whether pressures are the same at both ends of a sector.
         """
         if pair.formulation not in FORMULATIONS:
             raise ContactError(unknown("contact formulation", pair.formulation, FORMULATIONS))
@@ -338,7 +340,11 @@ class ModelContact(ModelConnections):
                 raise ContactError(unknown(f"option of {pair.formulation}", option, known))
         specific = {key: value for key, value in pair.options.items() if key not in SHARED_OPTIONS}
         check_fields(f"contact '{pair.name}'", specific, kind, ContactError)
-        secondary = surface(self.mesh, pair.secondary)
+        ends = [
+            (one.first, one.second, np.eye(self.mesh.dim) if one.turn is None else one.turn)
+            for one in self.periodic_interfaces
+        ]
+        secondary = surface(self.mesh, pair.secondary).with_seams(ends)
         options = pair_options(
             pair.name, pair.options, self.mesh, secondary, against_obstacle=pair.obstacle is not None
         )
@@ -351,13 +357,13 @@ class ModelContact(ModelConnections):
             primary = RigidSide(pair.obstacle, np.array(pair.motion), pair.rotation)
             specific.setdefault("surface_smoothing", False)
         else:
-            primary = surface(self.mesh, pair.primary)
+            primary = surface(self.mesh, pair.primary).with_seams(ends)
             check_sides(self.mesh, pair.name, secondary, primary, options.excluded)
         modulus = min((m.contact_modulus for m, _ in self.materials), default=1.0)
         axisymmetric = self.kinematics == "axisymmetric"
         # Tangential fields that turn from one end to the other are not one field of components.
-        friction = pair.options.get("friction")
-        interfaces = [end for end in self.periodic_interfaces if end.turn is None or not friction]
+        turning = sectors_alike and not pair.options.get("friction")
+        interfaces = [interface for interface in self.periodic_interfaces if interface.turn is None or turning]
         options = dataclasses.replace(
             options,
             same_place=same_place(interfaces, self.mesh.n_points),
