@@ -8,7 +8,8 @@ from fastcontact.analysis.contact_resultants import contact_moment as contact_mo
 from fastcontact.analysis.contact_resultants import contact_resultants as contact_resultants
 from fastcontact.analysis.contact_resultants import wear as wear
 from fastcontact.analysis.criteria import Criteria as Criteria
-from fastcontact.analysis.modes import Modes as Modes
+from fastcontact.analysis.modal.shapes import Modes as Modes
+from fastcontact.analysis.modal.shapes import RingModes as RingModes
 from fastcontact.analysis.modes import modes as modes
 from fastcontact.analysis.run import solve as solve
 from fastcontact.analysis.run import solve_steps as solve_steps

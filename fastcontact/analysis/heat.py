@@ -90,8 +90,9 @@ class Heat:
         return any({"conductance", "friction_heat"} & set(pair.options) for pair in self.model.contact)
 
     def temperatures(
-        self, instant: float, contact: csr_array | None = None, friction: Array | None = None
-    ) -> Temperatures:
+        self, instant: float, contact: csr_array | None = None, friction: Array | None = None,
+        obstacles: tuple[csr_array, Array] | None = None,
+    ) -> Temperatures:  # fmt: skip
         """Return the temperatures at an instant of the ramp.
 
         Parameters
@@ -101,6 +102,8 @@ class Heat:
             Matrix of what contacts conduct [power / temperature].
         friction : ndarray (n_points,), optional
             Powers of nodes by friction [power].
+        obstacles : (csr_array (n_points, n_points), ndarray (n_points,)), optional
+            Films between bodies and rigid obstacles: matrix [power / temperature], and powers by the obstacles' rise [power].
 
         Raises
         ------
@@ -113,9 +116,12 @@ class Heat:
         )
         rubbed = np.zeros(n) if friction is None else friction
         inner = self.matrix if contact is None else csr_array(self.matrix + contact)
-        self._check_reached(contact)
+        films = self.films
+        if obstacles is not None:
+            films, ambient = csr_array(films + obstacles[0]), ambient + obstacles[1]
+        self._check_reached(contact, films)
         P, power = self.merged, loads + ambient + rubbed
-        A, f = csr_array(P.T @ (inner + self.films) @ P), P.T @ power
+        A, f = csr_array(P.T @ (inner + films) @ P), P.T @ power
         used = np.zeros(n, bool)
         used[P.indices] = self.body >= 0
         free = np.flatnonzero(used & ~self.fixed)
@@ -125,7 +131,7 @@ class Heat:
         reaction = np.where(self.fixed, out, 0.0)
         round_off = ROUND_OFF * float((abs(A) @ np.abs(rise)).max())
         rise = P @ rise
-        given_off = ambient - self.films @ rise
+        given_off = ambient - films @ rise
         largest = max(float(np.abs(part).max()) for part in (reaction, loads, given_off, rubbed, P.T @ (inner @ rise)))
         residual = float(np.abs(out[free]).max(initial=0.0))
         if residual > max(self.criteria.relative * largest, round_off):
@@ -147,9 +153,9 @@ class Heat:
         solver.prepare(bsr_array((A.data[:, None, None], A.indices, A.indptr), shape=A.shape), np.ones((len(f), 1)))
         return solver.load(f).full_solution(np.zeros(len(f)))
 
-    def _check_reached(self, contact: csr_array | None) -> None:
+    def _check_reached(self, contact: csr_array | None, films: csr_array) -> None:
         """Raise ConvergenceError if nothing determines the temperature of a body."""
-        held = self.merged @ self.fixed + self.films.diagonal() > 0.0
+        held = self.merged @ self.fixed + films.diagonal() > 0.0
         pairs = coo_array(self.merged if contact is None else self.merged + contact)
         joined = np.stack([pairs.row, pairs.col], axis=1)[pairs.data != 0.0]
         alone = not_reached(self.body, held, joined)

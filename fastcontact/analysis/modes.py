@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import bsr_array
 
 from fastcontact._jit import parallel
+from fastcontact.analysis.modal.cyclic import Sectors, Wave, pairs_of, without_ends
 from fastcontact.analysis.modal.eigenpairs import lowest
-from fastcontact.analysis.modal.held_contact import held_contact
+from fastcontact.analysis.modal.held_contact import Conditions, held_contact, joined
 from fastcontact.analysis.modal.reduced import Reduced
+from fastcontact.analysis.modal.shapes import Modes
 from fastcontact.analysis.problem import near_nullspace
 from fastcontact.analysis.stages import at_present_length, stage_of
-from fastcontact.arrays import Array
+from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.contact.held_motions import HeldMotions
-from fastcontact.elasticity import recovery
 from fastcontact.elasticity.cell_stress import CellStress
 from fastcontact.elasticity.constrained_system import System
 from fastcontact.elasticity.inertia_loads import Densities
@@ -26,94 +26,14 @@ from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.elasticity.multipoint_constraints import stacked_rows
 from fastcontact.elasticity.springs import stiffened
 from fastcontact.elasticity.stiffness import stiffness
-from fastcontact.errors import FileError, ModelError
+from fastcontact.errors import ModelError, warn
 from fastcontact.linear import choice
 from fastcontact.mesh.argument_types import typed
-from fastcontact.mesh.html_table import html_table
 from fastcontact.model.model import Model
 from fastcontact.results.step import StepResult
 
-if TYPE_CHECKING:
-    import pandas
-
 # The shift that makes free bodies regular, by the eigenvalue of a uniform deformation: below those of all but thin bodies.
 SHIFT = 1e-4
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Modes(Sequence[StepResult]):
-    """Modes of a model: a sequence of shapes, each a `StepResult` for pictures and files, that prints as a table.
-
-    Attributes
-    ----------
-    frequencies : ndarray (n,)
-        Ascending [1 / time]; about zero for rigid motions, negative for shapes that grow by themselves.
-    eigenvalues : ndarray (n,)
-        Squares of the angular frequencies [1 / time^2].
-    shapes : ndarray (n, n_points, dim)
-        Displacements of unit modal mass: ``shape . M shape = 1`` [1 / mass^(1/2)].
-    participation : ndarray (n, dim)
-        Of a uniform acceleration along each axis: ``shape . M e`` [mass^(1/2)].
-    mass : ndarray (dim,)
-        Of all that moves along each axis [mass]; in axisymmetry zero along the radius.
-    """
-
-    frequencies: Array
-    eigenvalues: Array
-    shapes: Array
-    participation: Array
-    mass: Array
-    _model: Model = field(repr=False)
-    _field: MaterialField = field(repr=False)
-
-    @property
-    def effective_mass(self) -> Array:
-        """Effective modal masses (n, dim) [mass], the squares of the participation factors, whose sum is the total mass."""
-        return np.asarray(self.participation**2)
-
-    def __len__(self) -> int:
-        return len(self.frequencies)
-
-    def __getitem__(self, index: Any) -> Any:
-        """Return a mode as a step: its shape, the stress of that, and the frequency as load factor."""
-        if isinstance(index, slice):
-            return [self[k] for k in range(*index.indices(len(self)))]
-        number, model = range(len(self))[index], self._model
-        u = self.shapes[number]
-        stress = recovery.nodal_stress(
-            model.mesh, model.kinematics, self._field.moduli, self._field.loops, u, self._field.treatment
-        )
-        equivalent = recovery.von_mises(stress)
-        signed = recovery.von_mises_signed(stress, equivalent)
-        frequency = float(self.frequencies[number])
-        return StepResult(number + 1, frequency, u.copy(), stress, equivalent, signed, np.zeros_like(u))
-
-    def __repr__(self) -> str:
-        rows = [self._columns, *self._rows("{:.6g}")]
-        widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
-        return "\n".join("  ".join(text.rjust(width) for text, width in zip(row, widths)) for row in rows)
-
-    def _repr_html_(self) -> str:
-        return html_table(self._rows("{:.6g}"), self._columns, "Modes")
-
-    @property
-    def _columns(self) -> tuple[str, ...]:
-        return ("mode", "frequency", *(f"effective mass {axis}" for axis in "xyz"[: len(self.mass)]))
-
-    def _rows(self, numbers: str) -> list[tuple[str, ...]]:
-        return [
-            (str(k + 1), numbers.format(f), *(numbers.format(mass) for mass in masses))
-            for k, (f, masses) in enumerate(zip(self.frequencies, self.effective_mass))
-        ]
-
-    def to_pandas(self) -> pandas.DataFrame:
-        """Return frequencies and effective masses as a ``pandas.DataFrame``; FileError if pandas is not installed."""
-        try:
-            import pandas
-        except ImportError as error:
-            raise FileError("to_pandas needs pandas: pip install pandas") from error
-        data = np.column_stack([np.arange(1, len(self) + 1), self.frequencies, self.effective_mass])
-        return pandas.DataFrame(data, columns=list(self._columns)).astype({"mode": int})
 
 
 @typed(ModelError)
@@ -125,6 +45,7 @@ def modes(
     *,
     stress_stiffening: bool = True,
     hold_sliding: bool = False,
+    nodal_diameters: int | str | Sequence[int] | None = None,
     linear_solver: str = "auto",
 ) -> Modes:
     """Return the lowest frequencies and shapes of small vibrations, about a settled load step or at rest.
@@ -142,13 +63,17 @@ def modes(
         Of this model, from `solve` or a result file. Without one the model is at rest and without stress, and contact holds
         nothing but tied and bilateral pairs.
     n : int
-        How many.
+        How many, of each number of nodal diameters; modes in pairs count once.
     stress_stiffening : bool
         Whether stresses of the step count.
     hold_sliding : bool
         Whether nodes that slide in the step are held along the surface, too, as friction does as soon as small motions turn
         the slip round. Without, what friction alone holds and slides everywhere, as a bolt that is pressed on all round may,
         is free to turn.
+    nodal_diameters : int, sequence of int or "all", optional
+        Of the whole ring that a model with one cyclic symmetry stands for: from 0 to half the number of sectors. Modes are
+        then those of the ring: all but those of 0 and of half the sectors come in pairs of one frequency. Without, motions
+        are alike in all sectors, as of 0 nodal diameters; a warning tells so.
     linear_solver : str
         As for `solve`: by factors the Lanczos method, by multigrid conjugate gradients (LOBPCG).
 
@@ -181,27 +106,94 @@ def modes(
             f"{model.mesh.points.shape}: take a step of this model"
         )
     model = stage_of(model, step)
-    density = Densities([material for material, _ in model.materials], model.material_of_cells())
-    field, driven = model.material_field(), model.force_driven
-    K = _stiffness(model, step if stress_stiffening else None, field)
-    M = mass(model.mesh, model.kinematics, density)
-    supported, _ = model.prescribed_by_ramp()
-    contact = held_contact(
-        model, step, HeldMotions.of(supported, stacked_rows(model.relations, model.n_dofs)), hold_sliding
-    )
-    shift = SHIFT * _uniform(model, K, M)
-    relations = driven.relations([*model.relations, *at_present_length(model)])
-    K, M = contact.stiffened(driven.stiffness(K)), driven.stiffness(M)
-    touched = np.isin(np.arange(K.shape[0]), contact.rows.indices)
-    system = System(K, driven.supported(supported).ravel(), relations, driven.without_stiffness & touched)
-    reduced = Reduced(system, M, contact.rows, contact.nodes)
-    if n >= int(reduced.free.sum()):
-        raise ModelError(f"n = {n} modes of {int(reduced.free.sum())} free displacements: ask for fewer")
-    solver = choice.make(linear_solver, dim=model.mesh.dim, n_dofs=model.n_dofs, columns=True)
-    solver.contrast = field.contrast
-    soft = np.where(reduced.free[:, None], driven.near_nullspace(near_nullspace(model)), 0.0)
-    values, vectors = lowest(solver, (reduced.K, reduced.M), soft, reduced.free, n, shift)
-    return _modes(model, field, M, values, reduced.displacement(vectors))
+    sectors = Sectors.of(model)
+    asked = _asked(model, sectors, nodal_diameters)
+    vibration = _Vibration.of(model, sectors, step if stress_stiffening else None, step, hold_sliding)
+    if sectors is None or asked is None:
+        values, vectors = vibration.lowest(n, linear_solver, None if sectors is None else Wave(sectors, 0))
+        return _modes(vibration, values, vectors)
+    waves = [Wave(sectors, d) for d in asked]
+    return _of_ring(vibration, sectors, [(wave, *vibration.of_wave(wave, n, linear_solver)) for wave in waves])
+
+
+def _asked(
+    model: Model, sectors: Sectors | None, nodal_diameters: int | str | Sequence[int] | None
+) -> list[int] | None:
+    """Return the nodal diameters asked for; ModelError where there can be none."""
+    if nodal_diameters is None:
+        if sectors is not None:
+            warn(
+                f"the modes are those of nodal diameter 0 alone, alike in all {sectors.number} sectors: the ring has others, "
+                'which nodal_diameters="all" finds'
+            )
+        return None
+    if sectors is None:
+        raise ModelError("nodal diameters need a sector of a ring: Model.add_cyclic_symmetry tells its ends")
+    if model.force_driven.pairs:
+        raise ModelError(
+            f"obstacle '{model.force_driven.pairs[0].name}' that a force drives is no part of a sector, so modes with "
+            "nodal diameters cannot have it: prescribe its motion"
+        )
+    return sectors.diameters(nodal_diameters)
+
+
+@dataclass(frozen=True, eq=False)
+class _Vibration:
+    """Matrices of small motions: stiffness K [force / length], mass M [mass], conditions of contact, and the shift of K."""
+
+    model: Model
+    field: MaterialField
+    K: bsr_array
+    M: bsr_array
+    contact: list[Conditions]
+    supported: Mask
+    shift: float
+
+    @classmethod
+    def of(
+        cls, model: Model, sectors: Sectors | None, stressed: StepResult | None, step: StepResult | None, hold_sliding: bool
+    ) -> _Vibration:  # fmt: skip
+        """Return those about a step, without the ends of sectors, whose stresses stiffen as `stressed` has them."""
+        density = Densities([material for material, _ in model.materials], model.material_of_cells())
+        field = model.material_field()
+        K = _stiffness(model, stressed, field)
+        M = mass(model.mesh, model.kinematics, density)
+        supported, _ = model.prescribed_by_ramp()
+        model = model if sectors is None else without_ends(model, sectors)
+        held = HeldMotions.of(supported, stacked_rows(model.relations, model.n_dofs))
+        contact = held_contact(model, step, held, hold_sliding)
+        return cls(model, field, K, M, contact, supported, SHIFT * _uniform(model, K, M))
+
+    def lowest(self, n: int, linear_solver: str, wave: Wave | None = None) -> tuple[Array, Array]:
+        """Return the n lowest eigenvalues (n,) and displacements (n_dofs, n), in the real form of a wave."""
+        model, driven = self.model, self.model.force_driven
+        relations = [*model.relations, *at_present_length(model)]
+        K, M, near = driven.stiffness(self.K), driven.stiffness(self.M), driven.near_nullspace(near_nullspace(model))
+        supported, massless = driven.supported(self.supported).ravel(), driven.without_stiffness
+        if wave is not None:
+            K, M, relations = wave.twice(K), wave.twice(M), wave.relations(model, relations)
+            supported, massless = wave.both(supported), wave.both(massless)
+            near = near if wave.single else np.asarray(np.kron(np.eye(2), near), float)
+        relations = driven.relations(relations)
+        contact = joined(self.contact, K.shape[0]) if wave is None else joined(self.contact, K.shape[0], wave.joined)
+        K = contact.stiffened(K)
+        touched = np.isin(np.arange(K.shape[0]), contact.rows.indices)
+        reduced = Reduced(System(K, supported, relations, massless & touched), M, contact.rows, contact.nodes)
+        if n >= int(reduced.free.sum()):
+            raise ModelError(f"n = {n} modes of {int(reduced.free.sum())} free displacements: ask for fewer")
+        solver = choice.make(linear_solver, dim=model.mesh.dim, n_dofs=K.shape[0], columns=True)
+        solver.contrast = self.field.contrast
+        soft = np.where(reduced.free[:, None], near, 0.0)
+        values, vectors = lowest(solver, (reduced.K, reduced.M), soft, reduced.free, n, self.shift)
+        return values, reduced.displacement(vectors)
+
+    def of_wave(self, wave: Wave, n: int, linear_solver: str) -> tuple[Array, AnyArray]:
+        """Return the n lowest eigenvalues (n,) and complex displacements (n_dofs, n) of a wave, of unit modal mass."""
+        values, vectors = self.lowest(n if wave.single else 2 * n, linear_solver, wave)
+        if wave.single:
+            return values, vectors
+        K, M = joined(self.contact, 2 * self.K.shape[0], wave.joined).stiffened(wave.twice(self.K)), wave.twice(self.M)
+        return pairs_of(vectors, K, M, n)
 
 
 def _stiffness(model: Model, step: StepResult | None, field: MaterialField) -> bsr_array:
@@ -232,14 +224,57 @@ def _uniform(model: Model, K: bsr_array, M: bsr_array) -> float:
     return min((own for own in densities if own > 0.0), default=1.0)
 
 
-def _modes(model: Model, field: MaterialField, M: bsr_array, values: Array, vectors: Array) -> Modes:
+def _modes(vibration: _Vibration, values: Array, vectors: Array) -> Modes:
     """Return modes from eigenvalues (n,) [1 / time^2] and displacements (n_dofs, n), their largest component positive."""
-    vectors = vectors * np.sign(vectors[np.abs(vectors).argmax(axis=0), np.arange(len(values))])
-    dim, count = model.mesh.dim, model.n_dofs
-    along = np.tile(np.eye(dim), (len(vectors) // dim, 1))
-    if model.kinematics == "axisymmetric":
+    momentum = _momentum(vibration)
+    dim = momentum.shape[1]
+    vectors = _upright(vectors[: len(momentum)])
+    mass = np.einsum("nii->i", momentum.reshape(-1, dim, dim))
+    return Modes(
+        _frequencies(values), values, vectors.T.reshape(len(values), -1, dim), vectors.T @ momentum, mass, vibration.model,
+        vibration.field,
+    )  # fmt: skip
+
+
+def _of_ring(vibration: _Vibration, sectors: Sectors, found: list[tuple[Wave, Array, AnyArray]]) -> Modes:
+    """Return the modes of the whole ring from eigenvalues (n,) and displacements (n_dofs, n) of each wave."""
+    momentum, number = _momentum(vibration), sectors.number
+    turns = [np.linalg.matrix_power(sectors.turn, k) for k in range(number)]
+    values: list[float] = []
+    shapes, participation, diameters, twins = [], [], [], []
+    for wave, eigenvalues, vectors in found:
+        vectors = (_upright(vectors) if wave.single else np.sqrt(2.0) * vectors) / np.sqrt(number)
+        phases = np.exp(1j * wave.angle * np.arange(number))
+        ring = np.einsum("nd,k,ked->ne", vectors.T @ momentum, phases, turns)
+        for value, vector, total in zip(eigenvalues.tolist(), vectors.T, ring, strict=True):
+            first = len(values)
+            twins += [first] if wave.single else [first + 1, first]
+            for part in (np.real,) if wave.single else (np.real, np.imag):
+                values.append(value)
+                diameters.append(wave.diameters)
+                shapes.append(part(vector).reshape(-1, momentum.shape[1]))
+                participation.append(part(total))
+    mass = number * np.einsum("nii->i", momentum.reshape(-1, momentum.shape[1], momentum.shape[1]))
+    eigenvalues = np.array(values)
+    return Modes(
+        _frequencies(eigenvalues), eigenvalues, np.array(shapes), np.array(participation), mass, vibration.model,
+        vibration.field, np.array(diameters), np.array(twins), sectors,
+    )  # fmt: skip
+
+
+def _frequencies(eigenvalues: Array) -> Array:
+    return np.asarray(np.sign(eigenvalues) * np.sqrt(np.abs(eigenvalues)) / (2.0 * np.pi))
+
+
+def _momentum(vibration: _Vibration) -> Array:
+    """Return the momentum (n_dofs, dim) of uniform unit velocities along each axis [mass]."""
+    dim = vibration.model.mesh.dim
+    along = np.tile(np.eye(dim), (vibration.M.shape[0] // dim, 1))
+    if vibration.model.kinematics == "axisymmetric":
         along[:, 0] = 0.0  # around the circle it has every direction
-    momentum = M @ along
-    frequencies = np.sign(values) * np.sqrt(np.abs(values)) / (2.0 * np.pi)
-    shapes = vectors[:count].T.reshape(len(values), -1, dim)
-    return Modes(frequencies, values, shapes, vectors.T @ momentum, np.diag(along.T @ momentum), model, field)
+    return np.asarray(vibration.M @ along)
+
+
+def _upright(vectors: Array) -> Array:
+    """Return vectors (size, n) whose largest component is positive."""
+    return np.asarray(vectors * np.sign(vectors[np.abs(vectors).argmax(axis=0), np.arange(vectors.shape[1])]))

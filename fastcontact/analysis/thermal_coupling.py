@@ -24,7 +24,6 @@ from fastcontact.arrays import Array
 from fastcontact.contact.conductance import crossing
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
-from fastcontact.contact.surface import Surface
 from fastcontact.errors import ConvergenceError
 from fastcontact.model.parts.heat import HEAT_FLUX
 from fastcontact.results.step import StepResult
@@ -137,24 +136,33 @@ def _conducted(problem: Problem, start: State, load: StepLoad, instant: float, e
         return Heated(steady.rise, steady.reaction, {**steady.balance, "contacts": {}}, {})
     n, solution, laws = problem.model.mesh.n_points, settled.solution, problem.model.conductances()
     matrix, rubbed, crossings = csr_array((n, n)), np.zeros(n), {}
+    obstacles, given = csr_array((n, n)), np.zeros(n)
     for name, rows in settled.constraints.rows().items():
         pair, law = problem.pairs[name], laws.get(name)
         if law is None and not pair.options.friction_heat:
             continue
         at = problem.configuration(name, start, load, problem.displacement(u), u)
         constraints, force, gap = _pressed(problem, settled, name, rows, at)
-        assert isinstance(pair.primary, Surface)
         assert constraints.nodal is not None
         own = crossing(constraints, pair.secondary, pair.primary, pair.points.shape)
         if law is not None:
             h, facing = np.zeros(len(gap)), own.area > 0.0
             h[facing] = law(force[facing] / own.area[facing], gap[facing])
-            matrix, crossings[name] = csr_array(matrix + own.matrix(h)), (own, constraints.nodal, h)
+            there = 0.0
+            if pair.options.obstacle_temperature is None:
+                matrix = csr_array(matrix + own.matrix(h))
+            else:
+                there = pair.options.obstacle_temperature - problem.model.reference_temperature
+                obstacles, given = (
+                    csr_array(obstacles + own.matrix(h)),
+                    given + own.secondary.T @ (h * own.area * there),
+                )
+            crossings[name] = own, constraints.nodal, h, there
         if pair.options.friction_heat and isinstance(solution, FrictionalEquilibrium):
             work = np.maximum(-(solution.tangential[rows] * solution.slip[rows]).sum(axis=1), 0.0)
             rubbed += own.shared(pair.options.friction_heat * work / (instant - start.instant))
-    steady = problem.heat.temperatures(instant, matrix, rubbed)
-    powers = {name: h * own.area * (own.jump @ steady.rise) for name, (own, _, h) in crossings.items()}
+    steady = problem.heat.temperatures(instant, matrix, rubbed, (obstacles, given))
+    powers = {name: h * own.area * (own.jump @ steady.rise - at) for name, (own, _, h, at) in crossings.items()}
     fluxes = {name: crossings[name][1].over_whole_side(power) for name, power in powers.items()}
     balance = {**steady.balance, "contacts": {name: float(power.sum()) for name, power in powers.items()}}
     return Heated(steady.rise, steady.reaction, balance, fluxes)

@@ -44,7 +44,7 @@ STUDY_ENTRIES: dict[str, tuple[Any, str]] = {
     "options": (dict, "a table of options of a formulation"),
     "parameters": (dict, 'a table of laws by path, { "material[0].E" = "value" }'),
 }
-MODES: dict[str, Any] = {"n": int, "stress_stiffening": bool, "hold_sliding": bool}
+MODES: dict[str, Any] = {"n": int, "stress_stiffening": bool, "hold_sliding": bool, "nodal_diameters": (int, str, list)}
 TOP: dict[str, Any] = {
     "title": str,
     "kinematics": str,

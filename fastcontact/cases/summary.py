@@ -18,7 +18,7 @@ from fastcontact.results.step import CANCELLED, ContactResult, StepResult
 from fastcontact.results.units import units_of_results, valued, with_unit
 
 if TYPE_CHECKING:
-    from fastcontact.analysis.modes import Modes
+    from fastcontact.analysis.modal.shapes import Modes
 
 # Numbers that a theory must have to be compared as a whole.
 COMPARED = ("force", "pressure_max", "radius")
@@ -97,7 +97,10 @@ def _heat(last: StepResult) -> dict[str, Any]:
 
 
 def _modes(modes: Modes) -> dict[str, Any]:
-    return {"frequencies": modes.frequencies.tolist(), "effective_mass": modes.effective_mass.tolist()}
+    table = {"frequencies": modes.frequencies.tolist(), "effective_mass": modes.effective_mass.tolist()}
+    if modes.nodal_diameters is None or modes.twins is None:
+        return table
+    return {**table, "nodal_diameters": modes.nodal_diameters.tolist(), "twins": modes.twins.tolist()}
 
 
 def of_step(step: StepResult) -> dict[str, Any]:
@@ -238,11 +241,27 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
     for found_here in summary["sensitivities"]:
         rows += _sensitivity_lines(found_here)
     if "modes" in summary:
-        shown = ", ".join(f"{frequency:.6g}" for frequency in summary["modes"]["frequencies"])
-        rows.append(f"  frequencies about the last step: {shown}")
+        rows += _mode_lines(summary["modes"])
     for check in summary["checks"]:
         rows += [_check_line(check, unit), *_why(check)]
     return rows
+
+
+def _mode_lines(table: Mapping[str, Any]) -> list[str]:
+    """Return the frequencies in lines, one for each number of nodal diameters, where pairs of modes are told once."""
+    frequencies = table["frequencies"]
+    diameters, twins = (
+        table.get("nodal_diameters", [None] * len(frequencies)),
+        table.get("twins", range(len(frequencies))),
+    )
+    found = []
+    for d in dict.fromkeys(diameters):
+        own = [k for k, other in enumerate(diameters) if other == d and k <= twins[k]]
+        shown = ", ".join(f"{frequencies[k]:.6g}" for k in own)
+        pairs = ", each of two modes" if any(twins[k] > k for k in own) else ""
+        where = "" if d is None else f", {count(d, 'nodal diameter')}{pairs}"
+        found.append(f"  frequencies about the last step{where}: {shown}")
+    return found
 
 
 def count(number: int, noun: str) -> str:

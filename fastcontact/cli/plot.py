@@ -35,6 +35,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--field", metavar="NAME", default="von_mises",
         help="what colours the mesh: von_mises (default), stress.xx, stress.principal_min, displacement.y, contact_slip ...",
     )  # fmt: skip
+    parser.add_argument(
+        "--phases",
+        metavar="N",
+        type=int,
+        help="with --animate: one vibration of the shape that is --step, in N pictures",
+    )
     parser.add_argument("--zoom", metavar="LENGTH", type=float, help="half the width to draw around the largest value")
     parser.add_argument("--mirrored", action="store_true", help="draw the full section beyond the axis, too")
     parser.add_argument("--scale", type=float, default=1.0, help="factor on the displacements (default 1)")
@@ -48,6 +54,8 @@ def run(options: argparse.Namespace) -> int:
     if not (options.png or options.view or options.animate):
         raise CaseError("name the picture to write with --png FILE, or ask for a window with --view")
     check_outputs([options.file], [options.animate], [options.png])
+    if options.phases is not None and not options.animate:
+        raise CaseError("--phases N are those of a moving picture: name it with --animate FILE")
     if options.png and options.animate:
         raise CaseError("--animate FILE names the file to write: leave out --png")
     plane = _plane(options.section) if options.section else None
@@ -58,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
             plot.view(results, step, scale=options.scale, title=case["title"], screenshot=options.png)
             return 0
         if options.animate:
-            _animate(options, results, case)
+            _animate(options, results, step, case)
         elif any(getattr(options, name) for name in OF_CONTACT):
             save(_of_contact(options, results, step, case), options.png)
         else:
@@ -77,12 +85,15 @@ def _plane(text: str) -> tuple[int, float]:
         raise CaseError(f"'{text}' is no plane: write for example y=0") from None
 
 
-def _animate(options: argparse.Namespace, results: Any, case: dict[str, Any]) -> None:
+def _animate(options: argparse.Namespace, results: Any, step: Any, case: dict[str, Any]) -> None:
     from fastcontact.results import plot
+    from fastcontact.results.phases import phases
 
+    shown = list(results) if options.phases is None else phases(step, options.phases)
     plot.animate(
-        results.mesh, list(results), options.animate, field=options.field, scale=options.scale,
+        results.mesh, shown, options.animate, field=options.field, scale=options.scale,
         mirrored=options.mirrored, title=case["title"], units=case["units"],
+        pictures_per_second=5 if options.phases is None else 12,
     )  # fmt: skip
 
 

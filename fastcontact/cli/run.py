@@ -41,6 +41,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--plot", metavar="PNG", help="plot the contact pressure of the last step against theory")
     parser.add_argument("--modes", metavar="FILE", help="write the modes about the last step, a step each (.vtkhdf)")
+    parser.add_argument(
+        "--nodal-diameters", metavar="N[,N...]",
+        help="modes of the whole ring of a sector by these nodal diameters, such as 0,1,2, or all; shapes are the ring's",
+    )  # fmt: skip
     parser.add_argument("--linear", metavar="SOLVER", help="auto, direct, amg, cholmod or pyamg (default: the case's)")
     parser.add_argument("--estimate-error", action="store_true", help="estimate the error of every cell, into the file")
     parser.add_argument("--strict", action="store_true", help="exit with code 3 if a check of the case fails")
@@ -96,17 +100,29 @@ def run(options: argparse.Namespace) -> int:
 
 def _modes(options: argparse.Namespace, case: Case, last: StepResult) -> Any:
     """Return the modes that the case or the command asks for, written to their file; None for none."""
-    if case.modes is None and not options.modes:
+    asked = {**(case.modes or {}), **_diameters(options.nodal_diameters)}
+    if case.modes is None and not options.modes and not asked:
         return None
     from fastcontact.analysis.modes import modes
     from fastcontact.results.writer import ResultWriter
 
-    computed = modes(case.model, last, **{"linear_solver": options.linear or case.linear_solver, **(case.modes or {})})
+    computed = modes(case.model, last, **{"linear_solver": options.linear or case.linear_solver, **asked})
     if options.modes:
-        with ResultWriter(options.modes, case.model, case_text=case.text) as writer:
-            for mode in computed:
+        shapes, of = (computed, case.model) if computed.twins is None else (computed.whole_ring(),) * 2
+        with ResultWriter(options.modes, of, case_text=case.text) as writer:
+            for mode in shapes:
                 writer.write(mode)
     return computed
+
+
+def _diameters(text: str | None) -> dict[str, Any]:
+    """Return the argument of `fastcontact.modes` for numbers such as ``0,1,2``, or ``all``; empty for None."""
+    if text is None:
+        return {}
+    try:
+        return {"nodal_diameters": text if text == "all" else [int(number) for number in text.split(",")]}
+    except ValueError:
+        raise CaseError(f"--nodal-diameters {text}: write whole numbers with commas between them, or all") from None
 
 
 class _Done(NamedTuple):

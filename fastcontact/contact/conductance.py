@@ -15,11 +15,12 @@ import numpy as np
 from scipy.sparse import csr_array, diags_array
 
 from fastcontact.arrays import Array
+from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError
 
 if TYPE_CHECKING:
     from fastcontact.contact.constraints import Constraints
-    from fastcontact.contact.surface import Surface
+    from fastcontact.contact.obstacles.rigid_side import RigidSide
 
 TABLES = ("pressure", "gap")
 
@@ -142,15 +143,18 @@ class Crossing:
         return np.asarray(0.5 * (self.secondary.T @ power + self.primary.T @ power))
 
 
-def crossing(constraints: Constraints, secondary: Surface, primary: Surface, shape: tuple[int, ...]) -> Crossing:
+def crossing(
+    constraints: Constraints, secondary: Surface, primary: Surface | RigidSide, shape: tuple[int, ...]
+) -> Crossing:
     """Return where heat crosses between two sides by constraints, whose rows weight motions along one normal each.
 
-    `shape` is that of the points of the mesh, (n_points, dim).
+    A rigid primary side has no points, and no weights. `shape` is that of the points of the mesh, (n_points, dim).
     """
     n, dim = shape
     mine = np.zeros(n, bool)
     mine[secondary.points] = True
-    mine[primary.points] = False
+    if isinstance(primary, Surface):
+        mine[primary.points] = False
     by_axis = [csr_array(constraints.B[:, : n * dim][:, axis::dim]) for axis in range(dim)]
     normal = np.stack([rows @ mine for rows in by_axis], axis=1)
     length = np.einsum("md,md->m", normal, normal)

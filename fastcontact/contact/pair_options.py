@@ -53,6 +53,8 @@ class PairOptions:
         Of heat that crosses the contact; None: none does.
     friction_heat : float
         What part of the work of friction becomes heat [-].
+    obstacle_temperature : float, optional
+        Of the rigid obstacle, where heat crosses to it [temperature].
     cohesion : CohesiveLaw, optional
         Of tension between the sides; None without.
     source : ndarray of bool (n_points,), optional
@@ -76,6 +78,7 @@ class PairOptions:
     wear: float | None = None
     conductance: Conductance | None = None
     friction_heat: float = 0.0
+    obstacle_temperature: float | None = None
     cohesion: CohesiveLaw | None = None
     source: Mask | None = None
     same_place: Indices | None = None

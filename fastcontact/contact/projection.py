@@ -88,7 +88,8 @@ def _nodal_means(side: Surface, values: Sequence[Array], angles: Sequence[Array]
     n, dim = len(side.points), values[0].shape[2]
     at = np.concatenate([block.local.ravel() for block in side.blocks])
     weighted = [(angle[:, :, None] * normals).reshape(-1, dim) for normals, angle in zip(values, angles, strict=True)]
-    total = np.column_stack([np.bincount(at, part, n) for part in np.concatenate(weighted).T])
+    total: Array = np.column_stack([np.bincount(at, part, n) for part in np.concatenate(weighted).T])
+    side.add_across_ends(total)
     return total / np.linalg.norm(total, axis=1, keepdims=True)
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -49,12 +49,31 @@ class Surface:
         The nodes; in order along the line where the facets form one open line, else ascending.
     abscissa : ndarray (m,)
         Length along the surface to each node [length]; zero where there is no such order.
+    periodic_interfaces : tuple of (ndarray of int (k,), ndarray of int (k,), ndarray (dim, dim))
+        Positions in `points` at both ends of a part that repeats itself, and the turn [-] from the first to the second: there
+        the surface goes on.
     """
 
     group: str
     blocks: tuple[FacetBlock, ...]
     points: Numbers
     abscissa: Array
+    periodic_interfaces: tuple[tuple[Indices, Indices, Array], ...] = ()
+
+    def with_periodic_ends(self, ends: Iterable[tuple[Indices, Indices, Array]]) -> Surface:
+        """Return the surface that goes on at ends (k,) and (k,), by number of points, as far as it reaches them."""
+        order, interfaces = np.argsort(self.points), []
+        for first, second, turn in ends:
+            both = np.isin(first, self.points) & np.isin(second, self.points) & (first != second)
+            rows = (order[np.searchsorted(self.points, end[both], sorter=order)] for end in (first, second))
+            interfaces.append((*rows, turn))
+        return replace(self, periodic_interfaces=tuple(interfaces))
+
+    def add_across_ends(self, vectors: Array) -> None:
+        """Add up vectors (m, dim), sums over the facets at each end of an interface, over the facets of both ends."""
+        for first, second, turn in self.periodic_interfaces:
+            vectors[first] += vectors[second] @ turn
+            vectors[second] = vectors[first] @ turn.T
 
     @property
     def n_facets(self) -> int:

@@ -39,6 +39,8 @@ class TiedPair:
         What forces at the places of the formulation mean at its nodes.
     nodes : ndarray of int (q,), optional
         The secondary nodes that the gaps belong to, see `Constraints`.
+    areas : ndarray (q,), optional
+        Integrals of the functions that the equations are tested with [area].
     """
 
     moments: csr_array
@@ -47,6 +49,7 @@ class TiedPair:
     positions: Array
     nodal: NodalField
     nodes: Indices | None = None
+    areas: Array | None = None
 
     def constraints(self) -> Constraints:
         """Return the equations."""
@@ -66,24 +69,28 @@ class TiedPair:
 
 def tied(constraints: Constraints) -> TiedPair:
     """Return the tying equations of the constraints `constraints`, which have tangents."""
-    moments = moments_of(constraints)
+    moments, areas = moments_of(constraints)
     size = np.maximum(np.asarray(abs(moments).sum(axis=1)).ravel(), 1e-300)
     positions = abs(moments) @ constraints.positions / size[:, None]
     rows = tuple(_cleaned(csr_array(moments @ along)) for along in (constraints.B, *constraints.tangents))
     assert constraints.nodal is not None
-    return TiedPair(moments, rows, constraints.directions, positions, constraints.nodal, constraints.nodes)
+    return TiedPair(moments, rows, constraints.directions, positions, constraints.nodal, constraints.nodes, areas)
 
 
-def moments_of(constraints: Constraints) -> csr_array:
-    """Return the matrix (q, m) whose rows are the functions that the multipliers are combinations of."""
+def moments_of(constraints: Constraints) -> tuple[csr_array, Array | None]:
+    """Return the matrix (q, m) whose rows are the functions that the multipliers are combinations of.
+
+    Beside it the integrals (q,) of these functions, if known [area].
+    """
     if not isinstance(constraints.compliance, Projection):
-        return csr_array(eye_array(len(constraints.gap0), format="csr"))
+        return csr_array(eye_array(len(constraints.gap0), format="csr")), constraints.areas
     P, areas = constraints.compliance.P, constraints.compliance.areas
     weighted = csr_array(P.T @ diags_array(areas))
     scale = np.asarray(abs(weighted).sum(axis=1)).ravel()
     alone = np.flatnonzero((areas == 0.0) & constraints.usable)  # at the axis
     single = csr_array((np.ones(len(alone)), (np.arange(len(alone)), alone)), shape=(len(alone), len(areas)))
-    return csr_array(vstack([diags_array(1.0 / np.maximum(scale, 1e-300)) @ weighted, single]))
+    whole = np.concatenate([scale, np.zeros(len(alone))])
+    return csr_array(vstack([diags_array(1.0 / np.maximum(scale, 1e-300)) @ weighted, single])), whole
 
 
 def _cleaned(rows: csr_array) -> csr_array:

@@ -78,6 +78,8 @@ class ForceDrivenObstacles:
 
     def relations(self, relations: Sequence[MultiPointConstraint]) -> list[MultiPointConstraint]:
         """Return relations whose rows have columns for the obstacles, too."""
+        if not self.pairs:
+            return list(relations)
         return [dataclasses.replace(relation, rows=self._wider(relation.rows)) for relation in relations]
 
     def _wider(self, rows: csr_array) -> csr_array:

@@ -22,7 +22,8 @@ from fastcontact.model.ramp import Table, table_of
 # Options that every contact pair takes, beside those of its formulation.
 SHARED_OPTIONS = (
     "adhesion", "clearance", "clearance_primary", "clearance_ramp", "cohesion", "conductance", "excluded", "friction_heat",
-    "friction_ramp", "frictionless", "frictionless_along", "kind", "penalty", "search_distance", "tangential_penalty", "wear",
+    "friction_ramp", "frictionless", "frictionless_along", "kind", "obstacle_temperature", "penalty", "search_distance",
+    "tangential_penalty", "wear",
 )  # fmt: skip
 
 
@@ -37,11 +38,7 @@ def pair_options(
         raise ContactError(
             f"a rigid obstacle has no nodes to measure from: give contact '{name}' the option 'clearance'"
         )
-    if against_obstacle and {"conductance", "friction_heat"} & set(options):
-        raise ContactError(
-            f"a rigid obstacle has no temperature: give '{side.group}' a film, and contact '{name}' no conductance or "
-            "friction_heat"
-        )
+    _check_obstacle_temperature(name, options, against_obstacle)
     if "clearance_ramp" in options and not {"clearance", "clearance_primary"} & set(options):
         raise ContactError(f"contact '{name}' has a clearance_ramp, but no clearance that it could multiply")
     clearance_ramp(name, options)
@@ -61,6 +58,7 @@ def pair_options(
         wear=_positive(name, "wear", options, "none"),
         conductance=Conductance(name, options["conductance"]) if "conductance" in options else None,
         friction_heat=_friction_heat(name, options),
+        obstacle_temperature=options.get("obstacle_temperature"),
         cohesion=_cohesion(name, options),
     )
 
@@ -151,6 +149,22 @@ def _positive(name: str, option: str, options: Mapping[str, Any], without: str) 
     if not value > 0:
         raise ContactError(f"{option} = {value} of contact '{name}' must be positive; leave it out for {without}")
     return float(value)
+
+
+def _check_obstacle_temperature(name: str, options: Mapping[str, Any], against_obstacle: bool) -> None:
+    """Refuse heat that crosses to an obstacle of unknown temperature, and a temperature of what is none."""
+    temperature = options.get("obstacle_temperature")
+    if temperature is None:
+        if against_obstacle and {"conductance", "friction_heat"} & set(options):
+            raise ContactError(
+                f"heat that crosses contact '{name}' needs the temperature of its obstacle: give it obstacle_temperature=..."
+            )
+        return
+    check_number(f"the obstacle_temperature of contact '{name}'", temperature)
+    if not against_obstacle:
+        raise ContactError(f"contact '{name}' has an obstacle_temperature, but no obstacle: use fix_temperature")
+    if options.get("conductance") is None:
+        raise ContactError(f"contact '{name}' has an obstacle_temperature, but no conductance to the obstacle")
 
 
 def _friction_heat(name: str, options: Mapping[str, Any]) -> float:

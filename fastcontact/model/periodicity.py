@@ -30,13 +30,16 @@ CANCELLED = 1e-12
 class PeriodicInterface(NamedTuple):
     """Nodes of two groups that are one and the same place of a part that repeats itself: each (m,).
 
-    Vectors at the second node are those at the first one times `turn` (dim, dim), a `rotation`; None where nothing turns.
+    Of the ends of one of several `sectors`, vectors at the second node are those at the first one times `turn` (dim, dim), a
+    `rotation`, which `relation` says; None where nothing turns.
     """
 
     first: Indices
     second: Indices
     turn: Array | None = None
     rotation: Rotation | None = None
+    sectors: int = 1
+    relation: MultiPointConstraint | None = None
 
 
 def same_place(interfaces: Sequence[PeriodicInterface], n_points: int) -> Indices | None:
@@ -117,18 +120,29 @@ def cyclic(
     size = float(np.ptp(mesh.points[first], axis=0).max())
     far = int(np.argmax(distance))
     if len(first) == len(second) == len(np.unique(match)) and distance[far] <= APART * size:
-        interface = PeriodicInterface(first, second[match], turn, rotation)
-        rows = [_differences(interface, np.column_stack([unit, -turn.T @ unit]), mesh) for unit in np.eye(mesh.dim)]
-        return [_without_zeros(name, csr_array(vstack(rows)))], interface
+        interface = PeriodicInterface(first, second[match], turn, rotation, sectors)
+        relation = MultiPointConstraint(name, turned_rows(interface, 1.0, mesh))
+        return [relation], interface._replace(relation=relation)
     dependent, facets = (ends[0], ends[1]) if len(first) >= len(second) else (ends[1], ends[0])
     if all(mesh.cells_of(end, dim=mesh.dim - 1) for end in ends):
         for sign in (1.0, -1.0):
             if (rows_of := _following(mesh, dependent, facets, rotation, sign)) is not None:
-                return [_without_zeros(name, rows_of)], None
+                return [MultiPointConstraint(name, _without_zeros(rows_of))], None
     raise ModelError(
         f"{name}: point {first[far]} of '{ends[0]}', turned by 1/{sectors} of a turn, lies {distance[far]:.3g} from the "
         f"nearest node of '{ends[1]}', and the groups are no facets that lie upon each other: check axis and sectors"
     )
+
+
+def turned_rows(interface: PeriodicInterface, phase: complex, mesh: Mesh) -> csr_array:
+    """Return the rows (m, n_dofs) of ``u_second = phase Q u_first`` along the axes of the mesh, Q the turn of an interface.
+
+    None for what lies along the axis on it, without a phase.
+    """
+    assert interface.turn is not None
+    back = -phase * interface.turn.T
+    rows = [_differences(interface, np.column_stack([unit, back @ unit]), mesh) for unit in np.eye(mesh.dim)]
+    return _without_zeros(csr_array(vstack(rows)))
 
 
 def _following(mesh: Mesh, dependent: str, facets: str, rotation: Rotation, sign: float) -> csr_array | None:
@@ -152,12 +166,12 @@ def _following(mesh: Mesh, dependent: str, facets: str, rotation: Rotation, sign
     return csr_array(kron(own, turn) - kron(weights, np.eye(dim)))
 
 
-def _without_zeros(name: str, rows: csr_array) -> MultiPointConstraint:
-    """Return a relation without what is round-off in its rows, and without rows of nothing else: along the axis on it."""
+def _without_zeros(rows: csr_array) -> csr_array:
+    """Return rows without their round-off, and without those of nothing else: along the axis on it."""
     rows.sum_duplicates()
     rows.data[np.abs(rows.data) < CANCELLED] = 0.0
     rows.eliminate_zeros()
-    return MultiPointConstraint(name, csr_array(rows[np.diff(rows.indptr) > 0]))
+    return csr_array(rows[np.diff(rows.indptr) > 0])
 
 
 def _turned(

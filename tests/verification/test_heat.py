@@ -374,7 +374,7 @@ def test_what_cannot_be_is_refused_by_its_name():
         joined(model, conductance=-1.0)
     with refused(fc.errors.ContactError, match="no friction that could make it"):
         joined(model, friction_heat=0.5)
-    with refused(fc.errors.ContactError, match="a rigid obstacle has no temperature"):
+    with refused(fc.errors.ContactError, match="needs the temperature of its obstacle"):
         model.add_obstacle(
             "o", secondary="UPPER_TOP", obstacle=fc.obstacles.HalfSpace((0, 9), (0, -1)), conductance=1.0
         )
@@ -469,3 +469,31 @@ def test_case_files_have_heat(tmp_path):
     assert main(["run", str(tmp_path / "bars.toml"), "-o", str(tmp_path / "b.vtkhdf"), "--strict", "-q"]) == 0
     with fc.open_results(tmp_path / "b.vtkhdf") as steps:
         assert steps[-1].heat["contacts"]["joint"] == pytest.approx(625.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("formulation", ["node_to_segment", "mortar", "continuous"])
+@pytest.mark.parametrize("kinematics", ["plane_strain", "axisymmetric", "3d"])
+def test_heat_crosses_to_a_rigid_obstacle(formulation, kinematics):
+    """A bar between 100 and a plate of 20: q = h(p) (T - 20) = k (100 - T) / L, with h = 3 p and p = 10."""
+    if kinematics == "3d":
+        mesh, bottom, top = fc.generate.box((2.0, 2.0, 4.0), (2, 2, 3)), "ZMIN", "ZMAX"
+    else:
+        mesh, bottom, top = fc.generate.block((2.0, 4.0), (3, 3)), "BOTTOM", "TOP"
+    model = fc.Model(mesh, kinematics, reference_temperature=20.0)
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.0, conductivity=50.0))
+    model.add_pressure(top, 10.0)
+    model.fix(top, "xyz"[: mesh.dim - 1])
+    model.fix_temperature(top, 100.0)
+    normal = (0.0,) * (mesh.dim - 1) + (1.0,)
+    options = {"formulation": formulation, "conductance": lambda pressure, gap: 3.0 * pressure * (gap == 0.0)}
+    plate = fc.obstacles.HalfSpace((0.0,) * mesh.dim, normal)
+    model.add_obstacle("plate", secondary=bottom, obstacle=plate, obstacle_temperature=20.0, **options)
+    (step,) = fc.solve(model, 1)
+    flux = 80.0 / (1.0 / 30.0 + 4.0 / 50.0)
+    area = {"3d": 4.0, "plane_strain": 2.0, "axisymmetric": np.pi * 4.0}[kinematics]
+    assert step.temperature[mesh.points_of(bottom)] == pytest.approx(20.0 + flux / 30.0, rel=1e-9)
+    assert step.heat["contacts"]["plate"] == pytest.approx(flux * area, rel=1e-9)
+    assert step.heat["films"] == pytest.approx(-flux * area, rel=1e-9)
+    assert step.contact["plate"].heat_flux == pytest.approx(np.full(len(mesh.points_of(bottom)), flux), rel=1e-8)
+    with pytest.raises(fc.ContactError, match="needs the temperature of its obstacle"):
+        model.add_obstacle("other", secondary=bottom, obstacle=plate, **options)

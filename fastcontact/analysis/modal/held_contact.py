@@ -6,11 +6,11 @@ Contact Mechanics, 2006, section 5.3: the active set held). Penalties are spring
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import bsr_array, csr_array, diags_array, vstack
+from scipy.sparse import block_diag, bsr_array, csr_array, diags_array, vstack
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.configuration import Configuration
@@ -22,6 +22,31 @@ from fastcontact.contact.tied import TiedPair, moments_of
 from fastcontact.errors import ModelError
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
+
+
+@dataclass(frozen=True, eq=False)
+class Conditions:
+    """Relative displacements of one contact pair, along its normals or along its tangents, that vanish or give way.
+
+    Attributes
+    ----------
+    rows : csr_array (m, n_dofs)
+        [-].
+    nodes : ndarray of int (m,)
+        The secondary node of each.
+    areas : ndarray (m,)
+        That each stands for, as far as known [area].
+    directions : ndarray (m, dim), optional
+        Along tangents, the tangents [-].
+    compliance : csr_array (m, m), optional
+        By how much they give way [length / force].
+    """
+
+    rows: csr_array
+    nodes: Indices
+    areas: Array
+    directions: Array | None = None
+    compliance: csr_array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,12 +74,26 @@ class HeldContact:
         return K
 
 
-def held_contact(model: Model, step: StepResult | None, held: HeldMotions, hold_sliding: bool) -> HeldContact:
-    """Return the conditions of all pairs at the end of a step; without one those of tied and bilateral pairs, at rest."""
-    n_dofs = model.force_driven.n_dofs
+def joined(
+    held: Sequence[Conditions], n_dofs: int, join: Callable[[Conditions], Conditions] = lambda own: own
+) -> HeldContact:
+    """Return conditions as one, for `n_dofs` displacements, after `join` has made those of a whole ring of each."""
     equations, nodes, springs = [csr_array((0, n_dofs))], [np.empty(0, np.intp)], []
+    for own in map(join, held):
+        kept = np.flatnonzero(np.diff(own.rows.indptr) > 0)
+        if own.compliance is None:
+            equations.append(csr_array(own.rows[kept]))
+            nodes.append(own.nodes[kept])
+        elif len(kept):
+            springs.append((csr_array(own.rows[kept]), own.compliance.toarray()[np.ix_(kept, kept)]))
+    return HeldContact(csr_array(vstack(equations, format="csr")), np.concatenate(nodes), springs)
+
+
+def held_contact(model: Model, step: StepResult | None, held: HeldMotions, hold_sliding: bool) -> list[Conditions]:
+    """Return the conditions of all pairs at the end of a step; without one those of tied and bilateral pairs, at rest."""
+    found: list[Conditions] = []
     for pair in model.contact:
-        bound, contact = model.bind(pair, held), None if step is None else step.contact[pair.name]
+        bound, contact = model.bind(pair, held, sectors_alike=False), None if step is None else step.contact[pair.name]
         if bound.options.gap_only:
             continue
         if bound.options.cohesion is not None:
@@ -62,14 +101,8 @@ def held_contact(model: Model, step: StepResult | None, held: HeldMotions, hold_
         at = _configuration(model, step, contact)
         position = at.obstacle if contact is not None else np.zeros(model.mesh.dim)
         constraints = model.force_driven.constraints(pair.name, bound.constraints(at), position)
-        for rows, owners, softness in _rows(bound, constraints, contact, hold_sliding):
-            kept = np.flatnonzero(np.diff(rows.indptr) > 0)
-            if softness is None:
-                equations.append(csr_array(rows[kept]))
-                nodes.append(owners[kept])
-            elif len(kept):
-                springs.append((csr_array(rows[kept]), softness.toarray()[np.ix_(kept, kept)]))
-    return HeldContact(csr_array(vstack(equations, format="csr")), np.concatenate(nodes), springs)
+        found += _conditions(bound, constraints, contact, hold_sliding)
+    return found
 
 
 def _configuration(model: Model, step: StepResult | None, contact: ContactResult | None) -> Configuration:
@@ -90,35 +123,59 @@ def _worn(model: Model, contact: ContactResult) -> Array | None:
     return depth
 
 
-def _rows(
-    pair: Formulation, constraints: Constraints, contact: ContactResult | None, hold_sliding: bool
-) -> Iterator[tuple[csr_array, Indices, csr_array | None]]:
-    """Yield rows along the normal and along each tangent, their nodes, and their compliance matrix, if any.
+def _conditions(
+    pair: Formulation, part: Constraints, contact: ContactResult | None, hold_sliding: bool
+) -> Iterator[Conditions]:
+    """Yield conditions along the normals and along the tangents.
 
     They are tested with the formulation's multipliers, as those of tied pairs are, see `contact.tied`.
     """
-    if isinstance(constraints.tied, TiedPair):
-        node = _nodes(pair, constraints, constraints.tied.moments)
-        yield constraints.B, np.tile(pair.secondary.points[node].astype(np.intp), len(constraints) // len(node)), None
+    tied = part.tied if isinstance(part.tied, TiedPair) else None
+    moments, areas = moments_of(part) if tied is None else (tied.moments, tied.areas)
+    node = _nodes(pair, part, moments)
+    owners, n = pair.secondary.points[node].astype(np.intp), len(node)
+    areas = np.ones(n) if areas is None else areas
+    along = part.directions if tied is None else tied.directions
+    directions = [np.asarray(moments @ own) for own in along]
+    if tied is not None:
+        yield Conditions(tied.rows[0], owners, areas)
+        if directions:
+            yield _along(directions, tied.rows[1:], np.arange(n), owners, areas)
         return
-    moments = moments_of(constraints)
-    node = _nodes(pair, constraints, moments)
-    owners = pair.secondary.points[node].astype(np.intp)
-    always = np.zeros(len(constraints), bool) if constraints.equality is None else constraints.equality
+    always = np.zeros(len(part), bool) if part.equality is None else part.equality
     closed = abs(moments) @ always.astype(float) > 0.0
     sticking = np.zeros(len(closed), bool)
     if contact is not None:
         closed |= contact.active[node]
-        rubs = abs(moments) @ (constraints.coefficients > 0.0).astype(float) > 0.0
+        rubs = abs(moments) @ (part.coefficients > 0.0).astype(float) > 0.0
         sticking = (contact.active & (contact.sticking | hold_sliding))[node] & rubs
-    for along, held, softness in (
-        (constraints.B, closed, constraints.softness),
-        *((tangent, sticking, constraints.tangential_softness) for tangent in constraints.tangents),
-    ):
-        tested = csr_array(moments[np.flatnonzero(held)])
-        gives = softness is not None and (tested @ softness).any()
-        compliance = csr_array(tested @ diags_array(softness) @ tested.T) if gives else None
-        yield csr_array(tested @ along), owners[held], compliance
+    held, stuck = np.flatnonzero(closed), np.flatnonzero(sticking)
+    tested = csr_array(moments[held])
+    yield Conditions(
+        csr_array(tested @ part.B), owners[held], areas[held], compliance=_compliance(tested, part.softness)
+    )
+    if part.tangents:
+        tested = csr_array(moments[stuck])
+        rows, give = [tested @ own for own in part.tangents], _compliance(tested, part.tangential_softness)
+        yield _along(directions, rows, stuck, owners, areas, give)
+
+
+def _along(
+    directions: Sequence[Array], rows: Sequence[csr_array], kept: Indices, owners: Indices, areas: Array,
+    compliance: csr_array | None = None,
+) -> Conditions:  # fmt: skip
+    """Return the conditions along all tangents, of rows (k, n_dofs) that are the `kept` (k,) of owners and areas (q,)."""
+    count = len(rows)
+    give = None if compliance is None else csr_array(block_diag([compliance] * count, format="csr"))
+    stacked = csr_array(vstack(rows, format="csr"))
+    tangents = np.concatenate([own[kept] for own in directions])
+    return Conditions(stacked, np.tile(owners[kept], count), np.tile(areas[kept], count), tangents, give)
+
+
+def _compliance(tested: csr_array, softness: Array | None) -> csr_array | None:
+    if softness is None or not (tested @ softness).any():
+        return None
+    return csr_array(tested @ diags_array(softness) @ tested.T)
 
 
 def _nodes(pair: Formulation, constraints: Constraints, moments: csr_array) -> Indices:

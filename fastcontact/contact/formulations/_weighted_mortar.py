@@ -314,6 +314,7 @@ class WeightedMortar(Formulation):
             ours, theirs = coupling.pairs.T
             faced = coupling.integrals @ normals_of[coupling.primary.element][theirs]
             np.add.at(mean, coupling.secondary.local[ours], tests[coupling.secondary.element] @ faced)
+        self.secondary.add_across_ends(mean)
         length = np.linalg.norm(mean, axis=1, keepdims=True)
         return np.where(length > 0, mean / np.where(length > 0, length, 1.0), np.eye(mean.shape[1])[-1])
 

@@ -97,7 +97,8 @@ class ModelContact(ModelConnections):
             - ``conductance``: of heat that crosses, by area and difference of temperatures: a number, where the sides touch;
               a function of pressures and gaps (m,); pairs (pressure, conductance); or a mapping of ``"pressure"``, ``"gap"``
               to pairs. Without one none crosses. ``friction_heat``: what part of the work of friction becomes heat, half of
-              it on each side, with load factors as times [-].
+              it on each side, with load factors as times [-]. ``obstacle_temperature``: of a rigid obstacle, to which heat
+              crosses by its conductance [temperature].
             - ``search_distance``: what is farther off than this, or deeper inside, now and as the load step begins, is not
               faced [length].
             - ``normals``: ``"facet"`` or ``"averaged"`` between the facets that meet at a node at less than 45 degrees, which
@@ -324,10 +325,11 @@ class ModelContact(ModelConnections):
         self.contact.append(pair)
 
     @typed(ModelError)
-    def bind(self, pair: ContactPair, held: HeldMotions | None = None) -> Formulation:
+    def bind(self, pair: ContactPair, held: HeldMotions | None = None, *, sectors_alike: bool = True) -> Formulation:
         """Return the formulation of a contact pair on this mesh; see `add_contact` for the errors.
 
-        `held` are the motions of nodes that supports and relations prescribe, where they are known.
+        `held` are the motions of nodes that supports and relations prescribe, where they are known; `sectors_alike` tells
+        whether pressures are the same at both ends of a sector.
         """
         if pair.formulation not in FORMULATIONS:
             raise ContactError(unknown("contact formulation", pair.formulation, FORMULATIONS))
@@ -339,7 +341,11 @@ class ModelContact(ModelConnections):
                 raise ContactError(unknown(f"option of {pair.formulation}", option, known))
         specific = {key: value for key, value in pair.options.items() if key not in SHARED_OPTIONS}
         check_fields(f"contact '{pair.name}'", specific, kind, ContactError)
-        secondary = surface(self.mesh, pair.secondary)
+        ends = [
+            (one.first, one.second, np.eye(self.mesh.dim) if one.turn is None else one.turn)
+            for one in self.periodic_interfaces
+        ]
+        secondary = surface(self.mesh, pair.secondary).with_periodic_ends(ends)
         options = pair_options(
             pair.name, pair.options, self.mesh, secondary, against_obstacle=pair.obstacle is not None
         )
@@ -352,16 +358,16 @@ class ModelContact(ModelConnections):
             primary = RigidSide(pair.obstacle, np.array(pair.motion), pair.rotation)
             specific.setdefault("surface_smoothing", False)
         else:
-            primary = surface(self.mesh, pair.primary)
+            primary = surface(self.mesh, pair.primary).with_periodic_ends(ends)
             check_sides(self.mesh, pair.name, secondary, primary, options.excluded)
         modulus = min((m.contact_modulus for m, _ in self.materials), default=1.0)
         axisymmetric = self.kinematics == "axisymmetric"
+        interfaces = [one for one in self.periodic_interfaces if one.turn is None or sectors_alike]
         turning = next(
-            (s.rotation for s in self.periodic_interfaces if s.rotation and np.isin(s.second, secondary.points).any()),
-            None,
+            (e.rotation for e in interfaces if e.rotation and np.isin(e.second, secondary.points).any()), None
         )
         options = dataclasses.replace(
-            options, same_place=same_place(self.periodic_interfaces, self.mesh.n_points), turning=turning,
+            options, same_place=same_place(interfaces, self.mesh.n_points), turning=turning,
             source=self._source(pair, secondary, options),
         )  # fmt: skip
         return kind(secondary, primary, self.mesh.points, axisymmetric, modulus, options=options, held=held, **specific)

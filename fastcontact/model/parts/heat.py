@@ -162,7 +162,9 @@ class ModelHeat(ModelMaterials):
         _, body = bodies(self.mesh)
         joined = [np.stack([np.arange(len(body)), self.same_temperature()], axis=1)]
         for pair in self.contact:
-            if pair.options.get("conductance") is not None:
+            if pair.options.get("obstacle_temperature") is not None:
+                held[self.mesh.points_of(pair.secondary)] = True
+            elif pair.options.get("conductance") is not None:
                 ends = np.concatenate([self.mesh.points_of(pair.secondary), self.mesh.points_of(pair.primary)])
                 joined.append(np.stack([np.full(len(ends), ends[0]), ends], axis=1))
         alone = not_reached(body, held, np.concatenate(joined))

@@ -1,0 +1,235 @@
+"""Waves round a ring of equal sectors, of which one is modelled (Thomas, Int. J. Numer. Meth. Engng 14, 1979).
+
+A mode of d nodal diameters is a wave: the displacement of sector k is that of the first one, turned k times and times
+``exp(2 pi i d k / N)``. Complex matrices A are real ones of twice the size, ``[[Re A, -Im A], [Im A, Re A]]``, but for d = 0
+and d = N / 2, where nothing is complex.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import bmat, bsr_array, coo_array, csr_array
+
+from fastcontact.analysis.modal.held_contact import Conditions
+from fastcontact.arrays import AnyArray, Array, Indices
+from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
+from fastcontact.errors import ModelError
+from fastcontact.model.model import Model
+from fastcontact.model.periodicity import PeriodicInterface, turned_rows
+
+
+@dataclass(frozen=True, eq=False)
+class Sectors:
+    """The sectors of a ring.
+
+    Attributes
+    ----------
+    number : int
+        N, of the whole ring.
+    turn : ndarray (dim, dim)
+        Of vectors, from one sector to the next [-].
+    periodic_interfaces : list of PeriodicInterface
+        Ends of the modelled sector.
+    centre : ndarray (dim,)
+        A point of the axis [length].
+    """
+
+    number: int
+    turn: Array
+    periodic_interfaces: list[PeriodicInterface]
+    centre: Array
+
+    @classmethod
+    def of(cls, model: Model) -> Sectors | None:
+        """Return those of a model; None without cyclic symmetry. ModelError if it has several axes."""
+        periodic_interfaces = [interface for interface in model.periodic_interfaces if interface.turn is not None]
+        if not periodic_interfaces:
+            return None
+        first = periodic_interfaces[0]
+        assert first.turn is not None
+        for interface in periodic_interfaces:
+            if interface.sectors != first.sectors or _sense(interface, first.turn) == 0:
+                raise ModelError(
+                    "nodal diameters need one axis and one number of sectors: the cyclic symmetries differ"
+                )
+        points = model.mesh.points
+        off = points[first.second].mean(axis=0) - first.turn @ points[first.first].mean(axis=0)
+        return cls(
+            first.sectors, first.turn, periodic_interfaces, np.linalg.lstsq(np.eye(len(off)) - first.turn, off)[0]
+        )
+
+    def diameters(self, asked: int | str | Sequence[int]) -> list[int]:
+        """Return the nodal diameters asked for, ascending; ModelError if the ring has none of that number."""
+        most = self.number // 2
+        if isinstance(asked, str):
+            if asked != "all":
+                raise ModelError(f"nodal_diameters = '{asked}': write \"all\", or whole numbers from 0 to {most}")
+            return list(range(most + 1))
+        found = sorted({asked} if isinstance(asked, int) else set(asked))
+        wrong = [d for d in found if not 0 <= d <= most]
+        if wrong or not found:
+            raise ModelError(f"nodal_diameters = {asked}: a ring of {self.number} sectors has those from 0 to {most}")
+        return found
+
+
+def _sense(interface: PeriodicInterface, turn: Array) -> int:
+    """Return 1 where an interface turns as `turn` (dim, dim) does, -1 where it turns back, 0 where it does neither."""
+    assert interface.turn is not None
+    return (
+        1
+        if np.allclose(interface.turn, turn, atol=1e-9)
+        else -1
+        if np.allclose(interface.turn, turn.T, atol=1e-9)
+        else 0
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Wave:
+    """Motions of one number of nodal diameters."""
+
+    sectors: Sectors
+    diameters: int
+
+    @property
+    def angle(self) -> float:
+        """Phase from a sector to the next [radian]."""
+        return 2.0 * np.pi * self.diameters / self.sectors.number
+
+    @property
+    def single(self) -> bool:
+        """Whether it stands: modes of others come in pairs, a quarter of a wave apart."""
+        return 2 * self.diameters in (0, self.sectors.number)
+
+    def phase(self, interface: PeriodicInterface) -> complex:
+        """Return what the second end of an interface has more than the first one, beside the turn [-]."""
+        if self.single:
+            return 1.0 if self.diameters == 0 else -1.0
+        return complex(np.exp(1j * _sense(interface, self.sectors.turn) * self.angle))
+
+    def real(self, A: AnyArray) -> csr_array:
+        """Return the real form of a sparse matrix (m, n), complex or not."""
+        found = csr_array(A.real if self.single else bmat([[A.real, -A.imag], [A.imag, A.real]], format="csr"))
+        found.eliminate_zeros()
+        return found
+
+    def twice(self, K: bsr_array) -> bsr_array:
+        """Return the real form of a real matrix (n, n) with its blocks."""
+        if self.single:
+            return K
+        n, entries = K.shape[0] // K.blocksize[0], len(K.indices)
+        data = np.concatenate([K.data, K.data])
+        indices, indptr = np.concatenate([K.indices, K.indices + n]), np.concatenate([K.indptr, entries + K.indptr[1:]])
+        return bsr_array((data, indices, indptr), shape=(2 * K.shape[0], 2 * K.shape[0]))
+
+    def both(self, values: AnyArray) -> AnyArray:
+        """Return values (n, ...) of nodes or displacements of real and imaginary parts."""
+        return values if self.single else np.concatenate([values, values])
+
+    def relations(self, model: Model, others: Sequence[MultiPointConstraint]) -> list[MultiPointConstraint]:
+        """Return the relations of real and imaginary parts: `others`, and those of the ends of the sector with phases."""
+        ends = [
+            MultiPointConstraint(
+                "cyclic symmetry", self.real(turned_rows(interface, self.phase(interface), model.mesh))
+            )
+            for interface in self.sectors.periodic_interfaces
+        ]
+        return [*(MultiPointConstraint(own.name, self.real(own.rows)) for own in others), *ends]
+
+    def joined(self, held: Conditions) -> Conditions:
+        """Return conditions of contact in the real form, one at each place of the ring.
+
+        The function that tests a condition at the end of a sector goes on in the next one, whose part is at the other end; at
+        the axis it goes round all sectors.
+        """
+        P, kept = self._combined(held)
+        nodes = held.nodes[kept]
+        n_points = held.rows.shape[1] // self.sectors.turn.shape[0]
+        compliance = None if held.compliance is None else self.real(P @ held.compliance @ P.conj().T)
+        twins = nodes if self.single else np.concatenate([nodes, nodes + n_points])
+        return Conditions(self.real(P @ held.rows), twins, self.both(held.areas[kept]), compliance=compliance)
+
+    def _combined(self, held: Conditions) -> tuple[csr_array, Indices]:
+        """Return the matrix (k, q) from conditions to those of the ring, and the condition (k,) that each is most like."""
+        left, blocks = np.ones(len(held.nodes), bool), []
+        for interface in self.sectors.periodic_interfaces:
+            own = np.flatnonzero(np.isin(held.nodes, interface.first) | np.isin(held.nodes, interface.second))
+            for a, b in zip(interface.first.tolist(), interface.second.tolist(), strict=True):
+                here, there = own[held.nodes[own] == a], own[held.nodes[own] == b]
+                if a == b and len(here):
+                    blocks.append((self._around(held, here), here, here))
+                    left[here] = False
+                elif len(here) and len(there):
+                    block = self._across(held, interface, here, there)
+                    blocks.append((block, here, np.concatenate([here, there])))
+                    left[here] = left[there] = False
+        rest = np.flatnonzero(left)
+        rows, columns, values = [np.arange(len(rest))], [rest], [np.ones(len(rest), complex)]
+        kept, count = [rest], len(rest)
+        for block, like, among in blocks:
+            place = count + np.arange(len(block))
+            rows.append(np.repeat(place, len(among)))
+            columns.append(np.tile(among, len(block)))
+            values.append(block.ravel())
+            kept.append(like[: len(block)])
+            count += len(block)
+        entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
+        return csr_array(coo_array(entries, shape=(count, len(held.nodes)))), np.concatenate(kept)
+
+    def _across(self, held: Conditions, interface: PeriodicInterface, here: Indices, there: Indices) -> AnyArray:
+        """Return the part (k, k + l) of conditions at both nodes of an interface; the sector of the second one is behind."""
+        assert interface.turn is not None
+        share = np.nan_to_num(held.areas[np.concatenate([here, there])], posinf=0.0)
+        first, second = share[: len(here)].max(), share[len(here) :].max()
+        part = first / (first + second) if first + second > 0.0 else 0.5
+        alike = np.ones((len(here), len(there)))
+        if held.directions is not None:
+            alike = held.directions[here] @ (held.directions[there] @ interface.turn).T
+        return np.hstack([part * np.eye(len(here)), (1.0 - part) * np.conj(self.phase(interface)) * alike])
+
+    def _around(self, held: Conditions, here: Indices) -> AnyArray:
+        """Return the combinations (k, q) of the conditions of a node on the axis that do not cancel round the ring."""
+        directions = None if held.directions is None else held.directions[here]
+        total, turn = np.zeros((len(here), len(here)), complex), np.eye(len(self.sectors.turn))
+        for k in range(self.sectors.number):
+            alike = np.eye(len(here)) if directions is None else directions @ (directions @ turn.T).T
+            total += np.exp(1j * self.angle * k) * alike / self.sectors.number
+            turn = self.sectors.turn @ turn
+        strength, vectors = np.linalg.eigh(0.5 * (total + total.conj().T))
+        return np.asarray(vectors[:, strength > 0.5].conj().T)
+
+
+def without_ends(model: Model, sectors: Sectors) -> Model:
+    """Return the model without the relations of the ends of its sector."""
+    made = copy.copy(model)
+    made.relations = [
+        own
+        for own in model.relations
+        if not any(own is interface.relation for interface in sectors.periodic_interfaces)
+    ]
+    return made
+
+
+def pairs_of(vectors: Array, K: bsr_array, M: bsr_array, n: int) -> tuple[Array, AnyArray]:
+    """Return the n lowest eigenvalues (n,) and complex vectors (size, n) in the span of real forms (2 size, k).
+
+    Each is there twice, a quarter of a wave apart, or once where an iteration has missed its twin: which is the same complex
+    vector. Rayleigh and Ritz; of unit modal mass, the largest component real and positive.
+    """
+    Z = _complex(vectors)
+    stiff, heavy = (Z.conj().T @ _complex(matrix @ vectors) for matrix in (K, M))
+    weight, basis = np.linalg.eigh(heavy)
+    basis = basis[:, weight > 1e-8 * weight.max()] / np.sqrt(weight[weight > 1e-8 * weight.max()])
+    values, own = np.linalg.eigh(basis.conj().T @ stiff @ basis)
+    found = Z @ (basis @ own[:, :n])
+    largest = found[np.abs(found).argmax(axis=0), np.arange(found.shape[1])]
+    return values[:n], found * (np.abs(largest) / largest)
+
+
+def _complex(vectors: Array) -> AnyArray:
+    half = len(vectors) // 2
+    return np.asarray(vectors[:half] + 1j * vectors[half:])

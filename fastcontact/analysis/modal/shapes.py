@@ -1,0 +1,219 @@
+"""What `fastcontact.modes` returns: frequencies and shapes, of the model and of the whole ring that a sector stands for."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fastcontact.analysis.modal.cyclic import Sectors
+from fastcontact.arrays import Array, Indices
+from fastcontact.elasticity import recovery
+from fastcontact.elasticity.material_field import MaterialField
+from fastcontact.errors import FileError, ModelError
+from fastcontact.mesh.argument_types import typed
+from fastcontact.mesh.generate import union
+from fastcontact.mesh.html_table import html_table
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.model.model import Model
+from fastcontact.results.phases import phases
+from fastcontact.results.step import StepResult
+
+if TYPE_CHECKING:
+    import pandas
+
+# Rows and columns of the components of tensors, in the order of stresses.
+_COMPONENTS = {4: ([0, 1, 2, 0], [0, 1, 2, 1]), 6: ([0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2])}
+
+
+class Shapes(Sequence[StepResult]):
+    """A sequence of shapes, each a step: its displacement, the stress of that, and the frequency as load factor."""
+
+    @abstractmethod
+    def _step(self, number: int) -> StepResult: ...
+
+    def __getitem__(self, place: Any) -> Any:
+        """Return a shape, or a list of those of a slice."""
+        if isinstance(place, slice):
+            return [self[k] for k in range(*place.indices(len(self)))]
+        return self._step(range(len(self))[place])
+
+    @typed(ModelError)
+    def phases(self, number: int, count: int = 24) -> list[StepResult]:
+        """Return one period of a vibration as `count` steps, for `fastcontact.plot.animate` and result files.
+
+        Parameters
+        ----------
+        number : int
+            Of the mode, from 0.
+        count : int
+            How many steps; their load factors are the phases, from 0 to 1.
+        """
+        return phases(self[number], count)
+
+
+def _as_step(number: int, frequency: float, u: Array, stress: Array) -> StepResult:
+    equivalent = recovery.von_mises(stress)
+    signed = recovery.von_mises_signed(stress, equivalent)
+    return StepResult(number + 1, float(frequency), u, stress, equivalent, signed, np.zeros_like(u))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Modes(Shapes):
+    """Modes of a model: a sequence of shapes, each a `StepResult` for pictures and files, that prints as a table.
+
+    Attributes
+    ----------
+    frequencies : ndarray (n,)
+        Ascending, for each number of nodal diameters [1 / time]; about zero for rigid motions, negative for shapes that
+        grow by themselves.
+    eigenvalues : ndarray (n,)
+        Squares of the angular frequencies [1 / time^2].
+    shapes : ndarray (n, n_points, dim)
+        Displacements of unit modal mass, ``shape . M shape = 1``, of the whole ring where nodal diameters were asked for
+        [1 / mass^(1/2)].
+    participation : ndarray (n, dim)
+        Of a uniform acceleration along each axis: ``shape . M e`` [mass^(1/2)].
+    mass : ndarray (dim,)
+        Of all that moves along each axis [mass]; in axisymmetry zero along the radius.
+    nodal_diameters : ndarray of int (n,), optional
+        Of each mode; None where none were asked for.
+    twins : ndarray of int (n,), optional
+        The mode of the same frequency a quarter of a wave further round the ring; the mode itself where it is alone.
+    """
+
+    frequencies: Array
+    eigenvalues: Array
+    shapes: Array
+    participation: Array
+    mass: Array
+    _model: Model = field(repr=False)
+    _field: MaterialField = field(repr=False)
+    nodal_diameters: Indices | None = None
+    twins: Indices | None = None
+    _sectors: Sectors | None = field(default=None, repr=False)
+
+    @property
+    def effective_mass(self) -> Array:
+        """Effective modal masses (n, dim) [mass], the squares of the participation factors, whose sum is the total mass."""
+        return np.asarray(self.participation**2)
+
+    def __len__(self) -> int:
+        return len(self.frequencies)
+
+    def _step(self, number: int) -> StepResult:
+        model, u = self._model, self.shapes[number]
+        stress = recovery.nodal_stress(
+            model.mesh, model.kinematics, self._field.moduli, self._field.loops, u, self._field.treatment
+        )
+        return _as_step(number, self.frequencies[number], u.copy(), stress)
+
+    def whole_ring(self) -> RingModes:
+        """Return the same modes on the mesh of the whole ring; ModelError if no nodal diameters were asked for."""
+        if self._sectors is None:
+            raise ModelError(
+                "shapes of the whole ring need modes with nodal_diameters, of a model with cyclic symmetry"
+            )
+        return RingModes(self, self._sectors)
+
+    def __repr__(self) -> str:
+        rows = [self._columns, *self._rows("{:.6g}")]
+        widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
+        return "\n".join("  ".join(text.rjust(width) for text, width in zip(row, widths)) for row in rows)
+
+    def _repr_html_(self) -> str:
+        return html_table(self._rows("{:.6g}"), self._columns, "Modes")
+
+    @property
+    def _columns(self) -> tuple[str, ...]:
+        round_the_ring = () if self.nodal_diameters is None else ("nodal diameters", "twin")
+        masses = (f"effective mass {axis}" for axis in "xyz"[: len(self.mass)])
+        return ("mode", *round_the_ring, "frequency", *masses)
+
+    def _rows(self, numbers: str) -> list[tuple[str, ...]]:
+        rows = []
+        for k, (f, masses) in enumerate(zip(self.frequencies, self.effective_mass)):
+            round_the_ring: tuple[str, ...] = ()
+            if self.nodal_diameters is not None and self.twins is not None:
+                twin = "" if self.twins[k] == k else str(self.twins[k] + 1)
+                round_the_ring = (str(self.nodal_diameters[k]), twin)
+            rows.append((str(k + 1), *round_the_ring, *(numbers.format(value) for value in (f, *masses))))
+        return rows
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return the table as a ``pandas.DataFrame``; FileError if pandas is not installed."""
+        try:
+            import pandas
+        except ImportError as error:
+            raise FileError("to_pandas needs pandas: pip install pandas") from error
+        whole = [np.arange(1, len(self) + 1)]
+        if self.nodal_diameters is not None and self.twins is not None:
+            whole += [self.nodal_diameters, self.twins + 1]
+        data = np.column_stack([*whole, self.frequencies, self.effective_mass])
+        return pandas.DataFrame(data, columns=list(self._columns)).astype(
+            dict.fromkeys(self._columns[: len(whole)], int)
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class RingModes(Shapes):
+    """Modes on the mesh of a whole ring: a sequence of steps, which ``ResultWriter(path, ring)`` takes as a model.
+
+    Attributes
+    ----------
+    modes : Modes
+        Of the sector.
+    mesh : Mesh
+        All sectors, the modelled one first; their ends are not merged.
+    kinematics : str
+    """
+
+    modes: Modes
+    _sectors: Sectors = field(repr=False)
+
+    def __len__(self) -> int:
+        return len(self.modes)
+
+    @property
+    def kinematics(self) -> str:
+        """Of the model."""
+        return self.modes._model.kinematics
+
+    @cached_property
+    def _turns(self) -> list[Array]:
+        return [np.linalg.matrix_power(self._sectors.turn, k) for k in range(self._sectors.number)]
+
+    @cached_property
+    def mesh(self) -> Mesh:
+        """See the class."""
+        part, centre = self.modes._model.mesh, self._sectors.centre
+        return union(*(part.replace(points=(part.points - centre) @ turn.T + centre) for turn in self._turns))
+
+    def _step(self, number: int) -> StepResult:
+        modes = self.modes
+        assert modes.nodal_diameters is not None
+        assert modes.twins is not None
+        twin, d = int(modes.twins[number]), int(modes.nodal_diameters[number])
+        here, there = modes[number], modes[twin]
+        sign = float(np.sign(twin - number))  # the second of a pair is the imaginary part
+        u, stress = [], []
+        for k, turn in enumerate(self._turns):
+            angle = 2.0 * math.pi * d * k / self._sectors.number
+            real, imaginary = math.cos(angle), -sign * math.sin(angle)
+            u.append((real * here.displacement + imaginary * there.displacement) @ turn.T)
+            stress.append(_turned(real * here.stress + imaginary * there.stress, turn))
+        return _as_step(number, modes.frequencies[number], np.concatenate(u), np.concatenate(stress))
+
+
+def _turned(stress: Array, turn: Array) -> Array:
+    """Return stresses (n, 4 or 6) in axes before a turn (dim, dim) of the material [pressure]."""
+    rows, columns = _COMPONENTS[stress.shape[1]]
+    tensor, Q = np.zeros((len(stress), 3, 3)), np.eye(3)
+    Q[: len(turn), : len(turn)] = turn
+    tensor[:, rows, columns] = tensor[:, columns, rows] = stress
+    return np.asarray((Q @ tensor @ Q.T)[:, rows, columns])
