@@ -102,7 +102,11 @@ def _members(block: Block) -> list[Members]:
             continue
         for numbers, group in groupby(row.entries, lambda entry: entry.isdecimal() and len(entry) < 19):
             if numbers:
-                found.append(Members(row.place, array("q", map(int, group)), instance=instance))
+                members = array("q", map(int, group))
+                if found and isinstance(found[-1].numbers, array) and len(found[-1].numbers):
+                    found[-1].add(members, row.place.line)  # one entry for the lines that follow each other
+                else:
+                    found.append(Members(row.place, members, instance=instance))
             else:
                 found += [Members(row.place, name=entry, instance=instance) for entry in group if entry]
     return found
