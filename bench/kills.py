@@ -46,6 +46,7 @@ def main() -> int:
         with tempfile.TemporaryDirectory() as folder:
             known = killing.reference(kill_cases.prepared(name, Path(folder)), Path(folder))
             all_found[name] = killing.run(known, count, given.seed, Path(folder), given.failures, signals)
+        print(f"{name}: {all_found[name].kills}, {len(all_found[name].failures)} failures", file=sys.stderr, flush=True)
     print(f"{'':<20}" + "".join(f"{name[:11]:>12}" for name in all_found))
     for row in zip(*(found.rows() for found in all_found.values()), strict=True):
         print(f"{row[0][0]:<20}" + "".join(f"{text:>12}" for _, text in row))

@@ -10,7 +10,7 @@ HDF5 writes a node of an index or a part of a table as a whole, of which a step 
 the file is written, from the first such byte to the last.
 
 That helps when a process ends, not when the power does: a disk keeps no order. `synchronised` writes are kept in a journal
-until they are done.
+until they are done; more than a journal holds are made in portions, in the same order, each on the disk before the next.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class CommittedFile(DriverFile):
 
     After an error nothing is written: the file stays as the last good write has left it. Nor is anything written once `ours`
     is False, because another program has written to the file. `end` is where the contents end; the file may take more room.
-    While `synchronised` is True, what is flushed is on the disk, whole or not at all.
+    While `synchronised` is True, what is flushed is on the disk, whole or not at all, portion by portion.
     """
 
     def __init__(self, path: Path) -> None:
@@ -123,12 +123,13 @@ class CommittedFile(DriverFile):
         changes = [change for write in waiting[n_new:] if (change := self._changed(*write))[1]]
         for place, data in new:
             self._put(place, data)
-        if self.synchronised:
-            self._synchronise(new, changes)
-        for place, data in changes:
-            self._put(place, data)
-        if self.synchronised:
-            os.fsync(self.fileno())
+        for portion in journal.portions(changes) if self.synchronised else [changes]:
+            if self.synchronised:
+                self._synchronise(new, portion)
+            for place, data in portion:
+                self._put(place, data)
+            if self.synchronised:
+                os.fsync(self.fileno())
         self._head = self._read_head()
         for place, data in waiting:
             self._note(place, place + len(data))

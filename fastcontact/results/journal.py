@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 import io
 import struct
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import IO, Any
 
 from fastcontact.errors import FileError
@@ -23,7 +23,22 @@ HEADER = struct.Struct("<QQ?")  # place and length of one; whether its checksum 
 DIGEST = hashlib.sha256().digest_size
 # Bytes of a journal, which holds what changes in place: restart data, at most some hundred bytes an unknown.
 LARGEST = 1 << 31
+# Bytes of changes in one journal: writers make more than that in portions.
+PORTION = LARGEST >> 1
 PIECE = 1 << 20
+
+
+def portions(changes: Iterable[Write]) -> Iterator[list[Write]]:
+    """Yield changes in order, as many at a time as a journal holds; only one that is longer than that is cut."""
+    portion: list[Write] = []
+    for place, data in changes:
+        for first in range(0, len(data), PORTION):
+            piece = data[first : first + PORTION]
+            if portion and sum(len(other) for _, other in portion) + len(piece) > PORTION:
+                yield portion
+                portion = []
+            portion.append((place + first, piece))
+    yield portion
 
 
 def packed(new: Sequence[Write], changes: Sequence[Write]) -> bytes:
