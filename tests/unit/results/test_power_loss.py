@@ -53,13 +53,8 @@ class Disk:
 
 
 @pytest.fixture
-def recorded(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
-) -> tuple[list[tuple[str, object]], Path]:
-    """All that was done to a file that takes twelve steps, each on the disk when its writing ends; and the begun file.
-
-    The parameter is how many bytes of changes one journal holds.
-    """
+def recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[list[tuple[str, object]], Path]:
+    """All that was done to a file that takes twelve steps, each on the disk when its writing ends; and the begun file."""
     events: list[tuple[str, object]] = []
     path, begun = tmp_path / "run.vtkhdf", tmp_path / "begun.vtkhdf"
     real = committed_file.CommittedFile
@@ -86,7 +81,6 @@ def recorded(
 
     with monkeypatch.context() as patch:
         patch.setattr(writer, "CommittedFile", Watched)
-        patch.setattr(journal, "PORTION", getattr(request, "param", journal.PORTION))
         with ResultWriter(path, MESH, synchronise=True) as out:
             shutil.copy(path, begun)
             patch.setattr(writer, "reserve", reserve)
@@ -98,7 +92,6 @@ def recorded(
     return events, begun
 
 
-@pytest.mark.parametrize("recorded", [journal.PORTION, 3000], indirect=True)
 def test_a_loss_of_power_costs_no_step(recorded, tmp_path: Path) -> None:
     events, begun = recorded
     random = np.random.default_rng(1)
@@ -153,22 +146,6 @@ def test_a_run_goes_on_after_a_loss_of_power(recorded, tmp_path: Path) -> None:
         assert len(results) == 7
         for number, step in enumerate(results):
             assert_same(step, nth_step(number))
-
-
-def test_what_a_writer_writes_a_reader_takes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """No journal is longer than a reader takes, however much changes; what is longer than a journal is cut."""
-    monkeypatch.setattr(journal, "LARGEST", 2000)
-    monkeypatch.setattr(journal, "PORTION", 1000)
-    changes = [(0, b"a" * 600), (700, b"b" * 300), (1000, b"c" * 200), (1300, b"d" * 2500)]
-    contents, portions = bytearray(4000), list(journal.portions(changes))
-    assert [[len(data) for _, data in portion] for portion in portions] == [[600, 300], [200], [1000], [1000], [500]]
-    path = tmp_path / "file"
-    for portion in portions:
-        path.write_bytes(contents + journal.packed([(3990, b"\0" * 10)], portion))
-        with open(path, "rb") as file:
-            assert journal.found(file) == portion
-        journal.overlay(portion, 0, contents)
-    assert contents.count(b"d") == 2500
 
 
 @pytest.mark.parametrize("damage", ["cut", "changed", "data", "none"])
