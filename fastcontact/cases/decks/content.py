@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from fastcontact.cases.decks.blocks import Block, Place, folded
+from fastcontact.cases.decks.blocks import Block, Location, folded
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,12 +17,12 @@ class Cell:
 
     type: str
     nodes: Sequence[int]
-    within: Place
+    within: Location
     line: int
     set: str = ""
 
     @property
-    def place(self) -> Place:
+    def location(self) -> Location:
         """Its place."""
         return replace(self.within, line=self.line)
 
@@ -34,7 +34,7 @@ class Members:
     Numbers may be those of several lines: `lines` says where each further one begins, as place among them and line.
     """
 
-    place: Place
+    location: Location
     numbers: Sequence[int] = ()
     name: str = ""
     instance: str = ""
@@ -46,17 +46,17 @@ class Members:
         self.lines.extend((len(self.numbers), line))
         self.numbers.extend(numbers)
 
-    def place_of(self, number: int) -> Place:
+    def place_of(self, number: int) -> Location:
         """Return the line that holds a number."""
         row = bisect_right(self.lines[::2], self.numbers.index(number))
-        return replace(self.place, line=self.lines[2 * row - 1]) if row else self.place
+        return replace(self.location, line=self.lines[2 * row - 1]) if row else self.location
 
 
 @dataclass(frozen=True, slots=True)
 class Face:
     """One entry of a surface: an element set or number, or for nodes a node set or number, and the label of the face."""
 
-    place: Place
+    location: Location
     of: str
     label: str = ""
 
@@ -66,7 +66,7 @@ class SurfaceDefinition:
     """A surface as the deck has it."""
 
     name: str
-    place: Place
+    location: Location
     of_nodes: bool
     faces: list[Face] = field(default_factory=list)
 
@@ -75,7 +75,7 @@ class SurfaceDefinition:
 class Section:
     """Which material the elements of a set have, and how thick they are (None: not given)."""
 
-    place: Place
+    location: Location
     elements: str
     material: str
     thickness: float | None = None
@@ -118,7 +118,7 @@ class Material:
     """A material of the deck; `law` makes one of the model from axes, None for those of the mesh."""
 
     name: str
-    place: Place
+    location: Location
     law: Callable[[Any], Any] | None = None
     density: float | None = None
     expansion: float | tuple[float, ...] | None = None
@@ -129,7 +129,7 @@ class Interaction:
     """How surfaces touch."""
 
     name: str
-    place: Place
+    location: Location
     penalty: float | list[tuple[float, float]] | None = None
     friction: float = 0.0
     stick: float | None = None
@@ -141,7 +141,7 @@ class Interaction:
 class Pair:
     """A contact pair or a tie."""
 
-    place: Place
+    location: Location
     secondary: str
     primary: str
     interaction: str = ""
@@ -160,7 +160,7 @@ class Pair:
 class SectorEnds:
     """The two ends of a sector that repeats itself round an axis: their surfaces, by the name of the tie."""
 
-    place: Place
+    location: Location
     name: str
     surfaces: tuple[str, str]
 
@@ -169,7 +169,7 @@ class SectorEnds:
 class Sectors:
     """How many sectors make the whole round an axis, by two of its points, and the name of the tie of their ends."""
 
-    place: Place
+    location: Location
     count: int
     tie: str
     points: tuple[float, ...]
@@ -179,7 +179,7 @@ class Sectors:
 class Equation:
     """A linear equation: node, component and coefficient of each term."""
 
-    place: Place
+    location: Location
     terms: tuple[tuple[str, int, float], ...]
 
 
@@ -187,7 +187,7 @@ class Equation:
 class Pin:
     """Nodes, one or those of a set, that have the displacement of a further one, or each that of one of a further set."""
 
-    place: Place
+    location: Location
     first: str
     second: str
 
@@ -196,7 +196,7 @@ class Pin:
 class MultiPoint:
     """Nodes that stay in a plane or on a line, or, with a last one for it, have a mean rotation."""
 
-    place: Place
+    location: Location
     kind: str
     nodes: tuple[str, ...]
 
@@ -205,7 +205,7 @@ class MultiPoint:
 class Link:
     """A reference node with nodes that follow it (rigid, kinematic) or whose mean motion it follows (distributing)."""
 
-    place: Place
+    location: Location
     reference: str
     group: str
     kind: str  # nodes, elements or surface
@@ -219,7 +219,7 @@ class Link:
 class PretensionSection:
     """A section through a bolt: its surface, the node that has its shortening and its force, and its normal."""
 
-    place: Place
+    location: Location
     surface: str
     node: str
     normal: tuple[float, ...] | None
@@ -229,7 +229,7 @@ class PretensionSection:
 class Axes:
     """Local axes of nodes or materials: rectangular by points of the first axis and plane, or cylindrical about a line."""
 
-    place: Place
+    location: Location
     nodes: str
     cylindrical: bool
     points: tuple[float, ...]
@@ -239,7 +239,7 @@ class Axes:
 class Amplitude:
     """Points (time, multiplier), in the time of the step or of the analysis."""
 
-    place: Place
+    location: Location
     times: tuple[float, ...]
     values: tuple[float, ...]
     total: bool
@@ -258,7 +258,7 @@ class Given:
 class Step:
     """A load step of the deck."""
 
-    place: Place
+    location: Location
     nonlinear: bool = False
     period: float = 1.0
     increment: float = 1.0
@@ -289,16 +289,16 @@ class Content:
     pretensions: list[PretensionSection] = field(default_factory=list)
     orientations: dict[str, Axes] = field(default_factory=dict)
     amplitudes: dict[str, Amplitude] = field(default_factory=dict)
-    gaps: dict[str, tuple[Place, float, tuple[float, ...]]] = field(default_factory=dict)
-    springs: dict[str, tuple[Place, float]] = field(default_factory=dict)
+    gaps: dict[str, tuple[Location, float, tuple[float, ...]]] = field(default_factory=dict)
+    springs: dict[str, tuple[Location, float]] = field(default_factory=dict)
     supports: list[Given] = field(default_factory=list)
     initial: list[Block] = field(default_factory=list)
     stresses: list[Block] = field(default_factory=list)
     steps: list[Step] = field(default_factory=list)
     modes: dict[str, Any] | None = None
     notes: list[str] = field(default_factory=list)
-    outputs: list[Place] = field(default_factory=list)
+    outputs: list[Location] = field(default_factory=list)
 
-    def note(self, place: Place, text: str) -> None:
+    def note(self, location: Location, text: str) -> None:
         """Remember what a line means here, where that is not plain."""
-        self.notes.append(f"{place}: {text}")
+        self.notes.append(f"{location}: {text}")
