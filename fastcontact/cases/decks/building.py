@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from array import array
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -195,7 +196,7 @@ class Building:
         return name
 
     def _supports(self, conditions: Conditions) -> None:
-        mesh, alike = self.model.mesh, {}  # type: tuple[Any, dict[tuple[int, Table], list[int]]]
+        mesh, alike = self.model.mesh, ByShape()
         temporary = conditions.temporary()
         self._temporary_supports(conditions, temporary)
         at_times = {name for name, _ in temporary}
@@ -205,8 +206,8 @@ class Building:
                 if local:
                     self._local_support(conditions, name, table)
                 else:
-                    alike.setdefault((axis, table), []).append(point)
-        for axis, points, value, table in _by_shape(alike):
+                    alike.add(axis, table, [point])
+        for axis, points, value, table in alike:
             group = self._point_group("support", points)
             if callable(value) or any(factor for _, factor in table):
                 self.model.prescribe(group, ramp=table, **{"xyz"[axis]: value})
@@ -245,7 +246,7 @@ class Building:
         return csr_array((direction, (np.zeros(dim, int), columns)), shape=(1, self.model.n_dofs))
 
     def _forces(self, conditions: Conditions) -> None:
-        alike: dict[tuple[int, Table], list[int]] = {}
+        alike = ByShape()
         for table, names in conditions.forces.alike():
             along: dict[tuple[int, float], list[int]] = {}
             for point, axis, local in names:
@@ -254,8 +255,8 @@ class Building:
                     along.setdefault((k, float(direction[k])), []).append(point)
             for (k, cosine), points in along.items():
                 scaled = tuple((t, v * cosine / self.thickness) for t, v in table)
-                alike.setdefault((k, scaled), []).extend(points)
-        for axis, points, value, table in _by_shape(alike):
+                alike.add(k, scaled, points)
+        for axis, points, value, table in alike:
             if any(factor for _, factor in table):
                 group = self._point_group("force", points)
                 self.model.add_force(group, distribute=False, ramp=table, **{"xyz"[axis]: value})
@@ -524,26 +525,30 @@ def nodal_gaps(model: Model, secondary: str, primary: str, without: Sequence[int
     return (gaps[faced], places[formulation.secondary.points[faced]]) if faced.any() else (np.zeros(1), places[:1])
 
 
-def _by_shape(alike: Mapping[tuple[int, Table], list[int]]) -> Iterator[tuple[int, list[int], Any, Table]]:
-    """Yield axis, points, value and history of what points have by axis and history, once for histories of one shape.
+class ByShape:
+    """Histories of points along axes, grouped by axis and shape: what is given node by node becomes few loads.
 
-    The value is 1, or a function that returns those of the points, ascending, where they differ.
+    Iterating yields axis, points, value and history. The value is 1, or a function that returns those of the points,
+    ascending, where they differ.
     """
-    shapes: dict[tuple[int, Table], dict[Table, float]] = {}
-    for axis, table in alike:
+
+    def __init__(self) -> None:
+        self._members: dict[tuple[int, Table], tuple[Table, array[float], array[int]]] = {}
+
+    def add(self, axis: int, table: Table, points: Sequence[int]) -> None:
+        """Add a history of points along an axis."""
         size, shape = shape_of(table)
-        shapes.setdefault((axis, shape), {})[table] = size
-    for (axis, shape), sizes in shapes.items():
-        if len(sizes) == 1:
-            table = next(iter(sizes))
-            yield axis, alike[axis, table], 1.0, table
-            continue
-        values: dict[int, float] = {}
-        for table, size in sizes.items():
-            for point in alike[axis, table]:
-                values[point] = values.get(point, 0.0) + size
-        points = sorted(values)
-        yield axis, points, partial(_given, np.array([values[point] for point in points])), shape
+        _, sizes, members = self._members.setdefault((axis, shape), (table, array("d"), array("q")))
+        sizes.extend([size] * len(points))
+        members.extend(points)
+
+    def __iter__(self) -> Iterator[tuple[int, list[int], Any, Table]]:
+        for (axis, shape), (table, sizes, members) in self._members.items():
+            if min(sizes) == max(sizes):
+                yield axis, list(members), 1.0, table
+                continue
+            points, which = np.unique(members, return_inverse=True)
+            yield axis, points.tolist(), partial(_given, np.bincount(which, sizes)), shape
 
 
 def _given(values: Array, positions: Array) -> Array:

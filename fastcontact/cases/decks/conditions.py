@@ -124,7 +124,7 @@ class Conditions:
             raise block.location.refuse(f"TYPE={kind} is not supported, only DISPLACEMENT")
         if given.new:
             self.supports.forget()
-        for row in block.rows:
+        for row in block.each():
             points = self.made.nodes(row.text(0), row.location)
             named = NAMED.get(row.text(1).upper())
             if row.text(1).upper() in ("XASYMM", "YASYMM", "ZASYMM"):
@@ -180,7 +180,7 @@ class Conditions:
     def _forces(self, given: Given) -> None:
         if given.new:
             self.forces.forget()
-        for row in given.block.rows:
+        for row in given.block.each():
             component, value = row.whole(1), row.number(2)
             for point in self.made.nodes(row.text(0), row.location):
                 name = self._component(point, component) if 1 <= component <= 6 else None
@@ -194,7 +194,7 @@ class Conditions:
         keyword = given.block.keyword
         if given.new:
             self.loads.forget(lambda name: name.keyword == keyword)
-        for row in given.block.rows:
+        for row in given.block.each():
             for name, value in self._distributed(keyword, row):
                 self.loads.give(name, value, given.amplitude, row.location)
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from array import array
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Hashable, Iterable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Generic, TypeVar
 
@@ -22,9 +23,13 @@ ALIKE = 12
 
 @dataclass(slots=True)
 class Track:
-    """The value of quantities that were always given together, through the steps, as points (load factor, value)."""
+    """The value of quantities that were always given together, through the steps.
 
-    points: list[tuple[float, float]]
+    `numbers` are load factor and value of each point in turn: every node may have a track of its own, and pairs would take
+    three times as much.
+    """
+
+    numbers: array[float]
     location: Location
     size: int
     alive: bool = True
@@ -33,17 +38,22 @@ class Track:
     @property
     def last(self) -> float:
         """The value at the end of the last step so far."""
-        return self.points[-1][1]
+        return self.numbers[-1]
+
+    @property
+    def points(self) -> Table:
+        """Points (load factor, value)."""
+        return tuple(zip(self.numbers[::2], self.numbers[1::2], strict=True))
 
     def add(self, points: Iterable[tuple[float, float]]) -> None:
         """Go on with further points; one at the time of the last point and of another value becomes a jump."""
         for time, value in points:
-            end, before = self.points[-1]
+            end, before = self.numbers[-2:]
             if time <= end:
                 if value == before:
                     continue
                 time = end + JUMP
-            self.points.append((time, value))
+            self.numbers.extend((time, value))
 
 
 @dataclass
@@ -84,7 +94,7 @@ class Histories(Generic[Name]):
     def begin(self) -> None:
         """Take what was given before all steps as there from the beginning, at zero, and reached in the first step."""
         for _, _, location in [*self.changing.values()][:1]:
-            self.tracks = dict.fromkeys(self.changing, Track([(0.0, 0.0)], location, len(self.changing)))
+            self.tracks = dict.fromkeys(self.changing, Track(array("d", (0.0, 0.0)), location, len(self.changing)))
         self.first, self.changing = self.changing, {}
 
     def forget(self, which: Callable[[Name], bool] = lambda name: True) -> None:
@@ -132,10 +142,10 @@ class Histories(Generic[Name]):
             return track
         if track is None:
             assert given is not None
-            track = Track([(0.0, rest)], given[2], len(names))
+            track = Track(array("d", (0.0, rest)), given[2], len(names))
         else:
             track.size -= len(names)
-            track = replace(track, points=[*track.points], size=len(names))
+            track = replace(track, numbers=track.numbers[:], size=len(names))
         self.tracks.update(dict.fromkeys(names, track))
         return track
 
@@ -146,17 +156,15 @@ class Histories(Generic[Name]):
     def table(self, name: Name) -> Table:
         """Return the whole history as a table of load factor and value."""
         points, end = self.tracks[name].points, float(len(self.content.steps))
-        return tuple(points) if points[-1][0] >= end else (*points, (end, points[-1][1]))
+        return points if points[-1][0] >= end else (*points, (end, points[-1][1]))
 
-    def alike(self) -> list[tuple[Table, list[Name]]]:
-        """Return all histories, each once, with what has it."""
-        members: dict[int, list[Name]] = {}
+    def alike(self) -> Iterator[tuple[Table, list[Name]]]:
+        """Yield all histories, each once, with what has it."""
+        members: dict[bytes, list[Name]] = {}
         for name, track in self.tracks.items():
-            members.setdefault(id(track), []).append(name)
-        tables: dict[Table, list[Name]] = {}
+            members.setdefault(track.numbers.tobytes(), []).append(name)
         for names in members.values():
-            tables.setdefault(self.table(names[0]), []).extend(names)
-        return list(tables.items())
+            yield self.table(names[0]), names
 
 
 def shape_of(table: Table) -> tuple[float, Table]:
