@@ -1,8 +1,9 @@
 """Kill runs at random instants: does every file open, is every step right, does every run end right when it is resumed?
 
-    python bench/kills.py [--kills 200] [--seed 1] [--cases forma04c friction] [--failures FOLDER]
+    python bench/kills.py [--kills 200] [--seed 1] [--cases forma04c friction] [--signals KILL TERM] [--failures FOLDER]
 
-Half of the kills fall on FORMA04 C, half on a case in three dimensions with friction (tests/kills/kill_cases.py). Six in
+By default half of the kills fall on FORMA04 C, half on a case in three dimensions with friction (tests/kills/kill_cases.py);
+`--cases features` takes all that has a history, from plasticity to heat (tests/kills/feature_cases.py). Six in
 ten fall while a step is written, the others anywhere between start and end; three in ten runs are killed again when they
 are resumed. Prints what was found, a column a case; files that went wrong are kept; exit code 1 if there are any.
 """
@@ -10,6 +11,7 @@ are resumed. Prints what was found, a column a case; files that went wrong are k
 from __future__ import annotations
 
 import argparse
+import signal
 import sys
 import tempfile
 import time
@@ -17,6 +19,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "kills"))
 
+import feature_cases
 import kill_cases
 import killing
 
@@ -27,17 +30,24 @@ def main() -> int:
     parser.add_argument("--kills", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument(
-        "--cases", nargs="+", choices=("forma04c", "friction", "small"), default=["forma04c", "friction"]
+        "--cases",
+        nargs="+",
+        choices=("forma04c", "friction", "small", "features", *feature_cases.CASES),
+        default=["forma04c", "friction"],
     )
+    parser.add_argument("--signals", nargs="+", choices=("KILL", "TERM", "INT", "HUP"), default=["KILL"])
     parser.add_argument("--failures", type=Path, default=Path("kill-failures"))
     given = parser.parse_args()
     begin, all_found = time.perf_counter(), {}
-    for number, name in enumerate(given.cases):
-        count = given.kills * (number + 1) // len(given.cases) - given.kills * number // len(given.cases)
+    names = [name for case in given.cases for name in (feature_cases.CASES if case == "features" else [case])]
+    signals = [signal.Signals[f"SIG{name}"] for name in given.signals]
+    for number, name in enumerate(names):
+        count = given.kills * (number + 1) // len(names) - given.kills * number // len(names)
         with tempfile.TemporaryDirectory() as folder:
             known = killing.reference(kill_cases.prepared(name, Path(folder)), Path(folder))
-            all_found[name] = killing.run(known, count, given.seed, Path(folder), given.failures)
-    print(f"{'':<20}" + "".join(f"{name:>12}" for name in all_found))
+            all_found[name] = killing.run(known, count, given.seed, Path(folder), given.failures, signals)
+        print(f"{name}: {all_found[name].kills}, {len(all_found[name].failures)} failures", file=sys.stderr, flush=True)
+    print(f"{'':<20}" + "".join(f"{name[:11]:>12}" for name in all_found))
     for row in zip(*(found.rows() for found in all_found.values()), strict=True):
         print(f"{row[0][0]:<20}" + "".join(f"{text:>12}" for _, text in row))
     failures = [text for found in all_found.values() for text in found.failures]

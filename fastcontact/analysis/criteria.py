@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from fastcontact.errors import ModelError
@@ -64,7 +65,7 @@ class Criteria:
         for name, least in (("max_geometry_updates", 0), ("max_active_set_iterations", 1)):
             if getattr(self, name) < least or int(getattr(self, name)) != getattr(self, name):
                 raise ModelError(f"{name} = {getattr(self, name)} must be a whole number >= {least}")
-        if self.absolute is not None and not self.absolute >= 0:
+        if self.absolute is not None and not 0 <= self.absolute < math.inf:
             raise ModelError(f"the convergence criterion absolute = {self.absolute} must be a force >= 0, or None")
         if self.max_halvings < 0 or int(self.max_halvings) != self.max_halvings:
             raise ModelError(f"max_halvings = {self.max_halvings} must be a whole number >= 0")

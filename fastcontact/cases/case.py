@@ -14,7 +14,7 @@ from fastcontact.cases.input_files import files_named
 from fastcontact.cases.keys import NUMBER, RAMP, SENSITIVITY, TOP, at, called, check_keys, check_settings, tables
 from fastcontact.cases.model_tables import LISTS, build_model, points
 from fastcontact.cases.shipped import case_path, shipped_cases
-from fastcontact.errors import CaseError, unknown
+from fastcontact.errors import CaseError, FastcontactError, unknown
 from fastcontact.linear.choice import check_tolerance
 from fastcontact.mesh import generate
 from fastcontact.mesh.files import toml_text
@@ -109,8 +109,8 @@ def read_case(path: str | Path) -> Case:
     text, data = _parsed(path)
     try:
         return build_case(data, name=path.stem, folder=path.parent, text=text)
-    except CaseError as error:
-        raise CaseError(f"{path}: {error}") from error
+    except FastcontactError as error:
+        raise type(error)(f"{path}: {error}") from error
     except (ArithmeticError, AttributeError, LookupError, MemoryError, RecursionError, TypeError, ValueError) as error:
         # A value that passed all checks by key: Python's own message is all there is.
         reason = " ".join(str(error).split())[:200] or type(error).__name__
@@ -308,7 +308,11 @@ def _ramp(data: dict[str, Any]) -> Ramp:
 
 def _probes(mesh: Mesh, data: dict[str, Any]) -> dict[str, int]:
     check_keys("probes", data, dict.fromkeys(data, str))
-    return {name: mesh.point(group) for name, group in data.items()}
+    found = {}
+    for name, group in data.items():
+        with at(f"probes.{name}"):
+            found[name] = mesh.point(group)
+    return found
 
 
 def _theories(

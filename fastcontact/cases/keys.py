@@ -78,6 +78,8 @@ def check_settings(data: Mapping[str, Any]) -> None:
     """Raise CaseError if a key of a table of settings, such as ``[study]``, is unknown, or a value not of its type."""
     for key, known in (("study", STUDY), ("units", UNITS), ("solve", SOLVE), ("modes", MODES)):
         check_keys(key, data.get(key, {}), known)
+    if data.get("modes", {}).get("n", 1) < 1:
+        raise CaseError(f"modes.n = {data['modes']['n']}: ask for one mode or more")
     for key, (kind, form) in STUDY_ENTRIES.items():
         entries = data.get("study", {}).get(key, ())
         for place, entry in entries.items() if isinstance(entries, dict) else enumerate(entries):

@@ -386,7 +386,9 @@ def _arguments(where: str, entry: dict[str, Any]) -> dict[str, Any]:
 
 def points(table: list[Any], where: str = "ramp.table") -> Table:
     """Return a ramp as pairs of instant and multiplier of the loads [-]."""
-    pairs = all(isinstance(row, list) and len(row) == 2 and all(isinstance(v, NUMBER) for v in row) for row in table)
+    pairs = isinstance(table, list) and all(
+        isinstance(row, list) and len(row) == 2 and all(isinstance(v, NUMBER) for v in row) for row in table
+    )
     if not table or not pairs:
         raise CaseError(f"'{where}' must be a list of pairs [instant, multiplier of the loads]")
     return tuple((float(t), float(v)) for t, v in table)

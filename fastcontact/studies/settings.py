@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import inspect
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from fastcontact.cases.case import Case
+from fastcontact.cases.keys import check_keys
 from fastcontact.contact.formulations import FORMULATIONS
 from fastcontact.errors import CaseError, unknown
 from fastcontact.mesh import elements
-from fastcontact.mesh.generate import Circle
+from fastcontact.mesh.generate import GENERATORS, Circle
 
 SHAPES = {"triangles": ("tri3", "tri6"), "quadrangles": ("quad4", "quad8", "quad9")}
 # Elements that "all" stands for.
@@ -119,10 +121,15 @@ def settings(case: Case, data: dict[str, Any] | None = None) -> Settings:
 def _generator(data: dict[str, Any], study: dict[str, Any]) -> tuple[str | None, dict[str, dict[str, Any]]]:
     by_shape = {shape: dict(study[shape]) for shape in SHAPES if shape in study}
     generator = study.get("generator", data["mesh"].get("generator"))
+    if generator is not None and generator not in GENERATORS:
+        raise CaseError(unknown("study.generator", generator, GENERATORS))
     if by_shape and generator is None:
         raise CaseError(f"study.{next(iter(by_shape))} needs 'study.generator', the mesh maker it is meant for")
     if not by_shape and "generator" in study and study["generator"] != data["mesh"].get("generator"):
         raise CaseError("'study.generator' needs the arguments of level 0 in [study.triangles] or [study.quadrangles]")
+    for shape, arguments in by_shape.items():
+        known = dict.fromkeys(inspect.signature(GENERATORS[str(generator)]).parameters)
+        check_keys(f"study.{shape}", arguments, known)
     if by_shape or generator is None:
         return generator, by_shape
     kept = {key: value for key, value in data["mesh"].items() if key not in ("generator", "element")}

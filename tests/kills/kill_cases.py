@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+import feature_cases
+
 ROOT = Path(__file__).resolve().parents[2]
 
 # A quarter of a half-sphere is pressed on a block and then pushed along it, so that it sticks here and slides there.
@@ -81,9 +83,11 @@ class KilledCase:
 
 
 def prepared(name: str, folder: Path) -> KilledCase:
-    """Return a case by its name: "forma04c", "friction" or "small"; case files of our own go to `folder`."""
+    """Return a case by its name: "forma04c", "friction", "small", or a feature's; case files of our own go to `folder`."""
     if name == "forma04c":
         return KilledCase(ROOT / "data" / "cases" / "forma04c.toml", 1e-12)
+    if name in feature_cases.CASES:
+        return KilledCase(feature_cases.written(name, folder), 0.0)
     path = folder / f"{name}.toml"
     path.write_text({"friction": RUBBING, "small": SMALL}[name], encoding="utf-8")
     return KilledCase(path, 1e-10 if name == "friction" else 1e-12)

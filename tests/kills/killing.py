@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -18,6 +18,8 @@ import numpy as np
 from kill_cases import KilledCase
 
 import fastcontact as fc
+from fastcontact.results.layout import HEAT_FIELDS as HEAT
+from fastcontact.results.layout import OPTIONAL_COLUMNS
 
 # Largest relative difference of a step in a file of a killed run from that of the run that was let alone.
 OF_STEPS = 1e-12
@@ -30,6 +32,13 @@ WRITING = 0.6
 # Part of the killed runs that are killed again when they are resumed.
 AGAIN = 0.3
 LONGEST = 600.0  # s
+# Exit codes of runs that a signal ended; one that comes before Python listens, or after, ends the process by itself.
+ENDS = {
+    signal.SIGKILL: (-signal.SIGKILL,),
+    signal.SIGTERM: (143, -signal.SIGTERM),
+    signal.SIGINT: (130, -signal.SIGINT),
+    signal.SIGHUP: (129, -signal.SIGHUP),
+}
 
 
 @dataclass
@@ -138,13 +147,19 @@ def difference(found: fc.StepResult, expected: fc.StepResult) -> float:
     if list(found.contact) != list(expected.contact):
         return np.inf
     largest = 0.0
-    for name in ("displacement", "stress", "von_mises", "von_mises_signed", "reaction"):
-        largest = max(largest, _relative(getattr(found, name), getattr(expected, name)))
+    for name in ("displacement", "stress", "von_mises", "von_mises_signed", "reaction", *HEAT):
+        if (getattr(found, name) is None) != (getattr(expected, name) is None):
+            return np.inf
+        if getattr(found, name) is not None:
+            largest = max(largest, _relative(getattr(found, name), getattr(expected, name)))
+    for name, values in expected.cell_fields.items():
+        largest = max(largest, _relative(found.cell_fields[name], values))
     for name, other in expected.contact.items():
         for entry in ("points", "active", "sticking"):
             if not np.array_equal(getattr(found.contact[name], entry), getattr(other, entry)):
                 return np.inf
-        for entry in ("gap", "pressure", "multiplier", "force_vectors", "normal", "shear", "force", "radius"):
+        further = [entry for entry in OPTIONAL_COLUMNS if getattr(other, entry) is not None]
+        for entry in ("gap", "pressure", "multiplier", "force_vectors", "normal", "shear", "force", "radius", *further):
             largest = max(largest, _relative(getattr(found.contact[name], entry), getattr(other, entry)))
     return largest
 
@@ -198,6 +213,33 @@ def _torn(path: Path) -> bool:
     return rows > n_steps or any(contents[int.from_bytes(contents[40:48], "little") :])
 
 
+def arrays(path: Path) -> dict[str, np.ndarray]:
+    """Return every data set of a result file but those of notes, which tell how often and when runs ended."""
+    found = {}
+    with h5py.File(path, "r") as file:
+
+        def visit(name: str, item: object) -> None:
+            if isinstance(item, h5py.Dataset):
+                found[name] = np.asarray(item[()])
+
+        file.visititems(visit)
+    for name in ("runs", "notes", "steps"):
+        del found[f"fastcontact/{name}"]
+    return found
+
+
+def differing(first: Path, second: Path) -> list[str]:
+    """Return the names of arrays of two result files that do not have the same bits."""
+    one, other = arrays(first), arrays(second)
+    alike = {
+        name
+        for name in one.keys() & other.keys()
+        if (one[name].dtype, one[name].shape) == (other[name].dtype, other[name].shape)
+        and one[name].tobytes() == other[name].tobytes()
+    }
+    return sorted((one.keys() | other.keys()) - alike)
+
+
 def check_resumed(path: Path, known: Reference, found: Found, where: str) -> None:
     """Let a copy of what is left go on to its end and hold that against the undisturbed run."""
     folder = path.with_name("resumed")
@@ -225,8 +267,15 @@ def check_resumed(path: Path, known: Reference, found: Found, where: str) -> Non
         found.failures.append(f"{where}: ends {apart:.1e} off when it is resumed")
 
 
-def run(known: Reference, count: int, seed: int, folder: Path, keep: Path | None = None) -> Found:
-    """Kill `count` runs of a case, one after the other; files of failures are copied to `keep`."""
+def run(
+    known: Reference,
+    count: int,
+    seed: int,
+    folder: Path,
+    keep: Path | None = None,
+    signals: Sequence[signal.Signals] = (signal.SIGKILL,),
+) -> Found:
+    """End `count` runs of a case by one of the `signals`, one after the other; files of failures are copied to `keep`."""
     random, found = np.random.default_rng(seed), Found()
     path = folder / "killed.vtkhdf"
     resume = False
@@ -235,14 +284,15 @@ def run(known: Reference, count: int, seed: int, folder: Path, keep: Path | None
             for left in folder.glob(".killed.vtkhdf.*"):
                 left.unlink()
             path.unlink(missing_ok=True)
-        code = killed(known, path, resume, random)
+        sent = signals[random.integers(len(signals))]
+        code = killed(known, path, resume, random, sent)
         if code is None:  # it was faster
             resume = False
             continue
         found.kills += 1
         found.of_resumed += resume
-        where, failed = f"{known.case.path.stem}, seed {seed}, kill {found.kills}", len(found.failures)
-        if code != -signal.SIGKILL:
+        where, failed = f"{known.case.path.stem}, seed {seed}, {sent.name} {found.kills}", len(found.failures)
+        if code not in ENDS[sent]:
             found.failures.append(f"{where}: ended by itself with exit code {code}")
         check_left(path, known, found, where, resume)
         check_resumed(path, known, found, where)

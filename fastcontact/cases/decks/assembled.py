@@ -146,7 +146,7 @@ class Assembled:
             return self._named(kind, scope, entry)
         numbers = entry.numbers
         if not isinstance(numbers, range):
-            return (self._existing(kind, scope, number, entry.location) for number in numbers)
+            return self._all_existing(kind, scope, entry)
         there = self._there(kind, scope)
         numbers_there = [
             n for n in (numbers if len(numbers) <= len(there) else sorted(there)) if n in there and n in numbers
@@ -155,6 +155,12 @@ class Assembled:
             absent = f"{len(numbers) - len(numbers_there)} of the {len(numbers)} numbers {numbers[0]} to {numbers[-1]}"
             self.content.note(entry.location, f"{absent} are no {kind}s and left out")
         return (there[n] for n in numbers_there)
+
+    def _all_existing(self, kind: str, scope: str, entry: Members) -> Iterator[Any]:
+        there = self._there(kind, scope)
+        for number in entry.numbers:
+            found = there.get(number)
+            yield self._existing(kind, scope, number, entry.place_of(number)) if found is None else found
 
     def _named(self, kind: str, scope: str, entry: Members) -> Iterable[Any]:
         if not scope and any(entry.name.upper().startswith(name) for name in self.content.instances):

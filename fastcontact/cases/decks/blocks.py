@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from codecs import BOM_UTF8
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 from fastcontact.errors import CaseError, FileError
 
@@ -72,15 +74,17 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Lines:
-    """The data lines of a keyword as they stand in a file, from a line number on: rows are made when they are asked for."""
+    """The data lines of a keyword in the contents of a file, from a line number on: rows are made when they are asked for."""
 
     location: Location
-    texts: tuple[str, ...] = ()
+    contents: bytes = field(repr=False)
+    begin: int
+    end: int
 
     def __iter__(self) -> Iterator[Row]:
-        for number, raw in enumerate(self.texts, start=self.location.line):
-            if not (line := raw.strip()).startswith("**"):
-                yield _row(Location(self.location.file, number, self.location.keyword), line)
+        for line in _lines(self.contents, self.begin, self.end, self.location.line):
+            if not line.text.startswith("**"):
+                yield _row(Location(self.location.file, line.number, self.location.keyword), line.text)
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,7 +191,17 @@ def files_of_deck(path: Path) -> list[Path]:
     return source.files
 
 
-def _text(path: Path, source: Source) -> str:
+class _Line(NamedTuple):
+    """A line without blanks around it: its number, and where it begins and the next one does."""
+
+    number: int
+    begin: int
+    end: int
+    text: str
+
+
+def _contents(path: Path, source: Source) -> bytes:
+    """Return the bytes of a file, with lines that end as those of Unix do."""
     source.files.append(path)
     try:
         source.size += path.stat().st_size
@@ -195,61 +209,71 @@ def _text(path: Path, source: Source) -> str:
             raise FileError(
                 f"'{path}' with what it includes is more than {LARGEST >> 20} MiB or {MOST_FILES} files: too much for a deck"
             )
-        return path.read_text(encoding="utf-8-sig", errors="replace")
+        contents = path.read_bytes().removeprefix(BOM_UTF8)
     except OSError as error:
         raise FileError(f"cannot read '{path}': {error.strerror or error}") from error
+    return contents.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+
+
+def _lines(contents: bytes, begin: int, end: int, number: int = 1) -> Iterator[_Line]:
+    """Yield the lines between two places, one at a time: a list of all would take several times their length."""
+    while begin < end:
+        after = contents.find(b"\n", begin, end) + 1 or end
+        yield _Line(number, begin, after, contents[begin:after].decode("utf-8", "replace").strip())
+        number, begin = number + 1, after
 
 
 def _blocks(path: Path, name: str, source: Source) -> Iterator[Block]:
     """Yield the blocks of one file; data lines at its beginning belong to no keyword and are refused."""
     source.open.append(path.resolve())
     current: Block | None = None
-    begin = 0
-    texts = _text(path, source).splitlines()
-    lines = iter(enumerate(texts, start=1))
-    for number, raw in lines:
-        line = raw.strip()
-        if line.startswith("**"):
+    contents = _contents(path, source)
+    lines = _lines(contents, 0, len(contents))
+    last = _Line(0, 0, 0, "")  # of the current keyword
+    for line in lines:
+        if line.text.startswith("**"):
             continue
-        if len(line) > LONGEST_LINE:
-            keyword = _keyword(line) if line.startswith("*") else current.keyword if current else ""
-            raise Location(name, number, keyword).refuse(_TOO_LONG)
-        if not line.startswith("*"):
-            if line and current is None:
-                raise Location(name, number, "").refuse("a data line before any keyword")
+        if len(line.text) > LONGEST_LINE:
+            keyword = _keyword(line.text) if line.text.startswith("*") else current.keyword if current else ""
+            raise Location(name, line.number, keyword).refuse(_TOO_LONG)
+        if not line.text.startswith("*"):
+            if line.text and current is None:
+                raise Location(name, line.number, "").refuse("a data line before any keyword")
             continue
         if current is not None:
-            yield _with_lines(current, texts, begin, number - 1, source)
-        location = Location(name, number, _keyword(line))
-        line, begin = _continued(location, line, lines, number)
-        current = Block(location, _parameters(location, line))
+            yield _with_lines(current, contents, last, line.begin, source)
+        location = Location(name, line.number, _keyword(line.text))
+        last = _continued(location, line, lines)
+        current = Block(location, _parameters(location, last.text))
         if location.keyword == "INCLUDE":
             yield from _included(current, name, source)
             current = None
     if current is not None:
-        yield _with_lines(current, texts, begin, len(texts), source)
+        yield _with_lines(current, contents, last, len(contents), source)
     source.open.pop()
 
 
-def _with_lines(block: Block, texts: list[str], begin: int, end: int, source: Source) -> Block:
-    """Return a block with the lines of a file from one to another, counted from 0."""
-    if not source.with_data or begin >= end:
+def _with_lines(block: Block, contents: bytes, last: _Line, end: int, source: Source) -> Block:
+    """Return a block with the lines from the last one of its keyword to a place."""
+    if not source.with_data or last.end >= end:
         return block
-    location = Location(block.location.file, begin + 1, block.keyword)
-    return Block(block.location, block.parameters, Lines(location, tuple(texts[begin:end])))
+    location = Location(block.location.file, last.number + 1, block.keyword)
+    return Block(block.location, block.parameters, Lines(location, contents, last.end, end))
 
 
-def _continued(location: Location, line: str, lines: Iterator[tuple[int, str]], number: int) -> tuple[str, int]:
-    """Return the keyword line of a number with the lines on which it goes on, after a comma, and the number of the last."""
-    while line.endswith(","):
-        number, more = next(lines, (number, ""))
-        if not more.strip().startswith("**"):
-            line = f"{line} {more.strip()}"
-        if len(line) > LONGEST_LINE:
-            raise location.refuse(_TOO_LONG)
-        if not more:
+def _continued(location: Location, line: _Line, lines: Iterator[_Line]) -> _Line:
+    """Return a keyword line with the lines on which it goes on, after a comma, as one that ends where the last one does."""
+    while line.text.endswith(","):
+        more = next(lines, None)
+        if more is None:
             break
-    return line, number
+        further = "" if more.text.startswith("**") else f" {more.text}"
+        line = _Line(more.number, line.begin, more.end, line.text + further)
+        if len(line.text) > LONGEST_LINE:
+            raise location.refuse(_TOO_LONG)
+        if not more.text:
+            break
+    return line
 
 
 def _keyword(line: str) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -20,7 +20,7 @@ from fastcontact.cases.decks.content import Content, Interaction, Material, Pair
 from fastcontact.cases.decks.cyclic_symmetry import add_sectors
 from fastcontact.cases.decks.gaps import add_gap, check_discrete, gap_groups
 from fastcontact.cases.decks.heat import HELD, conductance_of, friction_heat_of, perfect_conductance
-from fastcontact.cases.decks.histories import JUMP, Histories, by_shape
+from fastcontact.cases.decks.histories import JUMP, ByShape, Histories
 from fastcontact.cases.decks.initial_stresses import add_initial_stresses
 from fastcontact.cases.decks.local_axes import axes_by_cell, local_axes, orientation_of
 from fastcontact.cases.decks.meshing import DeckMesh, begun, group_of_surface, secondary_group
@@ -223,7 +223,7 @@ class Building:
         return name
 
     def _supports(self, conditions: Conditions) -> None:
-        mesh, alike = self.model.mesh, {}  # type: tuple[Any, dict[int, list[tuple[Table, list[int]]]]]
+        mesh, alike = self.model.mesh, ByShape()
         temporary = conditions.temporary()
         self._temporary_supports(conditions, temporary)
         at_times = {name for name, _ in temporary}
@@ -236,8 +236,8 @@ class Building:
                 elif local:
                     self._local_support(conditions, name, table)
                 else:
-                    alike.setdefault(axis, []).append((table, [point]))
-        for axis, points, value, table in _by_axis(alike):
+                    alike.add(axis, table, [point])
+        for axis, points, value, table in alike:
             group = self._point_group("support", points)
             if callable(value) or any(factor for _, factor in table):
                 self.model.prescribe(group, ramp=table, **{"xyz"[axis]: value})
@@ -276,7 +276,7 @@ class Building:
         return csr_array((direction, (np.zeros(dim, int), columns)), shape=(1, self.model.n_dofs))
 
     def _forces(self, conditions: Conditions) -> None:
-        alike: dict[int, list[tuple[Table, list[int]]]] = {}
+        alike = ByShape()
         for table, names in conditions.forces.alike():
             along: dict[tuple[int, float], list[int]] = {}
             for point, axis, local in names:
@@ -285,8 +285,8 @@ class Building:
                     along.setdefault((k, float(direction[k])), []).append(point)
             for (k, cosine), points in along.items():
                 scaled = tuple((t, v * cosine / self.thickness) for t, v in table)
-                alike.setdefault(k, []).append((scaled, points))
-        for axis, points, value, table in _by_axis(alike):
+                alike.add(k, scaled, points)
+        for axis, points, value, table in alike:
             if any(factor for _, factor in table):
                 group = self._point_group("force", points)
                 self.model.add_force(group, distribute=False, ramp=table, **{"xyz"[axis]: value})
@@ -507,14 +507,6 @@ def _with_axes(law: Any, axes: Any, **constants: Any) -> Any:
         kept = {name: getattr(law, name) for name in ("density", "expansion", "conductivity")}
         law = Orthotropic((law.E,) * 3, (law.nu,) * 3, (G,) * 3, axes, **kept)
     return replace(law, **constants)
-
-
-def _by_axis(
-    alike: Mapping[int, list[tuple[Table, list[int]]]],
-) -> Iterator[tuple[int, list[int], Any, Table]]:
-    """Yield axis, points, value and history of what points have by axis, as `by_shape` does."""
-    for axis, members in alike.items():
-        yield from ((axis, *own) for own in by_shape(members))
 
 
 def _parts(step: Step) -> list[float]:

@@ -131,7 +131,7 @@ class Conditions:
         if given.new:
             self.supports.forget()
             self.heat.temperatures.forget()
-        for row in block.rows:
+        for row in block.each():
             if row.text(1) == "11":
                 self.heat.prescribe(given, row)
                 continue
@@ -190,7 +190,7 @@ class Conditions:
     def _forces(self, given: Given) -> None:
         if given.new:
             self.forces.forget()
-        for row in given.block.rows:
+        for row in given.block.each():
             component, value = row.whole(1), row.number(2)
             for point in self.made.nodes(row.text(0), row.location):
                 name = self._component(point, component) if 1 <= component <= 6 else None
@@ -204,7 +204,7 @@ class Conditions:
         keyword = given.block.keyword
         if given.new:
             self.loads.forget(lambda name: name.keyword == keyword)
-        for row in given.block.rows:
+        for row in given.block.each():
             for name, value in self._distributed(keyword, row):
                 self.loads.give(name, value, given.amplitude, row.location)
 

@@ -21,7 +21,7 @@ def contact_pair(content: Content, block: Block) -> None:
     if "SMALL SLIDING" in block.parameters:
         content.note(block.location, "SMALL SLIDING: sides are paired on the deformed shape all the same")
     adjust = block.get("ADJUST") if "ADJUST" in block.parameters else ""
-    for row in block.rows:
+    for row in block.each():
         if len([entry for entry in row.entries if entry]) != 2:
             raise row.location.refuse("a contact pair needs two surfaces, the secondary and the primary one")
         secondary, primary = unquoted(row.text(0)), unquoted(row.text(1))
@@ -58,7 +58,7 @@ def tie(content: Content, block: Block) -> None:
         )
     if adjust == "YES" and "ADJUST" in block.parameters:
         content.note(block.location, "ADJUST=YES: nodes are not moved, distances of the sides are kept")
-    for row in block.rows:
+    for row in block.each():
         if len([entry for entry in row.entries if entry]) != 2:
             raise row.location.refuse("a tie needs two surfaces, the secondary and the primary one")
         secondary, primary = unquoted(row.text(0)), unquoted(row.text(1))
@@ -67,7 +67,7 @@ def tie(content: Content, block: Block) -> None:
 
 def equation(content: Content, block: Block) -> None:
     """*EQUATION: the number of terms, then node, component and coefficient of each."""
-    rows = iter(block.rows)
+    rows = block.each()
     for head in rows:
         count = head.whole(0)
         terms: list[tuple[str, int, float]] = []
@@ -93,7 +93,7 @@ def multi_point(content: Content, block: Block) -> None:
     Those of PLANE, STRAIGHT and MEANROT go on over lines that begin with a number.
     """
     several: list[tuple[Row, str, list[str]]] = []
-    for row in block.rows:
+    for row in block.each():
         kind, nodes = row.text(0).upper(), [unquoted(entry) for entry in row.entries[1:] if entry]
         if kind.isdecimal() and several:
             several[-1][2].extend([*([row.text(0)] if int(kind) else []), *nodes])
@@ -121,7 +121,7 @@ def rigid_body(content: Content, block: Block) -> None:
 def coupling(content: Content, block: Block, inner: Block) -> None:
     """*COUPLING with *KINEMATIC or *DISTRIBUTING below it."""
     components: set[int] = set()
-    for row in inner.rows:
+    for row in inner.each():
         first, last = row.whole(0), row.whole(1, row.whole(0))
         if not 1 <= first <= last <= 6:
             raise row.location.refuse(f"the components {first} to {last} are not within 1 to 6")

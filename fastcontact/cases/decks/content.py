@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from array import array
+from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -27,12 +29,27 @@ class Cell:
 
 @dataclass(frozen=True, slots=True)
 class Members:
-    """Entries of a set: numbers, or the name of another set, in an instance (empty: where it is defined)."""
+    """Entries of a set: numbers, or the name of another set, in an instance (empty: where it is defined).
+
+    Numbers may be those of several lines: `lines` says where each further one begins, as place among them and line.
+    """
 
     location: Location
     numbers: Sequence[int] = ()
     name: str = ""
     instance: str = ""
+    lines: array[int] = field(default_factory=lambda: array("q"))
+
+    def add(self, numbers: array[int], line: int) -> None:
+        """Add the numbers of a further line."""
+        assert isinstance(self.numbers, array)
+        self.lines.extend((len(self.numbers), line))
+        self.numbers.extend(numbers)
+
+    def place_of(self, number: int) -> Location:
+        """Return the line that holds a number."""
+        row = bisect_right(self.lines[::2], self.numbers.index(number))
+        return replace(self.location, line=self.lines[2 * row - 1]) if row else self.location
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import Assembled, Element, Face
 from fastcontact.cases.decks.blocks import Block, Location, Row
 from fastcontact.cases.decks.content import Content, Given, Interaction, Material, Step
-from fastcontact.cases.decks.histories import Histories, by_shape
+from fastcontact.cases.decks.histories import ByShape, Histories
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.contact.conductance import Conductance
 from fastcontact.elasticity.materials import LinearElastic
@@ -262,10 +262,11 @@ class HeatConditions:
     def loads(self, thickness: float) -> list[Callable[[Model], None]]:
         """Make the groups of all loads of heat in the mesh; return what adds each of them to a model."""
         found, made = self.found, []  # type: DeckMesh, list[Callable[[Model], None]]
-        for points, value, table in by_shape([(self._risen(t), names) for t, names in self.temperatures.alike()]):
+        risen = [(self._risen(table), names) for table, names in self.temperatures.alike()]
+        for _, points, value, table in ByShape.of(risen):
             group = found.add_points(f"temperature {len(made)}", points)
             made.append(_prescribed(group, _above(value, self.reference), table))
-        for points, value, table in by_shape(self.powers.alike()):
+        for _, points, value, table in ByShape.of(self.powers.alike()):
             group = found.add_points(f"heat {len(made)}", points)
             made.append(_nodal(group, value, tuple((time, power / thickness) for time, power in table)))
         on_faces: dict[tuple[str, Table, float | None], list[Face]] = {}

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from array import array
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, Generic, TypeVar
@@ -24,9 +25,13 @@ ALIKE = 12
 
 @dataclass(slots=True)
 class Track:
-    """The value of quantities that were always given together, through the steps, as points (load factor, value)."""
+    """The value of quantities that were always given together, through the steps.
 
-    points: list[tuple[float, float]]
+    `numbers` are load factor and value of each point in turn: every node may have a track of its own, and pairs would take
+    three times as much.
+    """
+
+    numbers: array[float]
     location: Location
     size: int
     alive: bool = True
@@ -35,17 +40,22 @@ class Track:
     @property
     def last(self) -> float:
         """The value at the end of the last step so far."""
-        return self.points[-1][1]
+        return self.numbers[-1]
+
+    @property
+    def points(self) -> Table:
+        """Points (load factor, value)."""
+        return tuple(zip(self.numbers[::2], self.numbers[1::2], strict=True))
 
     def add(self, points: Iterable[tuple[float, float]]) -> None:
         """Go on with further points; one at the time of the last point and of another value becomes a jump."""
         for time, value in points:
-            end, before = self.points[-1]
+            end, before = self.numbers[-2:]
             if time <= end:
                 if value == before:
                     continue
                 time = end + JUMP
-            self.points.append((time, value))
+            self.numbers.extend((time, value))
 
 
 @dataclass
@@ -89,7 +99,9 @@ class Histories(Generic[Name]):
         for name in self.changing:
             alike.setdefault(self.rest.get(name, 0.0), []).append(name)
         for value, names in alike.items():
-            self.tracks.update(dict.fromkeys(names, Track([(0.0, value)], self.changing[names[0]][2], len(names))))
+            self.tracks.update(
+                dict.fromkeys(names, Track(array("d", (0.0, value)), self.changing[names[0]][2], len(names)))
+            )
         self.first, self.changing = self.changing, {}
 
     def forget(self, which: Callable[[Name], bool] = lambda name: True) -> None:
@@ -137,10 +149,10 @@ class Histories(Generic[Name]):
             return track
         if track is None:
             assert given is not None
-            track = Track([(0.0, rest)], given[2], len(names))
+            track = Track(array("d", (0.0, rest)), given[2], len(names))
         else:
             track.size -= len(names)
-            track = replace(track, points=[*track.points], size=len(names))
+            track = replace(track, numbers=track.numbers[:], size=len(names))
         self.tracks.update(dict.fromkeys(names, track))
         return track
 
@@ -151,17 +163,15 @@ class Histories(Generic[Name]):
     def table(self, name: Name) -> Table:
         """Return the whole history as a table of load factor and value."""
         points, end = self.tracks[name].points, float(len(self.content.steps))
-        return tuple(points) if points[-1][0] >= end else (*points, (end, points[-1][1]))
+        return points if points[-1][0] >= end else (*points, (end, points[-1][1]))
 
-    def alike(self) -> list[tuple[Table, list[Name]]]:
-        """Return all histories, each once, with what has it."""
-        members: dict[int, list[Name]] = {}
+    def alike(self) -> Iterator[tuple[Table, list[Name]]]:
+        """Yield all histories, each once, with what has it."""
+        members: dict[bytes, list[Name]] = {}
         for name, track in self.tracks.items():
-            members.setdefault(id(track), []).append(name)
-        tables: dict[Table, list[Name]] = {}
+            members.setdefault(track.numbers.tobytes(), []).append(name)
         for names in members.values():
-            tables.setdefault(self.table(names[0]), []).extend(names)
-        return list(tables.items())
+            yield self.table(names[0]), names
 
 
 def shape_of(table: Table) -> tuple[float, Table]:
@@ -170,24 +180,38 @@ def shape_of(table: Table) -> tuple[float, Table]:
     return size, tuple((time, round(value / size, ALIKE)) for time, value in table) if size else table
 
 
-def by_shape(alike: Iterable[tuple[Table, list[int]]]) -> Iterator[tuple[list[int], Any, Table]]:
-    """Yield points, value and history of what points have by history, once for histories of one shape.
+class ByShape:
+    """Histories of points along axes, grouped by axis and shape: what is given node by node becomes few loads.
 
-    The value is 1, or a function that returns those of the points, ascending, where they differ.
+    Iterating yields axis, points, value and history. The value is 1, or a function that returns those of the points,
+    ascending, where they differ.
     """
-    shapes: dict[Table, dict[Table, list[int]]] = {}
-    for table, points in alike:
-        shapes.setdefault(shape_of(table)[1], {}).setdefault(table, []).extend(points)
-    for shape, tables in shapes.items():
-        if len(tables) == 1:
-            yield from ((points, 1.0, table) for table, points in tables.items())
-            continue
-        values: dict[int, float] = {}
-        for table, points in tables.items():
-            for point in points:
-                values[point] = values.get(point, 0.0) + shape_of(table)[0]
-        ascending = sorted(values)
-        yield ascending, partial(_given, np.array([values[point] for point in ascending])), shape
+
+    def __init__(self) -> None:
+        self._members: dict[tuple[int, Table], tuple[Table, array[float], array[int]]] = {}
+
+    def add(self, axis: int, table: Table, points: Sequence[int]) -> None:
+        """Add a history of points along an axis."""
+        size, shape = shape_of(table)
+        _, sizes, members = self._members.setdefault((axis, shape), (table, array("d"), array("q")))
+        sizes.extend([size] * len(points))
+        members.extend(points)
+
+    @classmethod
+    def of(cls, alike: Iterable[tuple[Table, Sequence[int]]]) -> ByShape:
+        """Return histories of points that have no axis: 0."""
+        made = cls()
+        for table, points in alike:
+            made.add(0, table, points)
+        return made
+
+    def __iter__(self) -> Iterator[tuple[int, list[int], Any, Table]]:
+        for (axis, shape), (table, sizes, members) in self._members.items():
+            if min(sizes) == max(sizes):
+                yield axis, list(members), 1.0, table
+                continue
+            points, which = np.unique(members, return_inverse=True)
+            yield axis, points.tolist(), partial(_given, np.bincount(which, sizes).astype(float)), shape
 
 
 def _given(values: Array, positions: Array) -> Array:

@@ -23,7 +23,7 @@ def add_initial_stresses(model: Model, found: DeckMesh) -> None:
         starts[name], total = total, total + len(cells)
     values = np.zeros((total, len(names)))
     for block in content.stresses:
-        for row in block.rows:
+        for row in block.each():
             if len(row.entries) != 1 + len(names):
                 raise row.location.refuse(
                     f"{len(row.entries)} entries where {1 + len(names)} are needed: an element or a set, and the components "

@@ -52,7 +52,7 @@ def hyperelastic(content: Content, current: Material, block: Block) -> None:
     if len(kinds) != 1:
         raise block.location.refuse(f"material '{current.name}': one of {', '.join(HYPERELASTIC)} is supported")
     kind, terms = kinds[0], int(block.get("N", "1")) if kinds[0] == "OGDEN" else 1
-    numbers = [row.number(i) for row in block.rows for i in range(len(row.entries)) if row.entries[i]]
+    numbers = [row.number(i) for row in block.each() for i in range(len(row.entries)) if row.entries[i]]
     first, rest = (count * terms for count in HYPERELASTIC[kind])
     if len(numbers) < first:
         raise block.location.refuse(

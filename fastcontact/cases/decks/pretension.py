@@ -58,7 +58,7 @@ class Locks:
         self.number = number
         if not any(given.new for given in supports):
             return
-        named = {p for given in supports for row in given.block.rows for p in made.nodes(row.text(0), row.location)}
+        named = {p for given in supports for row in given.block.each() for p in made.nodes(row.text(0), row.location)}
         for point in self.begins:
             if point not in named:
                 location = next(given.block.location for given in supports if given.new)

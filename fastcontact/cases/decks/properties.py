@@ -54,7 +54,7 @@ def elastic(content: Content, current: Material, block: Block) -> None:
 
 def _with_axes(current: Material, block: Block, kind: str) -> None:
     """Take the constants of a material with axes, which may go on over lines; a temperature may follow them."""
-    numbers = [row.number(i) for row in block.rows for i in range(len(row.entries)) if row.entries[i]]
+    numbers = [row.number(i) for row in block.each() for i in range(len(row.entries)) if row.entries[i]]
     count = CONSTANTS[kind]
     if not count <= len(numbers) <= count + 1:
         raise block.location.refuse(
@@ -238,7 +238,7 @@ def amplitude(content: Content, block: Block) -> None:
     block.choice("DEFINITION", ("TABULAR",))
     block.choice("VALUE", ("RELATIVE",))
     total = block.choice("TIME", ("STEP TIME", "TOTAL TIME")) == "TOTAL TIME"
-    numbers = [row.number(i) for row in block.rows for i in range(len(row.entries)) if row.entries[i]]
+    numbers = [row.number(i) for row in block.each() for i in range(len(row.entries)) if row.entries[i]]
     times, values = numbers[::2], numbers[1::2]
     if not times or len(times) != len(values) or any(b <= a for a, b in pairwise(times)):
         raise block.location.refuse(f"amplitude '{name}' needs pairs of ascending times and multipliers")

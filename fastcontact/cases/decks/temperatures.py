@@ -68,13 +68,13 @@ def give(made: Assembled, histories: Histories[int], given: Given) -> None:
     """Give the temperatures of a *TEMPERATURE for the current step."""
     if given.new:
         histories.forget()
-    for row in given.block.rows:
+    for row in given.block.each():
         for point, value in _of_row(made, given.block, row):
             histories.give(point, value, given.amplitude, row.location)
 
 
 def _by_point(made: Assembled, block: Block) -> Iterable[tuple[int, float]]:
-    for row in block.rows:
+    for row in block.each():
         yield from _of_row(made, block, row)
 
 

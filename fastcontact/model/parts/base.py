@@ -10,7 +10,7 @@ from scipy.sparse import csr_array, vstack
 
 from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.elasticity.initial_states import InitialState
-from fastcontact.elasticity.loads import Load, Value
+from fastcontact.elasticity.loads import Load, Value, check_number
 from fastcontact.elasticity.materials import KINEMATICS, Material
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, stacked_rows
 from fastcontact.elasticity.nonlinear_materials import STRAINS
@@ -86,6 +86,7 @@ class ModelBase:
                     f"point {int(mesh.points[:, 0].argmin())} has the radius x = {radius:.6g} < 0: "
                     "an axisymmetric model lies at x >= 0, with y along the axis"
                 )
+        check_number("the reference_temperature", reference_temperature)
         self.mesh = mesh
         self.kinematics = kinematics
         self.strain = strain

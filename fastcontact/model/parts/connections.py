@@ -376,6 +376,8 @@ class ModelConnections(ModelInitialStates):
         if not len(nodes):
             raise ModelError(f"group '{group}' is empty: no spring can be there")
         if to is None:
+            if translation is not None:
+                raise ModelError(f"{name} goes to the ground: leave out the translation, or name the group to join")
             self.springs.append(grounded(name, nodes, axes, self.n_dofs, self.mesh.dim, along, vector))
             return
         opposite = self._nodes(to)

@@ -5,6 +5,7 @@ A `Value` is a number, or a function from reference positions (n, dim) [length] 
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import logging
 from collections.abc import Mapping, Sequence
@@ -163,6 +164,10 @@ class ModelContact(ModelConnections):
                 continue
             self.add_contact(pair.name, formulation=formulation, **sides, **options)
             added.append(pair)
+        if not added and options:  # they are wrong or right all the same
+            checked = copy.copy(self)
+            checked.contact = []
+            checked.add_contact("contacts", formulation=formulation, **sides, **options)
         return FoundContacts(self.mesh, tuple(added))
 
     @typed(ModelError)

@@ -11,7 +11,7 @@ import numpy as np
 
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.conductance import Conductance
-from fastcontact.elasticity.loads import Value, check_number, evaluated
+from fastcontact.elasticity.loads import Value, evaluated
 from fastcontact.errors import ModelError
 from fastcontact.heat.conduction import Conduction
 from fastcontact.heat.loads import Film, FixedTemperature, HeatFlux, Heating, HeatSource, NodalHeat
@@ -136,7 +136,6 @@ class ModelHeat(ModelMaterials):
                 raise ModelError(
                     f"contact '{pair.name}' has a friction_heat, but nothing conducts it: fix a temperature"
                 )
-        check_number("the reference_temperature", self.reference_temperature)
         if not self.conducts:
             return
         if self.temperatures:

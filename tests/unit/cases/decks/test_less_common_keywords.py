@@ -53,7 +53,7 @@ def test_a_file_that_is_lost_while_the_deck_is_read(tmp_path, monkeypatch):
     def lost(*_, **__):
         raise OSError(5, "Input/output error")
 
-    monkeypatch.setattr(Path, "read_text", lost)
+    monkeypatch.setattr(Path, "read_bytes", lost)
     (tmp_path / "deck.inp").write_bytes(WHOLE.encode())
     with pytest.raises(fc.FileError, match=r"cannot read '.*deck\.inp': Input/output error"):
         fc.read_deck(tmp_path / "deck.inp")

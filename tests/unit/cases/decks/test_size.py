@@ -28,15 +28,38 @@ def block(cells):
     return "\n".join(lines) + "\n*Dsload\noutside, P, 1.\n*End step\n"
 
 
-def test_twenty_bytes_a_byte(tmp_path):
-    text = block(16)
-    deck_of(tmp_path, block(1))  # imports
+def numbered(cells):
+    """Nodes of a block of so many cells along each edge."""
+    return range(1, (cells + 1) ** 3 + 1)
+
+
+# What every node may have a line of its own for: a part of the deck and what stands in its place.
+LINES = {
+    "sets": ("", None),
+    "forces": ("*Dsload\noutside, P, 1.", lambda n: "*Cload\n" + "\n".join(f"{k}, 3, {k}." for k in numbered(n))),
+    "same forces": ("*Dsload\noutside, P, 1.", lambda n: "*Cload\n" + "\n".join(f"{k}, 3, 1." for k in numbered(n))),
+    "members": ("*Step\n", lambda n: "*Nset, nset=singly\n" + "\n".join(map(str, numbered(n))) + "\n*Step\n"),
+}
+
+
+@pytest.mark.parametrize("kind", LINES)
+def test_twenty_bytes_a_byte(kind, tmp_path):
+    old, new = LINES[kind]
+    text = block(16).replace(old, new(16)) if old else block(16)
+    deck_of(tmp_path, block(1).replace(old, new(1)) if old else block(1))  # imports
     tracemalloc.start()
     deck = deck_of(tmp_path, text)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert len(deck.model.mesh.cells["hex8"]) == 16**3
     assert peak < 20 * len(text), f"{peak / len(text):.1f} bytes a byte"
+
+
+def test_a_member_that_is_missing_is_told_by_its_line(tmp_path):
+    text = block(1).replace("*Step", "*Nset, nset=singly\n1\n2, 3\n77, 4\n5\n*Step")
+    line = text.splitlines().index("77, 4") + 1
+    with pytest.raises(fc.CaseError, match=f"line {line}, .NSET: node 77 is not defined"):
+        deck_of(tmp_path, text)
 
 
 def calls(folder, text):

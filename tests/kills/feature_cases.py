@@ -1,0 +1,129 @@
+"""Small cases of all that has a history: yielding and stretching bodies, heat, layers, fluid, modes, coming supports."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+# Two blocks, of which the upper one is pressed down and then pushed to and fro.
+BLOCKS = """
+kinematics = "{kinematics}"
+{top}
+[mesh]
+generator = "block-on-block"
+divisions_lower = [6, 3]
+divisions_upper = [4, 2]
+size_upper = [6.0, 3.0]
+shift = 2.0
+[[material]]
+{material}
+[[support]]
+group = "LOWER_BOTTOM"
+x = 0.0
+y = 0.0
+[[support]]
+group = "UPPER_TOP"
+y = {down}
+ramp = [[0.0, 0.0], [0.5, 1.0], [1.0, 0.8]]
+[[support]]
+group = "UPPER_TOP"
+x = {along}
+ramp = [[0.0, 0.0], [0.25, 0.0], [0.75, 1.0], [1.0, 0.5]]
+[contact.pair]
+secondary = "CONT_UPPER"
+primary = "CONT_LOWER"
+{options}
+[ramp]
+steps = 6
+{tail}
+"""
+LINEAR = "E = 1000.0\nnu = 0.3"
+
+
+def _blocks(
+    material: str = LINEAR, options: str = "", tail: str = "", top: str = "", down: float = -0.02, along: float = 0.02,
+    kinematics: str = "plane_strain",
+) -> str:  # fmt: skip
+    return BLOCKS.format(
+        material=material, options=options, tail=tail, top=top, down=down, along=along, kinematics=kinematics
+    )
+
+
+HOT = """[[fixed_temperature]]
+group = "UPPER_TOP"
+value = 120.0
+ramp = [[0.0, 0.0], [0.5, 1.0], [1.0, 0.3]]
+[[film]]
+group = "LOWER_BOTTOM"
+coefficient = 1.5
+ambient = 20.0
+"""
+CONDUCTS = LINEAR + "\nconductivity = 50.0\nexpansion = 12e-6"
+# A cube held by what comes and goes, in steps of a deck.
+DECK = """*Node
+1, 0., 0., 0.
+2, 1., 0., 0.
+3, 1., 1., 0.
+4, 0., 1., 0.
+5, 0., 0., 1.
+6, 1., 0., 1.
+7, 1., 1., 1.
+8, 0., 1., 1.
+*Element, type=C3D8, elset=one
+1, 1, 2, 3, 4, 5, 6, 7, 8
+*Nset, nset=x1
+2, 3, 6, 7
+*Material, name=steel
+*Elastic
+100000., 0.3
+*Solid Section, elset=one, material=steel
+"""
+HELD = "1, 1, 3\n2, 2, 3\n3, 3\n4, 1\n4, 3\n5, 1\n8, 1\n"
+
+
+def _step(lines: str, pressure: float) -> str:
+    return f"*Step\n*Static\n{lines}*Dload\n1, P2, {pressure}\n*End Step\n"
+
+
+SUPPORTS = (
+    DECK
+    + _step("*Boundary\n" + HELD, 100.0)
+    + _step("*Boundary, fixed\nx1, 1\n", 200.0)
+    + _step("*Boundary\nx1, 1, 1, 0.\n", 200.0)
+    + _step("*Boundary, op=new\n" + HELD, 200.0)
+    + _step("*Boundary\nx1, 1, 1, 0.0005\n", 200.0)
+    + _step("", 100.0)
+)
+
+CASES = {
+    "plastic": _blocks(LINEAR + "\nyield_stress = 3.0\nhardening = [[0.0, 3.0], [0.1, 9.0]]\nkinematic = 20.0"),
+    "plastic with friction": _blocks(LINEAR + "\nyield_stress = 3.0", "friction = 0.3", along=0.05),
+    "rubber": _blocks(
+        'law = "neo_hookean"\nE = 10.0\nnu = 0.45', "friction = 0.2", top='strain = "finite"', down=-0.3, along=0.2
+    ),
+    "ogden": _blocks(
+        'law = "ogden"\nmu = [2.0]\nalpha = [2.5]\nbulk = 20.0', top='strain = "finite"', down=-0.3, along=0.1
+    ),
+    "heat": _blocks(CONDUCTS, "conductance = [[0.0, 0.1], [20.0, 40.0]]", HOT, "reference_temperature = 20.0"),
+    "heat of friction": _blocks(
+        CONDUCTS, "conductance = 5.0\nfriction = 0.3\nfriction_heat = 1.0", HOT, "reference_temperature = 20.0"
+    ),
+    "cohesive layer": _blocks(options="cohesion = {strength = 2.0, energy = 0.02}", down=0.03, along=0.02),
+    "adhesion": _blocks(options="adhesion = {work = 0.02, strength = 1.0}", down=0.01, along=0.0),
+    "fluid": _blocks(
+        tail='[[fluid_pressure]]\ncontact = "pair"\npressure = 8.0\nsource = "UPPER_LEFT"\n', along=0.005, down=-0.05
+    ),
+    "modes": _blocks(
+        LINEAR + "\ndensity = 1e-9", tail="[modes]\nn = 3\nstress_stiffening = true\n", options="friction = 0.3"
+    ),
+    "friction ramp": _blocks(
+        options="friction = 0.4\nfriction_ramp = [[0.0, 0.2], [0.5, 1.0], [1.0, 0.1]]", along=0.05
+    ),
+    "temporary supports": SUPPORTS,
+}
+
+
+def written(name: str, folder: Path) -> Path:
+    """Write a case by its name, a case file or a deck, and return its path."""
+    path = folder / f"{name.replace(' ', '-')}{'.inp' if CASES[name].startswith('*') else '.toml'}"
+    path.write_text(CASES[name], encoding="utf-8")
+    return path
