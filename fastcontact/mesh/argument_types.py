@@ -76,16 +76,16 @@ def _checked(call: Callable[..., Any], name: str, error: type[FastcontactError])
 
 def _named(signature: inspect.Signature, call: Callable[..., Any]) -> inspect.Signature:
     """Return the signature with the keys of an unpacked `TypedDict` as keyword arguments, None by default, for `help`."""
-    *others, last = signature.parameters.values() or [None]
-    if last is None or not str(last.annotation).startswith("Unpack["):
+    parameters = list(signature.parameters.values())
+    if not parameters or not str(parameters[-1].annotation).startswith("Unpack["):
         return signature
-    (keys,) = typing.get_args(types_of(call)[last.name])
+    (keys,) = typing.get_args(types_of(call)[parameters[-1].name])
     kind = inspect.Parameter.KEYWORD_ONLY
     named = [
         inspect.Parameter(key, kind, default=None, annotation=getattr(text, "__forward_arg__", text))
         for key, text in keys.__annotations__.items()
     ]
-    return signature.replace(parameters=[*others, *named])
+    return signature.replace(parameters=[*parameters[:-1], *named])
 
 
 def _called(call: Callable[..., Any], name: str, args: tuple[Any, ...]) -> str:
