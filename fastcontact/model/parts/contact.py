@@ -254,7 +254,7 @@ class ModelContact(ModelConnections):
         given: dict[str, Any] = {option: value for option, value in options.items() if value is not None}
         if formulation is None:
             kinds = self._facet_kinds(secondary)
-            formulation, options, reason = against_obstacle(self.mesh.dim, *kinds, given)
+            formulation, given, reason = against_obstacle(self.mesh.dim, *kinds, given)
             log.info("contact '%s': %s, since %s", name, method(formulation, given), reason)
         if formulation == "mortar":
             given.setdefault("multipliers", "dual")
