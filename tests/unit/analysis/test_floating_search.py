@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
+from fastcontact.analysis.floating_bodies import MAX_POSITIONS, FloatingBodies
 from fastcontact.analysis.load_step import load_step
 from fastcontact.analysis.problem import prepare
 from fastcontact.analysis.solution import Equilibrium
-from fastcontact.analysis.unsupported_bodies import MAX_POSITIONS, UnsupportedBodies
 
 DOFS = np.array([0])
 
 
 def bodies_at(dofs):
-    bodies = UnsupportedBodies.__new__(UnsupportedBodies)
+    bodies = FloatingBodies.__new__(FloatingBodies)
     bodies.dofs, bodies.stiffness = dofs, 1.0
     return bodies
 
