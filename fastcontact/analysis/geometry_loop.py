@@ -56,12 +56,11 @@ class Plan:
         """Return the plan that the criteria, the formulations and the linear solver of a problem ask for."""
         criteria = problem.criteria
         fixed = 0 if criteria.keep_pairing else criteria.geometry_updates
-        free = fixed is None and problem.floating_bodies is None
         return cls(
             until_settled=fixed is None,
             limit=criteria.max_geometry_updates if fixed is None else fixed,
-            semismooth=free and any(pair.geometry_in_loop for pair in problem.pairs.values()),
-            extrapolate=free and problem.solver.iterative,
+            semismooth=fixed is None and any(pair.geometry_in_loop for pair in problem.pairs.values()),
+            extrapolate=fixed is None and problem.solver.iterative,
         )
 
 

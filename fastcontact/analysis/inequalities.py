@@ -25,6 +25,8 @@ from fastcontact.model.rigid_motions import generalised, needed_friction, resist
 
 # Of the largest prescribed motion, what counts as none.
 ROUND_OFF = 1e-9
+# Of the size of the model: gaps that the linear program for rigid bodies, accurate to 1e-7, leaves where they touch.
+TOUCHING = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,12 +135,11 @@ def _with_floating_bodies(
     start = iterate.u[bodies.dofs]
     if not iterate.history:
         moved = _approach(step, bodies, constraints, iterate.u)
-        start = start if active.any() else start + moved
-    noise = 10 * problem.solver.tolerance
-    rigid = bodies.settle(
-        solve_at, start, state.largest_rigid_force, noise, state.gap_round_off,
-        None if iterate.rigid is None else iterate.rigid.derivative,
-    )  # fmt: skip
+        if not active.any():
+            start = start + moved
+            known = _touching(step, constraints, iterate.u + bodies.rigid(moved))
+    noise = 10 * max(problem.solver.tolerance, accuracy.residual or 0.0)
+    rigid = bodies.settle(solve_at, start, state.largest_rigid_force, noise, state.gap_round_off)
     if rigid.state.settled and not rigid.slack:
         rubbing = bool(constraints.coefficients.any())
         text = not_balanced(bodies, rigid, state.largest_rigid_force, rubbing)
@@ -146,6 +147,12 @@ def _with_floating_bodies(
     iterate.rigid = rigid
     at = lift + bodies.rigid(rigid.position)
     return rigid.state, problem.system.displacement(rigid.state.u, at)
+
+
+def _touching(step: StepContext, constraints: Constraints, u: Array) -> Mask:
+    """Return which constraints (m,) displacements u (n_dofs,) of rigid bodies in contact close."""
+    size = float(np.ptp(step.problem.model.mesh.points, axis=0).max())
+    return constraints.usable & (constraints.gap0 + constraints.B @ u <= TOUCHING * size)
 
 
 def _approach(step: StepContext, bodies: FloatingBodies, constraints: Constraints, u: Array) -> Array:

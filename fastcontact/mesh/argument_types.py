@@ -55,8 +55,10 @@ def _checked(call: Callable[..., Any], name: str, error: type[FastcontactError])
             return call(*args, **kwargs)
         for key, value in given.items():
             parameter = signature.parameters[key]
+            annotation = types_of(call).get(key, Any)
             if parameter.kind is parameter.VAR_KEYWORD:
                 each = {**value}
+                annotation = Any if typing.get_origin(annotation) is typing.Unpack else annotation
             elif parameter.kind is parameter.VAR_POSITIONAL:
                 each = {f"{key}[{i}]": member for i, member in enumerate(value)}
             elif value is parameter.default:
@@ -65,10 +67,25 @@ def _checked(call: Callable[..., Any], name: str, error: type[FastcontactError])
                 each = {key: value}
             for argument, member in each.items():
                 whose = f"the argument {argument} of {_called(call, name, args)}"
-                check_type(whose, member, types_of(call).get(key, Any), error)
+                check_type(whose, member, annotation, error)
         return call(*args, **kwargs)
 
+    checking.__signature__ = _named(signature, call)  # type: ignore[attr-defined]
     return checking
+
+
+def _named(signature: inspect.Signature, call: Callable[..., Any]) -> inspect.Signature:
+    """Return the signature with the keys of an unpacked `TypedDict` as keyword arguments, None by default, for `help`."""
+    parameters = list(signature.parameters.values())
+    if not parameters or not str(parameters[-1].annotation).startswith("Unpack["):
+        return signature
+    (keys,) = typing.get_args(types_of(call)[parameters[-1].name])
+    kind = inspect.Parameter.KEYWORD_ONLY
+    named = [
+        inspect.Parameter(key, kind, default=None, annotation=getattr(text, "__forward_arg__", text))
+        for key, text in keys.__annotations__.items()
+    ]
+    return signature.replace(parameters=[*parameters[:-1], *named])
 
 
 def _called(call: Callable[..., Any], name: str, args: tuple[Any, ...]) -> str:

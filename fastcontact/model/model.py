@@ -30,6 +30,12 @@ from fastcontact.model.pretension import check_locks
 from fastcontact.model.ramp import Ramp, Table, combined, multiplier
 from fastcontact.model.rigid_motions import free_motions, generalised, resisting, unstopped
 
+# What a user finds in a model beside `add_...`; the rest serves the analysis.
+PUBLIC = (
+    "check", "contact", "couple", "describe", "fix", "fix_temperature", "internal_forces", "kinematics", "loads", "materials",
+    "mesh", "prescribe", "relate", "relate_groups", "strain", "supports", "units",
+)  # fmt: skip
+
 
 class Model(ModelSupports):
     """An elastic contact problem.
@@ -68,6 +74,10 @@ class Model(ModelSupports):
     def __repr__(self) -> str:
         pairs = ", ".join(f"{p.name}: {p.secondary} on {p.opposite}, {p.method}" for p in self.contact)
         return f"Model({self.kinematics}, {self.mesh!r}, {self.n_dofs} degrees of freedom; contact: {pairs or 'none'})"
+
+    def __dir__(self) -> list[str]:
+        special = [name for name in super().__dir__() if name.startswith(("__", "add_"))]
+        return sorted([*special, *PUBLIC])
 
     def _repr_html_(self) -> str:
         """Return `describe` as a table for notebooks."""

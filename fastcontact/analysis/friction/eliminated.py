@@ -120,7 +120,7 @@ class Eliminated:
         yielding = np.divide(1.0, diagonal := loaded.diagonal(), out=np.zeros(len(u)), where=diagonal > 0.0)
         self._gives = _diagonal_compliance(constraints)
         compliance = self._own(rows, yielding)
-        self._turn = aligning(compliance) if k == 2 else None
+        self._turn = aligning(compliance, constraints.directions) if k == 2 else None
         if self._turn is not None:
             turned = csr_array(self._turn @ vstack(rows, format="csr"))
             rows = tuple(turned[a * m : (a + 1) * m] for a in range(3))

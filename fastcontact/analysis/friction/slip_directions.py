@@ -41,10 +41,13 @@ def compliance_of_rows(rows: tuple[csr_array, ...], yielding: Array) -> Array:
     return compliance
 
 
-def aligning(compliance: Array) -> csr_array | None:
+def aligning(compliance: Array, directions: tuple[Array, ...] = ()) -> csr_array | None:
     """Return Q (3 m, 3 m) that turns two tangents so that one is idle where supports leave one direction of slip.
 
-    In a plane of symmetry both tangents may lie across it; then neither is idle by itself. None where nothing turns.
+    In a plane of symmetry both tangents may lie across it; then neither is idle by itself. The others are turned so that the
+    first is at right angles to the coordinate axis nearest to the tangent plane, if `directions`, two of (m, 3), are given:
+    unknowns are displacements along axes, and which of them are eliminated would otherwise depend on the choice of tangents.
+    None where nothing turns.
     """
     m = compliance.shape[2]
     gap = np.maximum(compliance[0, 0], np.finfo(float).tiny)
@@ -53,11 +56,18 @@ def aligning(compliance: Array) -> csr_array | None:
     apart = np.hypot(0.5 * (first - second), mixed)
     largest, least = 0.5 * (first + second) + apart, 0.5 * (first + second) - apart
     across = (least <= IDLE * np.maximum(largest, gap)) & (np.abs(mixed) > IDLE * np.maximum(largest, gap))
-    if not across.any():
+    if not across.any() and not directions:
         return None
-    angle = np.where(across, 0.5 * np.arctan2(2 * mixed, first - second), 0.0)
+    angle = np.where(across, 0.5 * np.arctan2(2 * mixed, first - second), _to_axes(*directions) if directions else 0.0)
     c, s, zero = diags_array(np.cos(angle)), diags_array(np.sin(angle)), csr_array((m, m))
     return csr_array(block_array([[diags_array(np.ones(m)), zero, zero], [zero, c, s], [zero, -s, c]], format="csr"))
+
+
+def _to_axes(one: Array, other: Array) -> Array:
+    """Return the angles (m,) by which the tangents (m, 3) turn to those along axes."""
+    normal = np.cross(one, other)
+    first = np.cross(np.eye(3)[np.argmin(np.abs(normal), axis=1)], normal)
+    return np.asarray(np.arctan2((first * other).sum(axis=1), (first * one).sum(axis=1)))
 
 
 def idle(own: Array) -> Mask:

@@ -9,7 +9,7 @@ import copy
 import dataclasses
 import logging
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from fastcontact.contact.surface import Surface, surface
 from fastcontact.elasticity.loads import Value, axes_of, check_number
 from fastcontact.errors import ContactError, ModelError, unknown
 from fastcontact.mesh.argument_types import check_fields, typed
+from fastcontact.model.contact_options import ContactOptions
 from fastcontact.model.contact_pair import ContactPair, Driving, FluidPressure, method
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
 from fastcontact.model.obstacle_rotation import rotation_of
@@ -43,7 +44,13 @@ class ModelContact(ModelConnections):
 
     @typed(ModelError)
     def add_contact(
-        self, name: str, *, secondary: str, primary: str, formulation: str | None = None, **options: Any
+        self,
+        name: str,
+        *,
+        secondary: str,
+        primary: str,
+        formulation: str | None = None,
+        **options: Unpack[ContactOptions],
     ) -> None:
         """Let the facets of group `secondary` come into contact with those of group `primary`.
 
@@ -107,11 +114,11 @@ class ModelContact(ModelConnections):
               side's body: one normal for all of it. ``projection_tolerance``: how far points may stand out beyond the end of
               the primary side and still carry force, in facet lengths.
         """
-        options = {option: value for option, value in options.items() if value is not None}
+        given: dict[str, Any] = {option: value for option, value in options.items() if value is not None}
         if formulation is None:
-            formulation, options, reason = default_formulation(self.mesh.dim, options)
-            log.info("contact '%s': %s, since %s", name, method(formulation, options), reason)
-        self._add_pair(ContactPair(name, secondary, primary, formulation, options))
+            formulation, given, reason = default_formulation(self.mesh.dim, given)
+            log.info("contact '%s': %s, since %s", name, method(formulation, given), reason)
+        self._add_pair(ContactPair(name, secondary, primary, formulation, given))
 
     @typed(ModelError)
     def add_contacts(
@@ -121,7 +128,7 @@ class ModelContact(ModelConnections):
         angle: float = 45.0,
         groups: Sequence[str] | None = None,
         formulation: str | None = None,
-        **options: Any,
+        **options: Unpack[ContactOptions],
     ) -> FoundContacts:
         """Find the surfaces of different bodies that face each other, and let each two of them come into contact.
 
@@ -155,19 +162,19 @@ class ModelContact(ModelConnections):
             raise ContactError(nothing_found(self.mesh, distance, angle, groups))
         self.mesh, added = contacts.mesh, []
         for pair in contacts:
-            sides = {"secondary": pair.secondary, "primary": pair.primary}
-            ends = [self.mesh.points_of(group) for group in sides.values()]
+            secondary, primary = pair.secondary, pair.primary
+            ends = [self.mesh.points_of(group) for group in (secondary, primary)]
             if any(np.isin(side, [cut.nodes, cut.opposite]).all() for cut in self.pretensions for side in ends):
                 continue
             if any(joined_already(self.mesh, (pair.secondary, pair.primary), other) for other in self.contact):
                 log.info("contact '%s' is left out, since another one joins its facets already", pair.name)
                 continue
-            self.add_contact(pair.name, formulation=formulation, **sides, **options)
+            self.add_contact(pair.name, secondary=secondary, primary=primary, formulation=formulation, **options)
             added.append(pair)
         if not added and options:  # they are wrong or right all the same
             checked = copy.copy(self)
             checked.contact = []
-            checked.add_contact("contacts", formulation=formulation, **sides, **options)
+            checked.add_contact("contacts", formulation=formulation, secondary=secondary, primary=primary, **options)
         return FoundContacts(self.mesh, tuple(added))
 
     @typed(ModelError)
@@ -214,7 +221,7 @@ class ModelContact(ModelConnections):
         rotation: Mapping[str, Any] | None = None,
         ramp: History = None,
         formulation: str | None = None,
-        **options: Any,
+        **options: Unpack[ContactOptions],
     ) -> None:
         """Let the facets of group `secondary` come into contact with a rigid obstacle.
 
@@ -251,17 +258,17 @@ class ModelContact(ModelConnections):
             obstacle.check_apart(self.mesh)
         obstacle.distance(self.mesh.points[:1])  # what does not fit this dimension shows at once
         history = table_of(ramp, f"the ramp of the motion of obstacle '{name}'")
-        options = {option: value for option, value in options.items() if value is not None}
+        given: dict[str, Any] = {option: value for option, value in options.items() if value is not None}
         if formulation is None:
             kinds = self._facet_kinds(secondary)
-            formulation, options, reason = against_obstacle(self.mesh.dim, *kinds, options)
-            log.info("contact '%s': %s, since %s", name, method(formulation, options), reason)
+            formulation, given, reason = against_obstacle(self.mesh.dim, *kinds, given)
+            log.info("contact '%s': %s, since %s", name, method(formulation, given), reason)
         if formulation == "mortar":
-            options.setdefault("multipliers", "dual")
+            given.setdefault("multipliers", "dual")
         driving = self._driving(name, moves, force)
         turned = (None, None) if rotation is None else rotation_of(name, rotation, self.kinematics)
         self._add_pair(
-            ContactPair(name, secondary, "", formulation, options, obstacle, displacement, history, driving, *turned)
+            ContactPair(name, secondary, "", formulation, given, obstacle, displacement, history, driving, *turned)
         )
 
     def _source(self, pair: ContactPair, side: Surface, options: PairOptions) -> Mask | None:

@@ -82,6 +82,24 @@ def test_tangents_turn_to_the_slip_that_supports_leave():
     assert aligning(own_compliance(R @ (A @ A.T) @ R.T, 3)) is None
 
 
+def test_frames_of_eliminated_slips_do_not_depend_on_the_choice_of_tangents():
+    """Iterations beside a much stiffer side did: 132 to 267 of one model (`test_multigrid_counts`, hex20)."""
+    rng, m = np.random.default_rng(3), 8
+    normal = unit_vectors(rng, m, 3)
+    one, other = tangents(normal)
+    turn = rng.uniform(0.0, 2.0 * np.pi, m)[:, None]
+    frames = []
+    for along in ((one, other), (np.cos(turn) * one + np.sin(turn) * other, np.cos(turn) * other - np.sin(turn) * one)):
+        rows = np.stack([normal, *along])
+        own = np.einsum("amd,d,bmd->abm", rows, [1.0, 2.0, 3.0], rows)
+        Q = aligning(own, along)
+        np.testing.assert_allclose((Q @ Q.T).toarray(), np.eye(3 * m), atol=1e-15)
+        frames.append((Q @ rows.reshape(3 * m, 3)).reshape(3, m, 3))
+    np.testing.assert_allclose(frames[0], frames[1], atol=1e-14)
+    nearest = np.argmin(np.abs(normal), axis=1)
+    np.testing.assert_allclose(frames[0][1, np.arange(m), nearest], 0.0, atol=1e-14)
+
+
 def test_what_does_not_settle_is_told_with_its_numbers(monkeypatch):
     monkeypatch.setattr(cone_newton, "PATIENCE", 0)
     monkeypatch.setattr(dense, "SWEPT", ())

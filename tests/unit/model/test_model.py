@@ -1,9 +1,15 @@
 """A model is checked whole before any numerics: one clear line each."""
 
+import dataclasses
+import inspect
+
 import pytest
 from models import elastic_model
 
 import fastcontact as fc
+from fastcontact.contact.formulations import FORMULATIONS
+from fastcontact.model.contact_options import ContactOptions
+from fastcontact.model.pair_options import SHARED_OPTIONS
 
 
 @pytest.fixture
@@ -71,3 +77,29 @@ def test_wrong_contact_options(model, options, message):
     arguments = {"secondary": "CONT1", "primary": "CONT2", **options}
     with pytest.raises(fc.ContactError, match=message):
         model.add_contact("pair", **arguments)
+
+
+def test_dir_shows_what_a_user_calls():
+    """No more than the page of reference needs: what serves the analysis is not offered."""
+    model = fc.Model(fc.generate.block(), "plane_strain")
+    shown = [name for name in dir(model) if not name.startswith("__")]
+    assert all(hasattr(model, name) for name in shown)
+    assert {"add_contact", "add_material", "fix", "prescribe", "check", "describe", "mesh", "contact"} <= {*shown}
+    assert not {"bind", "forces_by_ramp", "material_field", "holding_rows", "conducts"} & {*shown}
+
+
+@pytest.mark.parametrize("add", [fc.Model.add_contact, fc.Model.add_contacts, fc.Model.add_obstacle])
+def test_options_of_contact_are_named_arguments(add):
+    """For `help` and editors: those of all formulations and no others, None by default."""
+    given = {"secondary", "primary", "points", "axisymmetric", "modulus", "options", "held"}
+    kinds = [
+        kind.variant(dim, {"multipliers": m})
+        for kind in FORMULATIONS.values()
+        for dim in (2, 3)
+        for m in ("standard", "dual")
+    ]
+    own = {field.name for kind in kinds for field in dataclasses.fields(kind) if field.init} - given
+    shown = inspect.signature(add).parameters
+    assert own | {*SHARED_OPTIONS} == {*ContactOptions.__annotations__}
+    assert all(shown[name].default is None for name in ContactOptions.__annotations__)
+    assert not any(parameter.kind is parameter.VAR_KEYWORD for parameter in shown.values())
