@@ -106,7 +106,7 @@ def _iterated(problem: Problem, start: State, load: StepLoad, expected: float, p
         if history and part == 1.0 and balanced.excess > 1.0:
             u, bodies, part = _searched(problem, start, load, (before, here), (u, bodies), force)
             balanced = _balanced(problem, start, load, (u, bodies), force) if part < 1.0 else balanced
-        moved, size = largest_difference(u, before), max(largest(u), largest(load.lift))
+        moved, size = largest_difference(u, before), max(map(largest, (u, load.lift, start.u)))
         changes.append(moved / size if size else 0.0)
         history.append(_told(iterate, changes[-1], balanced, part))
         if part == 1.0 and balanced.excess <= 1.0 and (_still(problem, changes) or moved <= start.gap_round_off):
