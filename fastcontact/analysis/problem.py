@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.sparse import bsr_array, csr_array, eye_array, kron
+from scipy.sparse import bsr_array, csr_array, diags_array, eye_array, kron
 
 from fastcontact._jit import parallel
 from fastcontact.analysis.active_dofs import ActiveDofs, SurfaceDofs
@@ -270,14 +270,23 @@ class Problem:
         return UnsupportedBodies(motions, system, system.involved(self.contact_dofs), before)
 
     def linearised(
-        self, bodies: DeformedBodies, u: Array, load: StepLoad, rigid: RigidPosition | None
+        self,
+        bodies: DeformedBodies,
+        u: Array,
+        load: StepLoad,
+        rigid: RigidPosition | None,
+        held: csr_array | None = None,
     ) -> tuple[Problem, StepLoad]:
-        """Return the problem with the tangent of nonlinear bodies, at displacements u (n_dofs,) [length], and its loads."""
+        """Return the problem with the tangent of nonlinear bodies, at displacements u (n_dofs,) [length], and its loads.
+
+        The tangent has springs along the rows `held` (k, n_dofs), slack at u.
+        """
         force, K = -self.internal(bodies, u, load)[0], stiffened(bodies.K, self.model.springs)
         for (pressure, _), factor in zip(self.following, load.following, strict=True):
             K = bsr_array(K + (factor * pressure.at(self.displacement(u))[1]).tobsr(K.blocksize))
             K.sort_indices()
-        system = self.system.renewed(self.force_driven.stiffness(K))
+        K = self.force_driven.stiffness(K)
+        system = self.system.renewed(K if held is None else _stiffened_along(K, held))
         force += load.force + system.K @ u
         floating = self._floating(system, u, rigid)
         if floating is not None and rigid is not None:  # turned bodies under load are not free to turn
@@ -355,6 +364,14 @@ def prepare(
         solver.snapshot(), tuple(doubtful), model.nonlinear_bodies(field), model.following_pressures(),
         prepared_heat(model, ramp, criteria, linear_solver, solver.tolerance),
     )  # fmt: skip
+
+
+def _stiffened_along(K: bsr_array, rows: csr_array) -> bsr_array:
+    """Return K (n, n) with springs along `rows` (k, n), as stiff as its diagonal at most [force / length]."""
+    stiffness = float(K.diagonal().max()) / np.asarray(rows.multiply(rows).sum(axis=1)).ravel()
+    total = bsr_array(K + csr_array(rows.T @ diags_array(stiffness) @ rows).tobsr(K.blocksize))
+    total.sort_indices()
+    return total
 
 
 def floating_motions(model: Model, supported: Mask, displacement: Array | float = 0.0) -> FreeMotions:
