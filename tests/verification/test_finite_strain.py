@@ -201,7 +201,7 @@ def test_iterations_converge_quadratically(law: str) -> None:
 @pytest.mark.parametrize("friction", [None, 0.5])
 @pytest.mark.parametrize("law", ["neo-Hookean", "Ogden", "isotropic"])
 def test_iterations_with_contact_converge_as_far_as_its_geometry_is_settled(law: str, friction: float | None) -> None:
-    """Quadratically, but for the thousandth of the last change, and the criterion, to which contact geometry is settled."""
+    """Quadratically, but for the hundredth of the last change that contact geometry is left off by."""
     finite = law in LAWS
     mesh = fc.generate.block((4.0, 1.0), (24, 6), element="quad4", origin=(-2.0, 0.0))
     model = fc.Model(mesh, "plane_strain", strain="finite" if finite else "small")
@@ -213,7 +213,7 @@ def test_iterations_with_contact_converge_as_far_as_its_geometry_is_settled(law:
     )  # fmt: skip
     changes = changes_of(fc.solve(model, 2)[-1])
     for before, after in zip(changes[-3:-1], changes[-2:], strict=True):
-        assert after <= 40.0 * before**2 + 2e-3 * before + fc.Criteria().geometry
+        assert after <= 40.0 * before**2 + 2e-2 * before
 
 
 def balls(law, strain: str, approach: float, **options):
