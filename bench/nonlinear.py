@@ -1,10 +1,8 @@
 """Prices of nonlinear bodies: user CPU seconds of whole processes, ours and a peer's in turn on the same machine.
 
-``python bench/nonlinear.py block PYTHON_WITH_FELUPE [N] [STEPS]``: a neo-Hookean block of N^3 hex8 drawn by a tenth of its height and
-sheared by as much; FElupe solves by conjugate gradients with Jacobi's preconditioner, which takes less than its default, SuperLU.
-
-``python bench/nonlinear.py ball [N] [STEPS]``: a rigid ball pressed into an elastic-plastic block past yield, axisymmetric, N x N
-quad8; CalculiX (``ccx``) from a deck of the same mesh, the ball as an obstacle here and as a surface of rigid quad8 there.
+``python bench/nonlinear.py block PYTHON_WITH_FELUPE [N] [STEPS]``: a neo-Hookean block of N^3 hex8, drawn by a tenth of its
+height and sheared by as much. FElupe solves by conjugate gradients with Jacobi's preconditioner, which takes less than its
+default, SuperLU.
 """
 
 from __future__ import annotations
@@ -72,7 +70,9 @@ def block(theirs: str, n: str = "31", steps: str = "10") -> None:
     for _ in range(3):
         ours, peer = timed([sys.executable, "-c", OURS, n, steps]), timed([theirs, "-c", THEIRS, n, steps])
         for name, (user, wall, told) in (("fastcontact", ours), ("FElupe", peer)):
-            print(f"{name}: user {user:.1f} s, wall {wall:.1f} s; unknowns, iterations, force on top: {told}", flush=True)
+            print(
+                f"{name}: user {user:.1f} s, wall {wall:.1f} s; unknowns, iterations, force on top: {told}", flush=True
+            )
         ratios.append(peer[0] / ours[0])
     print(f"FElupe over fastcontact: {np.median(ratios):.2f}")
 
