@@ -153,7 +153,7 @@ def _solve(
     geometric stiffness are left out.
     """
     bodies, u = at
-    held = _held(last)
+    held = None if problem.unsupported_bodies is not None else _held(last)  # there tangents let bodies move freely
     attempts = [
         (WHOLE, None),
         *([] if held is None else [(WHOLE, held)]),
@@ -175,15 +175,14 @@ def _solve(
 
 
 def _held(last: SettledContact | None) -> csr_array | None:
-    """Return the rows (k, n_dofs) of the gaps that are closed in a contact solution, and of what sticks there; None without.
+    """Return the rows (k, n_dofs) of the gaps that are closed in a contact solution; None where there are none.
 
     Displacements along them hardly change any more as iterations converge, so that a stiffness there changes iterations
     by terms of second order alone (as the augmented Lagrangian does: Alart and Curnier, 1991).
     """
     if last is None or not last.solution.active.any():
         return None
-    active = last.solution.active
-    return csr_array(last.constraints.B[np.flatnonzero(active)])
+    return csr_array(last.constraints.B[np.flatnonzero(last.solution.active)])
 
 
 def _linear_contact(

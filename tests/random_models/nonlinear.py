@@ -128,7 +128,7 @@ def figures(model: fc.Model, step: fc.StepResult) -> dict[str, float]:
         off = np.abs(sum_of_all[1:] if model.kinematics == "axisymmetric" else sum_of_all).max()
     work = step.work
     energies = [abs(work[name]) for name in ("strain_energy", "external_work", "friction_work")]
-    return {"balance": float(off / size), "work": abs(work["imbalance"]) / max(energies)}
+    return {"balance": float(off / size) if size else 0.0, "work": abs(work["imbalance"]) / (max(energies) or 1.0)}
 
 
 if __name__ == "__main__":
