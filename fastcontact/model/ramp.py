@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from numbers import Real
+from typing import Any
 
 import numpy as np
 
@@ -178,6 +179,6 @@ def multiplier(own: PartHistory, ramp: Ramp, instant: float) -> float:
     return ramp.value(instant) if own is None else table_value(own, instant)
 
 
-def combined(by_ramp: Mapping[PartHistory, Array], ramp: Ramp, instant: float, shape: tuple[int, ...]) -> Array:
+def combined(by_ramp: Mapping[Any, Array], ramp: Ramp, instant: float, shape: tuple[int, ...]) -> Array:
     """Return the sum of the parts at `instant`, each times its multiplier."""
     return sum((multiplier(own, ramp, instant) * part for own, part in by_ramp.items()), np.zeros(shape))
