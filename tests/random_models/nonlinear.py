@@ -18,7 +18,7 @@ import fastcontact as fc
 
 # Out of balance over the largest force; change by other words, over the largest displacement; missing in the work of a
 # step over the largest energy.
-BALANCE, SAME, WORK = 2e-6, 1e-6, 0.05
+BALANCE, SAME, WORK = 2e-6, 1e-6, 0.02
 
 
 def law(random: Random) -> tuple[fc.ElasticPlastic | fc.NeoHookean, str]:
@@ -107,6 +107,8 @@ def outcome(seed: int) -> dict[str, Any]:
             apart /= np.abs(last.displacement).max() or 1.0  # a ball between coarse nodes may touch none
             row |= {"words": again.words, "said again": float(apart)}
     bounds = {"balance": BALANCE, "said again": SAME, "work": WORK}
+    if any("works of these load steps do not add up" in text for text in last.warnings):
+        bounds.pop("work")  # it is told, with the number
     row["wrong"] = [name for name, bound in bounds.items() if not row.get(name, 0.0) <= bound]
     return row | {
         "closed": sum(int(c.active.sum()) for c in last.contact.values()),

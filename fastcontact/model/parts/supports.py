@@ -159,7 +159,7 @@ class ModelSupports(ModelContact):
         for before in self.supports[:number]:
             if before.component == support.component and node in self.mesh.points_of(before.group):
                 break
-        own, other = (sum(s.by_history(self.mesh.points[[node]]).values())[0] for s in (support, before))
+        own, other = (float(np.sum(list(s.by_history(self.mesh.points[[node]]).values()))) for s in (support, before))
         raise ModelError(
             f"'{support.group}' prescribes {'xyz'[support.component]} = {own:g} at point {node}, but '{before.group}' "
             f"prescribes {other:g} there{' with another ramp' if own == other else ''}: remove one of the two"
