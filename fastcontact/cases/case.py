@@ -256,7 +256,7 @@ def _checks(
 def _sensitivities(model: Model, data: dict[str, Any]) -> list[tuple[Asked, list[Asked]]]:
     from fastcontact.analysis.sensitivities import check_asked  # half of the solver
 
-    found = []
+    asked_for = []
     for i, entry in enumerate(tables("sensitivity", data.get("sensitivity", []))):
         where = f"sensitivity[{i}]"
         check_keys(where, entry, SENSITIVITY)
@@ -272,8 +272,8 @@ def _sensitivities(model: Model, data: dict[str, Any]) -> list[tuple[Asked, list
         quantity, *by = (tuple(row) for row in rows)
         with at(where):
             check_asked(model, quantity, by)
-        found.append((quantity, by))
-    return found
+        asked_for.append((quantity, by))
+    return asked_for
 
 
 def _mesh(folder: Path, data: dict[str, Any]) -> Mesh:
@@ -325,12 +325,12 @@ def _theories(
             raise CaseError(unknown("contact pair in 'theory'", pair, pairs))
         if not isinstance(entry, dict):
             raise CaseError(f"'theory.{pair}' must be a table of keys, kind first, not {entry!r:.80}")
-        own = {key: value for key, value in entry.items() if key not in ("mesh_converged", "share")}
-        theories[pair] = {"theory": _theory(f"theory.{pair}", own), "share": _share(f"theory.{pair}", entry)}
+        constants = {key: value for key, value in entry.items() if key not in ("mesh_converged", "share")}
+        theories[pair] = {"theory": _theory(f"theory.{pair}", constants), "share": _share(f"theory.{pair}", entry)}
         if "mesh_converged" in entry:
             theories[pair]["mesh_converged"] = _theory(f"theory.{pair}.mesh_converged", entry["mesh_converged"])
-        if "approach" in own:
-            approach[pair] = float(own["approach"])
+        if "approach" in constants:
+            approach[pair] = float(constants["approach"])
     return theories, approach
 
 

@@ -123,8 +123,8 @@ def _of_function(
         for choice in choices
     ]  # fmt: skip
     results = functions.run_functions(runs, "no point of the sweep could be solved", **options)
-    found = _points(by_name, choices, results)
-    return Sweep(**functions.of_function(function), **found, combination=name, asked=tuple(wanted), compared="")
+    points = _points(by_name, choices, results)
+    return Sweep(**functions.of_function(function), **points, combination=name, asked=tuple(wanted), compared="")
 
 
 def _choices(parameters: Mapping[str, Sequence[Value]]) -> list[dict[str, Value]]:
