@@ -37,6 +37,9 @@ TRIALS = 20
 # A step that leaves more than this part of the elongations meets no resistance yet; the next one is longer by a factor.
 UNCHANGED = 0.9
 FARTHER = 10.0
+# Of the size of a displacement as a place of a spring: on contact surfaces, and where springs have been.
+AVOIDED, KEPT = 1e-3, 4.0
+NONE = np.empty(0, np.intp)
 # A motion that resists less than this fraction of its spring does not resist.
 UNRESISTED = 1e-9
 
@@ -57,6 +60,8 @@ class RigidPosition:
         Positions tried.
     slack : bool
         Whether the springs are slack.
+    dofs : ndarray of int (k,)
+        The displacement that each spring holds.
     derivative : ndarray (k, k), optional
         Of the elongations by the position, there or nearby, if any was needed [-].
     """
@@ -66,6 +71,7 @@ class RigidPosition:
     spring_force: Array
     positions: int
     slack: bool
+    dofs: Indices
     derivative: Array | None = None
 
 
@@ -78,6 +84,8 @@ class FloatingBodies:
     system : System
     avoid : ndarray of int
         Displacements to keep the springs from if possible: those of the contact surfaces.
+    before : ndarray of int, optional
+        Displacements that springs held before, which go on with them unless others are much better.
 
     Attributes
     ----------
@@ -91,13 +99,16 @@ class FloatingBodies:
         Of each spring [force / length].
     """
 
-    def __init__(self, motions: FreeMotions, system: System, avoid: Indices) -> None:
+    def __init__(self, motions: FreeMotions, system: System, avoid: Indices, before: Indices = NONE) -> None:
         diagonal, weightless = system.matrix.diagonal(), system.weightless
         typical = float(np.median(diagonal[system.free & ~weightless]))
         diagonal = np.where(weightless, typical, diagonal)
         self._dim = system.matrix.blocksize[0]
         self.names = motions.names()
-        self.dofs = _spring_dofs(system.unknowns_of(motions.displacement), diagonal, avoid)
+        weights = np.sqrt(np.maximum(diagonal, 0.0))
+        weights[avoid] *= AVOIDED
+        weights[before] *= KEPT
+        self.dofs = _spring_dofs(system.unknowns_of(motions.displacement), weights)
         self._places = [
             f"{'xyz'[dof % self._dim]} of {self._owner(motions, dof, weightless)}" for dof in self.dofs.tolist()
         ]
@@ -201,7 +212,7 @@ class FloatingBodies:
         slack = search.settled and search.left <= tolerable()
         state = dataclasses.replace(search.unsettled or search.state, iterations=search.iterations)
         force = self.stiffness * search.elongation
-        return RigidPosition(state, search.position, force, search.positions, slack, derivative)
+        return RigidPosition(state, search.position, force, search.positions, slack, self.dofs, derivative)
 
 
 class _Search:
@@ -284,9 +295,7 @@ def _corrected(derivative: Array, moved: Array, change: Array) -> Array:
     return derivative + np.outer(change - derivative @ moved, moved) / square if square else derivative
 
 
-def _spring_dofs(motions: Array, diagonal: Array, avoid: Indices) -> Indices:
-    """Return k unknowns that determine the motions (n, k): the stiffest ones far apart, none of `avoid` if possible."""
-    weights = np.sqrt(np.maximum(diagonal, 0.0))
-    weights[avoid] *= 1e-3
+def _spring_dofs(motions: Array, weights: Array) -> Indices:
+    """Return k unknowns that determine the motions (n, k): those of the largest `weights` (n,) far apart."""
     _, _, order = qr((motions * weights[:, None]).T, mode="economic", pivoting=True)
     return np.sort(order[: motions.shape[1]]).astype(np.intp)

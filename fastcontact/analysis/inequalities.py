@@ -134,11 +134,9 @@ def _with_floating_bodies(
     if not iterate.history:
         moved = _approach(step, bodies, constraints, iterate.u)
         start = start if active.any() else start + moved
-    noise = 10 * problem.solver.tolerance
-    rigid = bodies.settle(
-        solve_at, start, state.largest_rigid_force, noise, state.gap_round_off,
-        None if iterate.rigid is None else iterate.rigid.derivative,
-    )  # fmt: skip
+    noise, before = 10 * problem.solver.tolerance, iterate.rigid
+    derivative = before.derivative if before is not None and np.array_equal(before.dofs, bodies.dofs) else None
+    rigid = bodies.settle(solve_at, start, state.largest_rigid_force, noise, state.gap_round_off, derivative)
     if rigid.state.settled and not rigid.slack:
         rubbing = bool(constraints.coefficients.any())
         text = not_balanced(bodies, rigid, state.largest_rigid_force, rubbing)

@@ -6,7 +6,7 @@ import pytest
 from starting import finished, start
 
 
-@pytest.mark.parametrize("runs", [("plane", "friction"), ("solid",)])
+@pytest.mark.parametrize("runs", [("plane", "friction"), ("stretched", "yielding"), ("solid",)])
 def test_one_and_two_threads_find_the_same_bits(runs):
     threads = [dict.fromkeys(("NUMBA_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"), n) for n in "12"]
     # Before, since Numba up to 0.60 may link the parts of a kernel otherwise in the process that compiles it.
