@@ -124,7 +124,7 @@ def balance(
     if not 0.0 < residual <= bound:
         # Stiff parts that moved far are off by round-off of their own rows, which may be more than the forces of soft ones.
         # Without forces the criterion is 0/0: round-off of all rows decides. Either costs a product with K.
-        row_sums = problem.system.K.row_sums(u)
+        row_sums = problem.system.K.row_sums(problem.accurate_to(u))
         residual = problem.system.balance(out, ROUND_OFF * row_sums)[1]
         round_off, noise = _round_off(problem, row_sums, forces, largest_so_far)
     n_dofs = problem.model.n_dofs

@@ -32,6 +32,9 @@ SLACK = 1e-12
 # What is left when nothing improves any more counts as slack below this fraction.
 STAGNANT = 1e-8
 MAX_POSITIONS = 100
+# Of the size of a displacement as a place of a spring: on contact surfaces, and where springs have been.
+AVOIDED, KEPT = 1e-3, 4.0
+NONE = np.empty(0, np.intp)
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,8 @@ class RigidPosition:
         Positions tried.
     slack : bool
         Whether the springs are slack.
+    dofs : ndarray of int (k,)
+        The displacement that each spring holds.
     """
 
     state: Solution
@@ -57,6 +62,7 @@ class RigidPosition:
     spring_force: Array
     positions: int
     slack: bool
+    dofs: Indices
 
 
 class FloatingBodies:
@@ -68,6 +74,8 @@ class FloatingBodies:
     system : System
     avoid : ndarray of int
         Displacements to keep the springs from if possible: those of the contact surfaces.
+    before : ndarray of int, optional
+        Displacements that springs held before, which go on with them unless others are much better.
 
     Attributes
     ----------
@@ -81,13 +89,16 @@ class FloatingBodies:
         Of each spring [force / length].
     """
 
-    def __init__(self, motions: FreeMotions, system: System, avoid: Indices) -> None:
+    def __init__(self, motions: FreeMotions, system: System, avoid: Indices, before: Indices = NONE) -> None:
         diagonal, weightless = system.matrix.diagonal(), system.weightless
         typical = float(np.median(diagonal[system.free & ~weightless]))
         diagonal = np.where(weightless, typical, diagonal)
         self._dim = system.matrix.blocksize[0]
         self.names = motions.names()
-        self.dofs = _spring_dofs(system.unknowns_of(motions.displacement), diagonal, avoid)
+        weights = np.sqrt(np.maximum(diagonal, 0.0))
+        weights[avoid] *= AVOIDED
+        weights[before] *= KEPT
+        self.dofs = _spring_dofs(system.unknowns_of(motions.displacement), weights)
         self._places = [
             f"{'xyz'[dof % self._dim]} of {self._owner(motions, dof, weightless)}" for dof in self.dofs.tolist()
         ]
@@ -173,12 +184,10 @@ class FloatingBodies:
                 break
             position, before = position + elongation, left
         state = dataclasses.replace(state, iterations=iterations)
-        return RigidPosition(state, position, self.stiffness * elongation, positions, slack)
+        return RigidPosition(state, position, self.stiffness * elongation, positions, slack, self.dofs)
 
 
-def _spring_dofs(motions: Array, diagonal: Array, avoid: Indices) -> Indices:
-    """Return k unknowns that determine the motions (n, k): the stiffest ones far apart, none of `avoid` if possible."""
-    weights = np.sqrt(np.maximum(diagonal, 0.0))
-    weights[avoid] *= 1e-3
+def _spring_dofs(motions: Array, weights: Array) -> Indices:
+    """Return k unknowns that determine the motions (n, k): those of the largest `weights` (n,) far apart."""
     _, _, order = qr((motions * weights[:, None]).T, mode="economic", pivoting=True)
     return np.sort(order[: motions.shape[1]]).astype(np.intp)

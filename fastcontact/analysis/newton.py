@@ -10,6 +10,9 @@ import logging
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+from scipy.sparse import csr_array
+
 from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.analysis.balance import Balance, balance
 from fastcontact.analysis.criteria import LOOSEST
@@ -98,15 +101,17 @@ def _iterated(problem: Problem, start: State, load: StepLoad, expected: float, o
     iterate = Iterate.of(start)
     history: list[dict[str, Any]] = []
     u, bodies, changes = origin, problem.deformed(origin, start), [1.0]
+    settled = None
     for _ in range(MOST):
-        settled, target, force = _solve(problem, start, load, (bodies, u), iterate, (expected, changes[-1]))
+        scale = expected, changes[-1]
+        settled, target, force = _solve(problem, start, load, (bodies, u), iterate, scale, settled)
         before, here = u, bodies
         u, bodies, fraction = _reach(problem, start, u, target)
         balanced = _balanced(problem, start, load, (u, bodies), force)
         if history and fraction == 1.0 and balanced.excess > 1.0:
             u, bodies, fraction = _searched(problem, start, load, (before, here), (u, bodies), force)
             balanced = _balanced(problem, start, load, (u, bodies), force) if fraction < 1.0 else balanced
-        moved, size = largest_difference(u, before), max(largest(u), largest(load.lift))
+        moved, size = largest_difference(u, before), max(map(largest, (u, load.lift, start.u)))
         changes.append(moved / size if size else 0.0)
         history.append(_told(iterate, changes[-1], balanced, fraction))
         if fraction == 1.0 and balanced.excess <= 1.0 and (_still(problem, changes) or moved <= start.gap_round_off):
@@ -138,22 +143,29 @@ def _still(problem: Problem, changes: list[float]) -> bool:
 
 def _solve(
     problem: Problem, start: State, load: StepLoad, at: tuple[DeformedBodies, Array], iterate: Iterate,
-    scale: tuple[float, float],
+    scale: tuple[float, float], last: SettledContact | None,
 ) -> tuple[SettledContact | None, Array, Array]:  # fmt: skip
     """Return contact, displacements (n_dofs,) [length] and contact forces (n_dofs,) [force] of the bodies linearised.
 
     `at` are the bodies and their displacements (n_dofs,) [length], `scale` the displacement to expect [length] and the last
-    relative change: contact geometry settles to a part of that. Where the tangent is not positive definite, there is no
-    equilibrium of the bodies alone to lead to, and parts of the geometric stiffness are left out.
+    relative change: contact geometry settles to a part of that. Where the tangent is not positive definite, the constraints
+    that the `last` contact held are stiffened, which leaves the iterations quadratic; where that does not help, parts of the
+    geometric stiffness are left out.
     """
     bodies, u = at
-    for geometric in range(WHOLE, -1, -1):
+    held = None if problem.floating_bodies is not None else _held(last)  # there tangents let bodies move freely
+    attempts = [
+        (WHOLE, None),
+        *([] if held is None else [(WHOLE, held)]),
+        *((less, None) for less in range(WHOLE)[::-1]),
+    ]
+    for geometric, rows in attempts:
         if geometric < WHOLE:
             bodies = problem.deformed(u, start, geometric=geometric)
         try:
-            return _linear_contact(problem, start, load, (bodies, u), iterate, scale)
+            return _linear_contact(problem, start, load, (bodies, u), iterate, scale, rows)
         except (ModelError, ConvergenceError) as error:
-            log.info("the tangent leaves out more of the geometric stiffness: %s", error)
+            log.info("the tangent is changed (geometric stiffness %d, held %s): %s", geometric, rows is not None, error)
             failed = error
     if isinstance(failed, ConvergenceError):
         raise failed
@@ -162,12 +174,23 @@ def _solve(
     )
 
 
+def _held(last: SettledContact | None) -> csr_array | None:
+    """Return the rows (k, n_dofs) of the gaps that are closed in a contact solution; None where there are none.
+
+    Displacements along them hardly change any more as iterations converge, so that a stiffness there changes iterations
+    by terms of second order alone (as the augmented Lagrangian does: Alart and Curnier, 1991).
+    """
+    if last is None or not last.solution.active.any():
+        return None
+    return csr_array(last.constraints.B[np.flatnonzero(last.solution.active)])
+
+
 def _linear_contact(
     problem: Problem, start: State, load: StepLoad, at: tuple[DeformedBodies, Array], iterate: Iterate,
-    scale: tuple[float, float],
+    scale: tuple[float, float], held: csr_array | None = None,
 ) -> tuple[SettledContact | None, Array, Array]:  # fmt: skip
-    """Return the result of `_solve` for the full tangent."""
-    tangent, linear = problem.linearised(*at, load, iterate.rigid)
+    """Return the result of `_solve` for a tangent, stiffened along the rows `held` (k, n_dofs)."""
+    tangent, linear = problem.linearised(*at, load, iterate.rigid, held)
     iterate.u, iterate.history = at[1].copy(), []
     loaded, settled = with_loads(tangent, linear), None
     if tangent.pairs:

@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.sparse import bsr_array, csr_array, eye_array, kron
+from scipy.sparse import bsr_array, csr_array, diags_array, eye_array, kron
 
 from fastcontact._jit import parallel
 from fastcontact.analysis.active_dofs import ActiveDofs, SurfaceDofs
@@ -18,7 +18,7 @@ from fastcontact.analysis.floating_bodies import FloatingBodies, RigidPosition
 from fastcontact.analysis.heat import Heat, prepared_heat
 from fastcontact.analysis.state import State
 from fastcontact.analysis.work import Work
-from fastcontact.arrays import Array, Indices, Numbers
+from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.held_motions import HeldMotions
@@ -40,10 +40,10 @@ from fastcontact.linear.protocol import LinearSolver
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
 from fastcontact.model.model import Model
 from fastcontact.model.obstacle_rotation import angle_at
-from fastcontact.model.ramp import Ramp, Table, combined, multiplier
-from fastcontact.model.rigid_motions import free_motions
+from fastcontact.model.ramp import PartHistory, Ramp, Table, combined, multiplier
+from fastcontact.model.rigid_motions import FreeMotions, free_motions
 
-ByRamp = Mapping[Table | None, Array]
+ByRamp = Mapping[PartHistory, Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,6 +183,17 @@ class Problem:
         """Return the displacements (n_points, dim) of the mesh of all displacements u (n_dofs,) [length]."""
         return u[: self.model.n_dofs].reshape(-1, self.model.mesh.dim)
 
+    def accurate_to(self, u: Array) -> Array:
+        """Return the lengths (n_dofs,) of which displacements u (n_dofs,) are known up to round-off [length].
+
+        Those themselves; where bodies turn, they are differences of places.
+        """
+        if self.bodies is None or not self.bodies.finite:
+            return u
+        places, sizes = self.model.mesh.points, np.abs(u)
+        sizes[: places.size] += np.abs(places - places.mean(axis=0)).ravel()
+        return sizes
+
     def obstacles_at(self, load: StepLoad, u: Array) -> dict[str, Array]:
         """Return by contact pair the displacements (dim,) of rigid obstacles, those that forces drive where u has them."""
         return {**load.obstacles, **self.force_driven.positions(u)}
@@ -247,24 +258,46 @@ class Problem:
             force[:n] -= factor * (here - before).ravel()
         return force, (bodies.energy + 0.5 * float(pull @ u[:n]), bodies.plastic_work)
 
+    def _floating(self, system: System, u: Array, rigid: RigidPosition | None) -> FloatingBodies | None:
+        """Return the floating bodies of a tangent: where they turn, their free motions are those of the deformed shape."""
+        turning = self.bodies is not None and self.bodies.finite and self.model.kinematics != "axisymmetric"
+        if self.floating_bodies is None or not turning:
+            return self.floating_bodies
+        motions = floating_motions(self.model, self.model.prescribed_by_ramp()[0], self.displacement(u))
+        if len(motions) != len(self.floating_bodies.motions):
+            return self.floating_bodies
+        before = self.floating_bodies.dofs if rigid is None else rigid.dofs
+        return FloatingBodies(motions, system, system.involved(self.contact_dofs), before)
+
     def linearised(
-        self, bodies: DeformedBodies, u: Array, load: StepLoad, rigid: RigidPosition | None
+        self,
+        bodies: DeformedBodies,
+        u: Array,
+        load: StepLoad,
+        rigid: RigidPosition | None,
+        held: csr_array | None = None,
     ) -> tuple[Problem, StepLoad]:
-        """Return the problem with the tangent of nonlinear bodies, at displacements u (n_dofs,) [length], and its loads."""
+        """Return the problem with the tangent of nonlinear bodies, at displacements u (n_dofs,) [length], and its loads.
+
+        The tangent has springs along the rows `held` (k, n_dofs), slack at u.
+        """
         force, K = -self.internal(bodies, u, load)[0], stiffened(bodies.K, self.model.springs)
         for (pressure, _), factor in zip(self.following, load.following, strict=True):
             K = bsr_array(K + (factor * pressure.at(self.displacement(u))[1]).tobsr(K.blocksize))
             K.sort_indices()
-        system = self.system.renewed(self.force_driven.stiffness(K))
+        K = self.force_driven.stiffness(K)
+        system = self.system.renewed(K if held is None else _stiffened_along(K, held))
         force += load.force + system.K @ u
-        if self.floating_bodies is not None and rigid is not None:  # turned bodies under load are not free to turn
-            force -= system.K @ self.floating_bodies.rigid(rigid.position)
+        floating = self._floating(system, u, rigid)
+        if floating is not None and rigid is not None:  # turned bodies under load are not free to turn
+            force -= system.K @ floating.rigid(u[floating.dofs])
         solver = copy.copy(self.solver)
         involved = system.involved(self.contact_dofs)
-        modes = self.force_driven.near_nullspace(near_nullspace(self.model))
-        involved = _prepare_solver(solver, system, self.floating_bodies, modes, involved)
-        dofs = active_dofs(system, self.contact_dofs, involved, self.pairs, self.floating_bodies, solver)
-        return replace(self, system=system, solver=solver, dofs=dofs), replace(load, force=force)
+        modes = self.force_driven.near_nullspace(near_nullspace(self.model, self.displacement(u)))
+        involved = _prepare_solver(solver, system, floating, modes, involved)
+        dofs = active_dofs(system, self.contact_dofs, involved, self.pairs, floating, solver)
+        tangent = replace(self, system=system, solver=solver, dofs=dofs, floating_bodies=floating)
+        return tangent, replace(load, force=force)
 
     def initial_state(self) -> State:
         """Return the state before the first load step."""
@@ -321,7 +354,7 @@ def prepare(
     solver.basis_transformation = _basis_transformation(pairs.values(), K.shape[0], mesh.dim)
     contact_dofs = _contact_dofs(mesh, pairs, len(driven))
     involved = system.involved(contact_dofs)
-    motions = driven.motions(free_motions(mesh, model.kinematics, supported, model.holding_rows()))
+    motions = floating_motions(model, supported)
     bodies = FloatingBodies(motions, system, involved) if len(motions) else None
     involved = _prepare_solver(solver, system, bodies, driven.near_nullspace(near_nullspace(model)), involved)
     return Problem(
@@ -331,6 +364,21 @@ def prepare(
         solver.snapshot(), tuple(doubtful), model.nonlinear_bodies(field), model.following_pressures(),
         prepared_heat(model, ramp, criteria, linear_solver, solver.tolerance),
     )  # fmt: skip
+
+
+def _stiffened_along(K: bsr_array, rows: csr_array) -> bsr_array:
+    """Return K (n, n) with springs along `rows` (k, n), as stiff as its diagonal at most [force / length]."""
+    stiffness = float(K.diagonal().max()) / np.asarray(rows.multiply(rows).sum(axis=1)).ravel()
+    total = bsr_array(K + csr_array(rows.T @ diags_array(stiffness) @ rows).tobsr(K.blocksize))
+    total.sort_indices()
+    return total
+
+
+def floating_motions(model: Model, supported: Mask, displacement: Array | float = 0.0) -> FreeMotions:
+    """Return the rigid-body modes that supports and relations leave, at a `displacement` (n_points, dim) [length]."""
+    deformed = model.mesh.replace(points=model.mesh.points + displacement)
+    motions = free_motions(deformed, model.kinematics, supported, model.holding_rows())
+    return model.force_driven.motions(motions)
 
 
 def active_dofs(
@@ -384,10 +432,12 @@ def _basis_transformation(pairs: Iterable[Formulation], n: int, dim: int) -> csr
     return total
 
 
-def near_nullspace(model: Model) -> Array:
+def near_nullspace(model: Model, displacement: Array | float = 0.0) -> Array:
     """Return the displacements (n_dofs, k) that cost little energy, for multigrid: rigid-body modes of the mesh [-].
+
+    At a `displacement` (n_points, dim) [length], by which modes of rotation turn.
 
     One set serves all bodies, since aggregates do not span them. In axisymmetry the in-plane motions are no rigid-body
     modes of the ring, but away from the axis they cost little, and aggregates of two unknowns a node need them.
     """
-    return rigid_modes(model.mesh.points, "plane_strain" if model.mesh.dim == 2 else model.kinematics)
+    return rigid_modes(model.mesh.points + displacement, "plane_strain" if model.mesh.dim == 2 else model.kinematics)

@@ -12,7 +12,7 @@ from fastcontact.analysis.facet_sag import sag_warnings
 from fastcontact.analysis.interpenetration import interpenetration
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
-from fastcontact.analysis.stress_scatter import scatter_warnings
+from fastcontact.analysis.stress_scatter import nonlinear_scatter_warnings, scatter_warnings
 from fastcontact.analysis.volumetric_locking import locking_warning
 from fastcontact.analysis.wavering_pressure import wavering
 from fastcontact.analysis.wear import too_fast
@@ -54,6 +54,8 @@ def result_warnings(problem: Problem, state: State, last: StepResult) -> list[st
         warnings += [*_large_strain(problem, last), *_large_rotation(problem, state)]
     if problem.bodies is None:
         warnings += locking_warning(problem, state.u) or scatter_warnings(problem, last)
+    else:
+        warnings += nonlinear_scatter_warnings(problem, state)
     warnings += [problem.solver.gave_up] if problem.solver.gave_up else []
     load = problem.load_at(last.load_factor)
     loaded, sagging = bool(load.force.any() or load.lift.any()), sag_warnings(problem, state, last)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from fastcontact.analysis.problem import Problem
+from fastcontact.analysis.state import State
 from fastcontact.arrays import Array
 from fastcontact.elasticity.cell_stress import CellStress
 from fastcontact.elasticity.energy import cell_volumes, elastic_energy, integration_rule
@@ -28,6 +29,8 @@ SUSPICIOUS, ALTERNATING = 0.45, 0.3
 BENDING = 0.45
 # Roots of energies below this part of that of a body strained by its displacement are round-off, as where it only moves.
 ROUND_OFF = 1e-9
+# Elements whose only dilatation is one condition too many of each cell.
+SIMPLICES = ("tri3", "tet4")
 # Cells at a time.
 BATCH = 50_000
 
@@ -100,6 +103,29 @@ class StressScatter:
                 (off[..., :3].mean(axis=2) ** 2 * nearly).sum(), (rough[..., :3].mean(axis=2) ** 2 * nearly).sum(),
             ]  # fmt: skip
         return sums
+
+
+def nonlinear_scatter_warnings(problem: Problem, state: State) -> list[str]:
+    """Return a warning where the mean stress of nonlinear triangles and tetrahedra that keep their volume alternates."""
+    mesh, bodies = problem.model.mesh, problem.bodies
+    names = [name for name in SIMPLICES if name in mesh.solids]
+    nearly = problem.field.averaged & (problem.model.kinematics != "plane_stress")
+    if bodies is None or not names or not nearly.any():
+        return []
+    stress, off, whole = problem.deformed(state.u, state).stress, 0.0, 0.0
+    for name in names:
+        cells = mesh.cells[name][nearly[problem.field.rows[name]]]
+        mean = stress[name][nearly[problem.field.rows[name]]][..., :3].mean(axis=(1, 2))
+        total, count = (np.bincount(cells.ravel(), part, mesh.n_points) for part in (mean.repeat(cells.shape[1]), None))
+        smooth = (total / np.maximum(count, 1))[cells].mean(axis=1)
+        off, whole = off + float(((mean - smooth) ** 2).sum()), whole + float((mean**2).sum())
+    if off <= ALTERNATING**2 * whole:
+        return []
+    return [
+        f"{' and '.join(names)} cells lock: of a material that keeps its volume, their mean stress scatters by "
+        f"{np.sqrt(off / whole):.0%} about its averages at the nodes, and forces are too large; use quadrangles "
+        "or hexahedra, or quadratic elements (generate.to_quadratic)"
+    ]
 
 
 def scatter_warnings(problem: Problem, step: StepResult) -> list[str]:

@@ -193,6 +193,7 @@ LISTS: dict[str, tuple[dict[str, Any], Sequence[str]]] = {
         if kind not in ("material", "temperature", "coupling")
     },
     "coupling": _keys(_add_coupling, place=list),
+    "support": _keys(Model.prescribe, rotation=dict),
     "material": (
         {
             **dict.fromkeys(("E", "nu", "expansion", "conductivity"), (*NUMBER, list, dict)),
@@ -345,9 +346,6 @@ def _add_obstacle(model: Model, name: str, entry: Any, folder: Path) -> None:
     for key in ("motion", "force"):
         if key in rest:
             check_keys(f"{where}.{key}", rest[key], AXES)
-    if "rotation" in rest:
-        check_keys(f"{where}.rotation", rest["rotation"], ROTATION)
-        rest["rotation"] = _arguments(f"{where}.rotation", rest["rotation"])
     with at(where):
         model.add_obstacle(name, obstacle=obstacle, **_arguments(where, rest))
 
@@ -373,6 +371,9 @@ def _arguments(where: str, entry: dict[str, Any]) -> dict[str, Any]:
     arguments = dict(entry)
     if isinstance(entry.get("axes"), dict):
         arguments["axes"] = called(f"{where}.axes", CylindricalAxes, entry["axes"])
+    if "rotation" in entry:
+        check_keys(f"{where}.rotation", entry["rotation"], ROTATION)
+        arguments["rotation"] = _arguments(f"{where}.rotation", entry["rotation"])
     if "ramp" in entry:
         arguments["ramp"] = points(entry["ramp"], f"{where}.ramp")
     for term in entry.get("terms", []):

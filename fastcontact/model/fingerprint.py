@@ -23,6 +23,7 @@ from fastcontact.elasticity.varying_constants import Varying
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.model import Model
+from fastcontact.model.parts.base import Support
 
 LENGTH = 16
 SMOOTHING = "surface_smoothing of contact"
@@ -144,7 +145,7 @@ def _take_object(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: A
     if isinstance(value, Material):  # a density or expansion that is not given counts as little as in older files
         fields = [field for field in fields if getattr(value, field.name) is not None]
         fields = [field for field in fields if field.name != "incompatible_modes"]
-    if isinstance(value, ContactPair) and value.rotation is None:  # likewise
+    if isinstance(value, (ContactPair, Support)) and value.rotation is None:  # likewise
         fields = [field for field in fields if not field.name.startswith("rotation")]
     if isinstance(value, ContactPair) and value.fluid is None:
         fields = [field for field in fields if field.name != "fluid"]

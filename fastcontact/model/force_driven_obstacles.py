@@ -10,8 +10,9 @@ translation of all points.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -21,9 +22,8 @@ from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.model.contact_pair import ContactPair
+from fastcontact.model.ramp import PartHistory, Table
 from fastcontact.model.rigid_motions import FreeMotions
-
-Table = tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,19 +90,19 @@ class ForceDrivenObstacles:
         held = [[force is None for force in pair.force] for pair in self.pairs]
         return np.vstack([fixed, np.array(held, bool).reshape(-1, self.shape[1])])
 
-    def prescribed(self, by_ramp: dict[Table | None, Array]) -> dict[Table | None, Array]:
+    def prescribed(self, by_ramp: dict[PartHistory, Array]) -> dict[PartHistory, Array]:
         """Return by history the displacements (n_points + n, dim) at multiplier 1, those of the obstacles included."""
         return self._with(by_ramp, [pair.motion for pair in self.pairs])
 
-    def forces(self, by_ramp: dict[Table | None, Array]) -> dict[Table | None, Array]:
+    def forces(self, by_ramp: Mapping[Table | None, Array]) -> dict[PartHistory, Array]:
         """Return by history the forces (n_points + n, dim) at multiplier 1, those on the obstacles included."""
         return self._with(by_ramp, [tuple(force or 0.0 for force in pair.force) for pair in self.pairs])
 
-    def _with(
-        self, by_ramp: dict[Table | None, Array], values: Sequence[tuple[float, ...]]
-    ) -> dict[Table | None, Array]:
+    def _with(self, by_ramp: Mapping[Any, Array], values: Sequence[tuple[float, ...]]) -> dict[PartHistory, Array]:
         n, dim = self.shape
-        wider = {ramp: np.vstack([part, np.zeros((len(self), dim))]) for ramp, part in by_ramp.items()}
+        wider: dict[PartHistory, Array] = {
+            ramp: np.vstack([part, np.zeros((len(self), dim))]) for ramp, part in by_ramp.items()
+        }
         for number, (pair, value) in enumerate(zip(self.pairs, values, strict=True)):
             if any(value):
                 part = wider.setdefault(pair.ramp, np.zeros((n + len(self), dim)))

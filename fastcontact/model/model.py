@@ -27,7 +27,7 @@ from fastcontact.model.parts.base import Support
 from fastcontact.model.parts.supports import ModelSupports
 from fastcontact.model.prescribed_overlap import Supports, check_prescribed
 from fastcontact.model.pretension import check_locks
-from fastcontact.model.ramp import Ramp, Table, combined, multiplier
+from fastcontact.model.ramp import PartHistory, Ramp, combined, multiplier
 from fastcontact.model.rigid_motions import free_motions, generalised, resisting, unstopped
 
 # What a user finds in a model beside `add_...`; the rest serves the analysis.
@@ -110,6 +110,7 @@ class Model(ModelSupports):
             named += [(f"the clearance of contact '{p.name}'", p.clearance_ramp) for p in self.contact]
             named += [(f"the friction of contact '{p.name}'", p.friction_ramp) for p in self.contact]
             named += [(f"the fluid in contact '{p.name}'", p.fluid.ramp) for p in self.contact if p.fluid is not None]
+            named += [(f"the rotation of '{s.group}'", s.rotation_ramp) for s in self.supports]
             named += [(f"the rotation of obstacle '{p.name}'", p.rotation_ramp) for p in self.contact]
             check_ramps(named, ramp.instants)
             check_turns(self.contact, ramp)
@@ -140,7 +141,7 @@ class Model(ModelSupports):
             {0.0, *(t for relation in temporary for t in (relation.begins, relation.ends) if 0.0 < t < np.inf)}
         )
 
-    def _check_relations(self, fixed: Mask, prescribed: Mapping[Table | None, Array], ramp: Ramp) -> None:
+    def _check_relations(self, fixed: Mask, prescribed: Mapping[PartHistory, Array], ramp: Ramp) -> None:
         relations = [relation for relation in self.relations if not isinstance(relation, TemporaryConstraint)]
         if not relations:
             return

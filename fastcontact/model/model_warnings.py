@@ -22,7 +22,7 @@ from fastcontact.mesh.quality import poorest_cell
 from fastcontact.mesh.topology import outer_facets
 from fastcontact.model.hanging_nodes import hanging_nodes_warning
 from fastcontact.model.prescribed_overlap import Supports, prescribed_overlap_warnings
-from fastcontact.model.ramp import Ramp, Table
+from fastcontact.model.ramp import Harmonic, Ramp, Table
 from fastcontact.model.repeated_pairs import split_side_warnings
 
 if TYPE_CHECKING:
@@ -160,9 +160,8 @@ def _proportions(model: Model) -> list[str]:
 def _pushed(model: Model) -> float:
     """Return the largest prescribed displacement, by its history or as it is given without one [length]."""
     _, prescribed = model.prescribed_by_ramp()
-    return max(
-        (_peak(ramp) * float(np.abs(values).max(initial=0.0)) for ramp, values in prescribed.items()), default=0.0
-    )
+    straight = {ramp: values for ramp, values in prescribed.items() if not isinstance(ramp, Harmonic)}  # not what turns
+    return max((_peak(ramp) * float(np.abs(values).max(initial=0.0)) for ramp, values in straight.items()), default=0.0)
 
 
 def _peak(ramp: Table | None) -> float:
@@ -243,6 +242,8 @@ def _unramped(model: Model, ramp: Ramp) -> list[str]:
     items: list[Any] = [*(s for s in model.supports if s.value), *model.loads, *model.temperatures]
     ramps = [(item.name, item.ramp) for item in items]
     ramps += [(f"the motion of obstacle '{pair.name}'", pair.ramp) for pair in model.contact if any(pair.motion)]
+    turning = {s.group: s.rotation_ramp or s.ramp for s in model.supports if s.rotation is not None}
+    ramps += [(f"the rotation of '{group}'", own) for group, own in turning.items()]
     ramps += [(f"the force on obstacle '{pair.name}'", pair.ramp) for pair in model.contact if any(pair.force)]
     without = [name for name, own in ramps if own is None]
     if not without or len(without) == len(ramps):

@@ -1,4 +1,4 @@
-"""The rotation of a rigid obstacle as a user gives it: checked, with its history."""
+"""The rotation of a rigid obstacle, or of a support, as a user gives it: checked, with its history."""
 
 from __future__ import annotations
 
@@ -19,9 +19,11 @@ KEYS = ("angle", "centre", "axis", "ramp")
 LARGEST_TURN = 1.0
 
 
-def rotation_of(name: str, given: Mapping[str, Any], kinematics: str) -> tuple[Rotation, Table | None]:
-    """Return the rotation of obstacle `name` and its history, None for that of the motion; ModelError if they are wrong."""
-    caption = f"the rotation of obstacle '{name}'"
+def rotation_of(caption: str, given: Mapping[str, Any], kinematics: str) -> tuple[Rotation, Table | None]:
+    """Return the rotation that messages call `caption`, and its history, None for that of the motion.
+
+    ModelError if they are wrong.
+    """
     for key in given:
         if key not in KEYS:
             raise ModelError(unknown(f"key of {caption}", key, KEYS))

@@ -15,7 +15,7 @@ from fastcontact.contact.pairing import Candidates, gap_rows, rows_along
 from fastcontact.errors import ModelError
 from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.obstacle_rotation import angle_at
-from fastcontact.model.ramp import Ramp, Table, combined, multiplier
+from fastcontact.model.ramp import PartHistory, Ramp, combined, multiplier
 
 Pairs = Sequence[tuple[ContactPair, Formulation]]
 # A gap that changes with a displacement by less than this does not depend on it [-].
@@ -31,7 +31,7 @@ class Supports:
     """What supports prescribe: which components (n_points, dim), by history their values at multiplier 1 [length], a ramp."""
 
     fixed: Mask
-    by_ramp: Mapping[Table | None, Array]
+    by_ramp: Mapping[PartHistory, Array]
     ramp: Ramp
 
     def instants(self) -> list[float]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from numbers import Real
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +17,34 @@ from fastcontact.mesh.argument_types import typed
 
 # Points (instant, multiplier of the loads) of a piecewise linear function.
 Table = tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class Harmonic:
+    """The history of the sine of an angle, or of one minus its cosine: what a rotation is linear in.
+
+    Attributes
+    ----------
+    ramp : Table, optional
+        History of the angle; None: that of the analysis.
+    angle : float
+        At multiplier 1 [radian].
+    versine : bool
+        Whether it is one minus the cosine.
+    """
+
+    ramp: Table | None
+    angle: float
+    versine: bool
+
+    def value(self, multiplier: float) -> float:
+        """Return sine, or one minus cosine, at a multiplier of the angle [-]."""
+        angle = multiplier * self.angle
+        return 2.0 * math.sin(0.5 * angle) ** 2 if self.versine else math.sin(angle)
+
+
+# By what parts of the prescribed displacements are multiplied.
+PartHistory = Table | Harmonic | None
 # Largest number of equal steps; more are probably a typing error.
 MOST_STEPS = 1_000_000
 
@@ -142,11 +172,13 @@ def ramp_of(steps: RampLike | None) -> Ramp:
     return Ramp(tuple(values), ((0.0, 0.0), (end, end)))
 
 
-def multiplier(table: Table | None, ramp: Ramp, instant: float) -> float:
+def multiplier(table: PartHistory, ramp: Ramp, instant: float) -> float:
     """Return the multiplier of a load at `instant`: that of its own history, or else of the ramp."""
+    if isinstance(table, Harmonic):
+        return table.value(multiplier(table.ramp, ramp, instant))
     return ramp.value(instant) if table is None else table_value(table, instant)
 
 
-def combined(by_ramp: Mapping[Table | None, Array], ramp: Ramp, instant: float, shape: tuple[int, ...]) -> Array:
+def combined(by_ramp: Mapping[Any, Array], ramp: Ramp, instant: float, shape: tuple[int, ...]) -> Array:
     """Return the sum of the parts at `instant`, each times its multiplier."""
     return sum((multiplier(table, ramp, instant) * values for table, values in by_ramp.items()), np.zeros(shape))

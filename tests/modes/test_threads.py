@@ -6,7 +6,7 @@ from starting import finished, start
 
 
 def test_one_and_two_threads_find_the_same_bits():
-    runs = ("plane", "friction", "solid")
+    runs = ("plane", "friction", "stretched", "yielding", "solid")
     threads = [dict.fromkeys(("NUMBA_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"), n) for n in "12"]
     # Before, since Numba up to 0.60 may link the parts of a kernel otherwise in the process that compiles it.
     finished(start("whole_runs.py", *runs))

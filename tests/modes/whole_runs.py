@@ -27,7 +27,13 @@ def plane() -> list[fc.StepResult]:
     return fc.solve(model, fc.linear_ramp(2), linear_solver="direct")
 
 
-def cubes(n: int, m: int, solver: str, **options: object) -> list[fc.StepResult]:
+def cubes(
+    n: int,
+    m: int,
+    solver: str,
+    law: fc.LinearElastic | fc.NeoHookean | fc.ElasticPlastic | None = None,
+    **options: object,
+) -> list[fc.StepResult]:
     """Two cubes of n and m cells a side, pressed together and a little along each other."""
     parts = [
         fc.generate.renamed(mesh, {group: f"{group}_{name}" for group in mesh.cell_groups})
@@ -36,8 +42,8 @@ def cubes(n: int, m: int, solver: str, **options: object) -> list[fc.StepResult]
             "HIGH": fc.generate.box((1.0, 1.0, 1.0), (m, m, m), origin=(0.0, 0.0, 1.0), name="HIGH"),
         }.items()
     ]
-    model = fc.Model(fc.generate.union(*parts), "3d")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model = fc.Model(fc.generate.union(*parts), "3d", strain="finite" if isinstance(law, fc.NeoHookean) else "small")
+    model.add_material(law or fc.LinearElastic(E=1000.0, nu=0.3))
     model.fix("ZMIN_LOW", "xyz")
     model.prescribe("ZMAX_HIGH", x=0.002, y=0.0, z=-0.01)
     model.add_contact("pair", secondary="ZMIN_HIGH", primary="ZMAX_LOW", formulation="node_to_segment", **options)
@@ -49,6 +55,8 @@ RUNS = {
     "plane": plane,
     "solid": lambda: cubes(18, 12, "amg"),
     "friction": lambda: cubes(3, 2, "direct", friction=0.3),
+    "stretched": lambda: cubes(3, 2, "direct", fc.NeoHookean(E=1000.0, nu=0.499), friction=0.3),
+    "yielding": lambda: cubes(3, 2, "amg", fc.ElasticPlastic(E=1000.0, nu=0.3, yield_stress=2.0, kinematic=10.0)),
     "small": lambda: cubes(3, 2, "amg"),
 }
 

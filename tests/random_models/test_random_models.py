@@ -4,6 +4,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import mechanics
+import nonlinear
 import numpy as np
 import pytest
 from drawing import drawn
@@ -35,6 +36,15 @@ def test_random_models_end_right():
 @pytest.mark.parametrize("first", range(1000, 1300, 50))
 def test_more_random_models_end_right(first):
     check(range(first, first + 50))
+
+
+@pytest.mark.parametrize(
+    "seeds", [range(6), *(pytest.param(range(k, k + 20), marks=pytest.mark.slow) for k in (6, 26, 46))]
+)
+def test_random_models_of_bodies_that_yield_or_stretch_end_right(seeds):
+    rows = [nonlinear.outcome(seed) for seed in seeds]
+    assert not [row for row in rows if row["wrong"]]
+    assert sum("error" not in row for row in rows) >= SOLVED * len(rows)
 
 
 @pytest.mark.parametrize("words", WORDS)

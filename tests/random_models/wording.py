@@ -19,8 +19,8 @@ Call = tuple[str, tuple, dict[str, Any]]
 class SpokenModel(fc.Model):
     """A model that remembers by which calls it was built, `calls`."""
 
-    def __init__(self, mesh: fc.Mesh, kinematics: str) -> None:
-        super().__init__(mesh, kinematics)
+    def __init__(self, mesh: fc.Mesh, kinematics: str, strain: str = "small") -> None:
+        super().__init__(mesh, kinematics, strain=strain)
         self.calls: list[Call] = []
         self.inside = False
 
@@ -77,7 +77,7 @@ def reworded(model: SpokenModel, random: Random) -> Reworded | None:
 
 
 def _said(words: str, model: SpokenModel, calls: Sequence[Call], mesh: fc.Mesh | None = None, **how: Any) -> Reworded:
-    other = fc.Model(mesh or model.mesh, model.kinematics)
+    other = fc.Model(mesh or model.mesh, model.kinematics, strain=model.strain)
     for name, given, named in calls:
         getattr(other, name)(*given, **named)
     return Reworded(words, other, how.get("Q", np.eye(model.mesh.dim)), how.get("new", np.arange(model.mesh.n_points)))

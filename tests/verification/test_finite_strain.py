@@ -171,16 +171,49 @@ def test_rigid_rotation_by_90_degrees_leaves_no_stress() -> None:
     assert np.abs(steps[-1].stress).max() <= 1e-10
 
 
-def test_iterations_converge_quadratically() -> None:
-    material, _ = LAWS["Mooney-Rivlin"]
-    mesh = fc.generate.block((1.0, 1.0), (4, 4), element="quad8")
-    model = fc.Model(mesh, "plane_strain", strain="finite")
-    model.add_material(material)
+YIELDING = {
+    "isotropic": fc.ElasticPlastic(E=1.0, nu=0.3, yield_stress=0.01, hardening=[(0.0, 0.01), (1.0, 0.05)]),
+    "kinematic": fc.ElasticPlastic(E=1.0, nu=0.3, yield_stress=0.01, kinematic=0.05),
+}
+
+
+def changes_of(step) -> list[float]:
+    """Return the changes of the displacement by Newton's iterations, relative to the largest."""
+    return [entry["displacement_change"] for entry in step.iterations["history"]]
+
+
+@pytest.mark.parametrize("law", [*LAWS, *YIELDING])
+def test_iterations_converge_quadratically(law: str) -> None:
+    finite = law in LAWS
+    model = fc.Model(
+        fc.generate.block((1.0, 1.0), (4, 4), element="quad8"), "plane_strain", strain="finite" if finite else "small"
+    )
+    model.add_material(LAWS[law][0] if finite else YIELDING[law])
     model.fix("BOTTOM", "xy")
-    model.prescribe("TOP", x=0.3, y=-0.2)
-    changes = [entry["displacement_change"] for entry in fc.solve(model, 1)[-1].iterations["history"]]
+    scale = (0.3 if law == "Saint Venant-Kirchhoff" else 1.0) if finite else 0.1
+    model.prescribe("TOP", x=0.3 * scale, y=-0.2 * scale)
+    changes = changes_of(fc.solve(model, 1)[-1])
     for before, after in zip(changes[-3:-1], changes[-2:], strict=True):
         assert after <= 10.0 * before**2 + 1e-13
+
+
+@pytest.mark.filterwarnings("ignore:contact 'ball'")
+@pytest.mark.parametrize("friction", [None, 0.5])
+@pytest.mark.parametrize("law", ["neo-Hookean", "Ogden", "isotropic"])
+def test_iterations_with_contact_converge_as_far_as_its_geometry_is_settled(law: str, friction: float | None) -> None:
+    """Quadratically, but for the hundredth of the last change that contact geometry is left off by."""
+    finite = law in LAWS
+    mesh = fc.generate.block((4.0, 1.0), (24, 6), element="quad4", origin=(-2.0, 0.0))
+    model = fc.Model(mesh, "plane_strain", strain="finite" if finite else "small")
+    model.add_material(LAWS[law][0] if finite else YIELDING[law])
+    model.fix("BOTTOM", "xy")
+    model.add_obstacle(
+        "ball", secondary="TOP", obstacle=fc.obstacles.Sphere((0.0, 2.0), 1.0), motion={"y": -0.2 if finite else -0.03},
+        friction=friction,
+    )  # fmt: skip
+    changes = changes_of(fc.solve(model, 2)[-1])
+    for before, after in zip(changes[-3:-1], changes[-2:], strict=True):
+        assert after <= 40.0 * before**2 + 2e-2 * before
 
 
 def balls(law, strain: str, approach: float, **options):

@@ -184,6 +184,8 @@ def _of_prescribed(contact: MovingContact, asked: Asked) -> Change:
     problem, instant = contact.problem, contact.instant
     model = problem.model
     supports, along = _prescribing(model, asked)
+    if any(support.rotation is not None for support in supports):
+        raise ModelError(f"results are not linear in the rotation of '{asked[1]}': no sensitivity by it is there")
     values = np.zeros(problem.shape)
     for support in supports:
         nodes = model.mesh.points_of(support.group)

@@ -39,11 +39,15 @@ class Rotation:
 
     def matrix(self, angle: float) -> Array:
         """Return the matrix (dim, dim) that turns vectors by `angle` [radian] (Rodrigues' formula)."""
+        first, second = self.generators
+        return np.asarray(np.eye(len(first)) + math.sin(angle) * first + (1.0 - math.cos(angle)) * second)
+
+    @cached_property
+    def generators(self) -> tuple[Array, Array]:
+        """What sine, and one minus cosine, of an angle multiply in its matrix (dim, dim) [-]."""
         x, y, z = self.direction
-        across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-        turned = np.eye(3) + math.sin(angle) * across + (1.0 - math.cos(angle)) * (across @ across)
-        dim = len(self.centre)
-        return turned[:dim, :dim]
+        across, dim = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]), len(self.centre)
+        return across[:dim, :dim], (across @ across)[:dim, :dim]
 
     def axes(self, positions: Array) -> Array:
         """Return cylindrical axes (n, dim, dim) at positions (n, dim) [length], in columns: radial, tangential, axial [-].

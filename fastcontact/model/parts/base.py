@@ -9,8 +9,9 @@ import numpy as np
 from scipy.sparse import csr_array, vstack
 
 from fastcontact.arrays import AnyArray, Array, Indices, Mask
+from fastcontact.contact.obstacles.rotation import Rotation
 from fastcontact.elasticity.initial_states import InitialState
-from fastcontact.elasticity.loads import Load, Value, check_number
+from fastcontact.elasticity.loads import Load, Value, check_number, evaluated
 from fastcontact.elasticity.materials import KINEMATICS, Material
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, stacked_rows
 from fastcontact.elasticity.nonlinear_materials import STRAINS
@@ -25,25 +26,38 @@ from fastcontact.mesh.quality import check_cells
 from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.periodicity import PeriodicInterface
 from fastcontact.model.pretension import Pretension
-from fastcontact.model.ramp import Table
+from fastcontact.model.ramp import Harmonic, PartHistory, Table
 
 
 @dataclass(frozen=True)
 class Support:
     """A prescribed displacement component of all nodes of a group: `value` [length] times the ramp.
 
-    `value` is a number or a function of position, `ramp` a history of its own or None.
+    `value` is a number or a function of position, `ramp` a history of its own or None. What a rotation about an axis does is
+    added, with the history of its angle.
     """
 
     group: str
     component: int
     value: Value
     ramp: Table | None = None
+    rotation: Rotation | None = None
+    rotation_ramp: Table | None = None
 
     @property
     def name(self) -> str:
         """What it is and where it acts, for messages."""
         return f"the displacement {'xyz'[self.component]} prescribed on '{self.group}'"
+
+    def by_history(self, points: Array) -> dict[PartHistory, Array]:
+        """Return by history its displacements (n,) of `points` (n, dim) at multiplier 1 [length]."""
+        parts: dict[PartHistory, Array] = {self.ramp: evaluated(self.value, points, self.name)}
+        if self.rotation is not None:
+            arms, angle = points - np.array(self.rotation.centre), self.rotation.angle
+            ramp = self.ramp if self.rotation_ramp is None else self.rotation_ramp
+            for versine, generator in enumerate(self.rotation.generators):
+                parts[Harmonic(ramp, angle, bool(versine))] = arms @ generator[self.component]
+        return parts
 
 
 def group_names(groups: Sequence[str] | str | None) -> tuple[str, ...] | None:

@@ -266,7 +266,11 @@ class ModelContact(ModelConnections):
         if formulation == "mortar":
             given.setdefault("multipliers", "dual")
         driving = self._driving(name, moves, force)
-        turned = (None, None) if rotation is None else rotation_of(name, rotation, self.kinematics)
+        turned = (
+            (None, None)
+            if rotation is None
+            else rotation_of(f"the rotation of obstacle '{name}'", rotation, self.kinematics)
+        )
         self._add_pair(
             ContactPair(name, secondary, "", formulation, given, obstacle, displacement, history, driving, *turned)
         )

@@ -7,19 +7,22 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.contact.obstacles.rotation import Rotation
 from fastcontact.elasticity.loads import Value, axes_of, check_value, evaluated
 from fastcontact.elasticity.material_axes import Axes, checked_axes, frames
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.elasticity.symmetry_axis import ON_AXIS, axis_nodes
 from fastcontact.errors import ModelError
 from fastcontact.mesh.argument_types import typed
+from fastcontact.model.obstacle_rotation import rotation_of
 from fastcontact.model.parts.base import Support
 from fastcontact.model.parts.contact import ModelContact
-from fastcontact.model.ramp import History, Table, table_of
+from fastcontact.model.ramp import History, PartHistory, Table, table_of
 from fastcontact.model.relation_rows import NORMAL, along, normals_of
 
 log = logging.getLogger("fastcontact")
@@ -53,6 +56,7 @@ class ModelSupports(ModelContact):
         *,
         normal: Value | None = None,
         axes: SupportAxes = None,
+        rotation: Mapping[str, Any] | None = None,
         ramp: History = None,
         **components: Value,
     ) -> None:
@@ -63,7 +67,17 @@ class ModelSupports(ModelContact):
         With `axes` (k, 3) [-], vectors in rows or a function as those of materials, in the plane also one vector of two
         numbers, x, y and z are along the first, second and third of them: ``axes=fc.CylindricalAxes()`` stands for radial,
         circumferential and axial components.
+
+        `rotation` turns the group about an axis, exactly by any angle, and holds all its components: ``angle`` at multiplier
+        1 [radian]; ``centre``, a point of the axis (dim,) [length]; in space ``axis``, its direction; ``ramp``, a history of
+        its own. The components x, y and z are then what the axis moves by. Not in axisymmetry.
         """
+        if rotation is not None:
+            if axes is not None or normal is not None:
+                raise ModelError(f"the support of '{group}' turns: give what its axis moves by as x, y, z")
+            turned = rotation_of(f"the rotation of '{group}'", rotation, self.kinematics)
+            self._support(group, dict.fromkeys("xyz"[: self.mesh.dim], 0.0) | components, ramp, *turned)
+            return
         if axes is not None:
             if normal is not None:
                 raise ModelError(f"the support of '{group}' is along its normals or along axes: name one of them")
@@ -107,13 +121,15 @@ class ModelSupports(ModelContact):
         self.relations.append(relation)
         self.related_supports.append((group, relation))
 
-    def _support(self, group: str, components: Mapping[str, Value], ramp: History) -> None:
+    def _support(
+        self, group: str, components: Mapping[str, Value], ramp: History, rotation: Rotation | None = None,
+        rotation_ramp: Table | None = None,
+    ) -> None:  # fmt: skip
         if not len(self.mesh.points_of(group)):
             raise ModelError(f"group '{group}' is empty: no displacement can be prescribed on it")
         for axis, value in axes_of(f"prescribe('{group}')", components, self.mesh.dim).items():
-            support = Support(
-                group, axis, value, table_of(ramp, f"the ramp of the displacement prescribed on '{group}'")
-            )
+            table = table_of(ramp, f"the ramp of the displacement prescribed on '{group}'")
+            support = Support(group, axis, value, table, rotation, rotation_ramp)
             check_value(support.name, value)
             self.supports.append(support)
 
@@ -122,31 +138,37 @@ class ModelSupports(ModelContact):
         fixed, by_ramp = self.prescribed_by_ramp()
         return fixed, sum(by_ramp.values(), np.zeros(self.mesh.points.shape))
 
-    def prescribed_by_ramp(self) -> tuple[Mask, dict[Table | None, Array]]:
+    def prescribed_by_ramp(self) -> tuple[Mask, dict[PartHistory, Array]]:
         """Return supported components (n_points, dim), and by history their displacement at multiplier 1 [length]."""
         fixed = np.zeros(self.mesh.points.shape, bool)
-        by_ramp: dict[Table | None, Array] = {}
-        owner: dict[tuple[int, int], Support] = {}
-        for support in self.supports:
+        by_ramp: dict[PartHistory, Array] = {}
+        for number, support in enumerate(self.supports):
             nodes, k = self.mesh.points_of(support.group), support.component
-            values = evaluated(support.value, self.mesh.points[nodes], support.name)
-            for node, value in zip(nodes[fixed[nodes, k]], values[fixed[nodes, k]], strict=True):
-                other = owner[int(node), k]
-                found = by_ramp[other.ramp][node, k]
-                if found != value or (other.ramp != support.ramp and value != 0.0):
-                    raise ModelError(
-                        f"'{support.group}' prescribes {'xyz'[k]} = {value:g} at point {node}, but "
-                        f"'{other.group}' prescribes {found:g} there"
-                        f"{' with another ramp' if found == value else ''}: remove one of the two"
-                    )
-            new = ~fixed[nodes, k]
-            total = by_ramp.setdefault(support.ramp, np.zeros(self.mesh.points.shape))
-            fixed[nodes, k], total[nodes[new], k] = True, values[new]
-            owner.update({(int(node), k): support for node in nodes[new]})
+            parts, new = support.by_history(self.mesh.points[nodes]), ~fixed[nodes, k]
+            for history in {**by_ramp, **parts}:
+                total = by_ramp.setdefault(history, np.zeros(self.mesh.points.shape))
+                values = parts.get(history, np.zeros(len(nodes)))
+                other = np.flatnonzero((total[nodes, k] != values) & ~new)
+                if len(other):
+                    self._refuse(number, int(nodes[other[0]]))
+                total[nodes[new], k] = values[new]
+            fixed[nodes, k] = True
         self._hold_axis(fixed, by_ramp)
         return fixed, by_ramp
 
-    def _hold_axis(self, fixed: Mask, by_ramp: Mapping[Table | None, Array]) -> None:
+    def _refuse(self, number: int, node: int) -> None:
+        """Raise ModelError since a support prescribes a component of a node in another way than one before it."""
+        support = self.supports[number]
+        for before in self.supports[:number]:
+            if before.component == support.component and node in self.mesh.points_of(before.group):
+                break
+        own, other = (float(np.sum(list(s.by_history(self.mesh.points[[node]]).values()))) for s in (support, before))
+        raise ModelError(
+            f"'{support.group}' prescribes {'xyz'[support.component]} = {own:g} at point {node}, but '{before.group}' "
+            f"prescribes {other:g} there{' with another ramp' if own == other else ''}: remove one of the two"
+        )
+
+    def _hold_axis(self, fixed: Mask, by_ramp: Mapping[PartHistory, Array]) -> None:
         """Add the symmetry at the axis of an axisymmetric model to the supports, and refuse those that contradict it."""
         axis = self.axis_nodes
         for values in by_ramp.values():
