@@ -15,6 +15,7 @@ from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.integration import lumped_areas
 from fastcontact.errors import ContactError, unknown
 from fastcontact.mesh.argument_types import typed
+from fastcontact.mesh.html_table import fields_table
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
 
@@ -82,6 +83,8 @@ class ContactAnswers:
     pressure_max: float
     dissipation: float
     friction_work: float
+
+    _repr_html_ = fields_table
 
 
 @typed(ContactError)

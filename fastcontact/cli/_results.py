@@ -56,7 +56,7 @@ def case_data(results: Any) -> dict[str, Any]:
         data = toml_text.parsed(results.case_text or "")
     except ValueError:
         data = {}
-    return described(data)
+    return described(data) | ({"units": results.units} if results.units else {})
 
 
 def load_multiplier(table: Sequence[tuple[float, float]], step: Any) -> float:

@@ -124,7 +124,9 @@ def _of_function(
     ]  # fmt: skip
     results = functions.run_functions(runs, "no point of the sweep could be solved", **options)
     found = _points(by_name, choices, results)
-    return Sweep(**functions.of_function(function), **found, combination=name, asked=tuple(wanted), compared="")
+    return Sweep(
+        **functions.of_function(function, results), **found, combination=name, asked=tuple(wanted), compared=""
+    )
 
 
 def _choices(parameters: Mapping[str, Sequence[Value]]) -> list[dict[str, Value]]:

@@ -62,7 +62,7 @@ def axis_stress(
     depth, side, stress = stresses_on_axis(mesh, step, pair)
     upright = abs(_axis(step, pair)[1][1]) > 0.5
     bodies = ("upper body", "lower body") if upright else ("right body", "left body")
-    axes = new_axes(ax, (6.4, 4.8))
+    axes, units = new_axes(ax, (6.4, 4.8)), units or step.units
     reach = DEEP * np.nan_to_num(contacts_of([step], pair)[0].radius[0]) or float(depth.max())
     shown = depth <= reach
     values = {what: stress[:, component] for what, component in COMPONENTS.items()} | {"von Mises": von_mises(stress)}

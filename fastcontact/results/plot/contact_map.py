@@ -69,7 +69,7 @@ def contact_map(
     if mesh.dim != 3:
         raise FastcontactError("maps of a contact are for meshes in three dimensions: draw the pressure profile")
     blocks = _facets(mesh, contact)
-    basis, labels = _seen_along(contact, blocks)
+    (basis, labels), units = _seen_along(contact, blocks), units or contact.units
     flat = contact.coordinates @ basis.T
     if labels is None:
         flat -= contact.middle @ basis.T

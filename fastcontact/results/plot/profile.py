@@ -48,10 +48,11 @@ def pressure_profile(
         `normal_stress`.
     title : str
     units : mapping
-        Names of the units of ``length``, ``force`` and ``pressure`` for the labels, which have none without; see `UNITS`.
+        Names of the units of ``length``, ``force`` and ``pressure`` for the labels, by default those of the model (none
+        where it names none); see `UNITS`.
     ax : matplotlib Axes, optional
     """
-    ax = new_axes(ax, (6.4, 4.4))
+    ax, units = new_axes(ax, (6.4, 4.4)), units or contact.units
     order = np.argsort(contact.place, kind="stable")
     place, flat = contact.place[order], contact.coordinates.shape[1] == 2
     curves = _curves(theory, other_theories or {})

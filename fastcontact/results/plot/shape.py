@@ -87,7 +87,7 @@ def deformed_shape(
     """
     if zoom is not None and (mesh.dim == 3 or not 0.0 < zoom < LARGEST):
         raise FastcontactError(f"zoom = {zoom:g}: in the plane half a width > 0 can be drawn; in 3D draw a section")
-    shown = field_of(mesh, step, field)
+    shown, units = field_of(mesh, step, field), units or step.units
     place = scaled(shown.mesh.points, scale, step.displacement[shown.node])
     heading = title or f"Deformed shape (displacements x {scale:g}), load factor {step.load_factor:g}"
     if mesh.dim == 3:
