@@ -63,8 +63,8 @@ class ContactAnswers:
         times the unit of thickness, in axisymmetry that of the full circle [length^2]. Off by less than a row of facets at
         the edge.
     centre : ndarray (dim,)
-        Centre of pressure, of the normal forces of this model; NaN without any [length]. In axisymmetry its radius means
-        nothing.
+        Centre of pressure, of the normal forces of this model; NaN without any [length]. In axisymmetry it lies on the axis,
+        and NaN stands for the mean radius of the forces, which is no centre.
     mean_gap : float
         Mean over the area that faces the other side [length]; NaN where none does.
     pressure_mean, pressure_max : float
@@ -119,12 +119,15 @@ def _answers(contact: ContactResult, areas: Array, axisymmetric: bool, work: flo
     total, area = float(pushed.sum()), float(areas[closed].sum())
     pressed = bool(total > 0.0)
     moment = contact_moment(contact)
+    centre = pushed @ contact.coordinates / total if pressed else np.full(contact.coordinates.shape[1], np.nan)
+    if axisymmetric:
+        centre[0] = np.nan
     return ContactAnswers(
         force=contact.force,
         normal_force=contact.normal_force,
         moment=np.zeros_like(moment) if axisymmetric else moment,
         area=area,
-        centre=pushed @ contact.coordinates / total if pressed else np.full(contact.coordinates.shape[1], np.nan),
+        centre=centre,
         mean_gap=float(areas[facing] @ contact.gap[facing] / areas[facing].sum()) if facing.any() else float("nan"),
         pressure_mean=total / area if area else 0.0,
         pressure_max=contact.pressure_max,

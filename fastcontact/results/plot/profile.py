@@ -124,6 +124,7 @@ def _mark_edges(ax: Axes, contact: ContactResult, place: Array, units: Units) ->
         centre = 0.5 * float(closed.min() + closed.max()) if len(closed) else 0.0
         ax.axvspan(centre - outside, centre - inside, color="tab:blue", alpha=0.15, lw=0)
     # Where constraints lie between nodes, the radius that results tell is narrower than what nodes can show.
-    between = not np.allclose((inside, outside), contact.radius, rtol=0.01)
-    label = f"edge{', between nodes' * between}: {inside:.4g} to {valued(outside, units, 'length')}"
+    between = not np.allclose(half_width(contact.place, contact.active, contact.across), contact.radius, rtol=0.01)
+    along = "" if contact.tangent is None else " (arc length)"
+    label = f"edge{', between nodes' * between}: {inside:.4g} to {valued(outside, units, 'length')}{along}"
     ax.axvspan(centre + inside, centre + outside, color="tab:blue", alpha=0.15, lw=0, label=label)
