@@ -254,10 +254,10 @@ def _checks(
 
 
 def _sensitivities(model: Model, data: dict[str, Any]) -> list[tuple[Asked, list[Asked]]]:
-    from fastcontact.analysis.sensitivities import check_asked  # half of the solver
-
-    found = []
-    for i, entry in enumerate(tables("sensitivity", data.get("sensitivity", []))):
+    found, entries = [], list(tables("sensitivity", data.get("sensitivity", [])))
+    if entries:
+        from fastcontact.analysis.sensitivities import check_asked  # half of the solver
+    for i, entry in enumerate(entries):
         where = f"sensitivity[{i}]"
         check_keys(where, entry, SENSITIVITY)
         for key in SENSITIVITY:

@@ -138,7 +138,7 @@ def _choices(parameters: Mapping[str, Sequence[Value]]) -> list[dict[str, Value]
 
 
 def _label(choice: Mapping[str, Value]) -> str:
-    return ", ".join(f"{name} = {value}" for name, value in choice.items())
+    return label_of(choice, list(choice))
 
 
 def _points(
