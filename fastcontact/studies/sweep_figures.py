@@ -150,6 +150,6 @@ class Drawing:
 
 
 def label_of(parameters: Mapping[str, Value], others: Sequence[str]) -> str:
-    """Return some of the parameters and their values in words: what tells a curve from others, where the first is left out."""
+    """Return some of the parameters with their values in words, as what tells a curve from others."""
     values = ((name, parameters[name]) for name in others)
     return ", ".join(f"{name} = {f'{value:.6g}' if isinstance(value, float) else value}" for name, value in values)
