@@ -23,13 +23,10 @@ def html_table(rows: Iterable[Sequence[object]], head: Sequence[object] = (), ca
 
 def fields_table(result: Any) -> str:
     """Return the fields of a dataclass as an HTML table, and its properties that are numbers; of long arrays the range."""
+    named = [own.name for own in fields(result) if own.repr]
     properties = [name for name, own in vars(type(result)).items() if isinstance(own, property)]
-    rows = [(name.replace("_", " "), _text(getattr(result, name))) for name in [*_names(result), *properties]]
+    rows = [(name.replace("_", " "), _text(getattr(result, name))) for name in [*named, *properties]]
     return html_table(rows, caption=type(result).__name__)
-
-
-def _names(result: Any) -> list[str]:
-    return [own.name for own in fields(result) if own.repr]
 
 
 def _text(value: Any) -> str:

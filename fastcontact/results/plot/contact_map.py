@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 # The part of the surface that is drawn reaches so far beyond the closed one, in its own half widths.
-MARGIN = 0.35
+MARGIN = 0.15
 # Least length of the mean of the facets' normals for a surface to be drawn as it is seen along it.
 LEAST_MEAN = 0.3
 # What may stand beside the pressure: its name in words, and what its unit belongs to.
