@@ -23,9 +23,8 @@ from fastcontact.mesh.files.paths import existing_file, is_stream
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, linear_ramp
-from fastcontact.model.units import named_units
 from fastcontact.results.step import StepResult
-from fastcontact.results.units import known_units, units_of_results
+from fastcontact.results.units import known_units
 
 if TYPE_CHECKING:
     from fastcontact.cases.decks.deck import Deck
@@ -354,14 +353,13 @@ def _theory(where: str, data: dict[str, Any]) -> Any:
 
 
 def described(data: dict[str, Any]) -> dict[str, Any]:
-    """Return title, units of results, theories, approach and the table of the ramp of a case, as `Case` holds them.
+    """Return title, theories, approach and the table of the ramp of a case, as `Case` holds them.
 
     `data` is the parsed text kept in a result file; it may be empty.
     """
     theories, approach = _theories(data)
     return {
         "title": data.get("title", ""),
-        "units": units_of_results(named_units(data.get("units", {})), str(data.get("kinematics", ""))),
         "theories": theories,
         "approach": approach,
         "ramp": _ramp(data.get("ramp", {})).table,

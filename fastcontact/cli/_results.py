@@ -49,14 +49,14 @@ def other_contacts(step: Any, name: str, asked: str | None) -> str:
 
 
 def case_data(results: Any) -> dict[str, Any]:
-    """Return title, units, theories, approaches and ramp of the case text kept in the file; empty without one."""
+    """Return title, theories, approaches and ramp of the case text kept in the file; empty without one."""
     from fastcontact.cases.case import described
 
     try:
         data = toml_text.parsed(results.case_text or "")
     except ValueError:
         data = {}
-    return described(data) | ({"units": results.units} if results.units else {})
+    return described(data)
 
 
 def load_multiplier(table: Sequence[tuple[float, float]], step: Any) -> float:

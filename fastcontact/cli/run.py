@@ -80,15 +80,8 @@ def run(options: argparse.Namespace) -> int:
             say(f"warning: {text}", error=True)
     if not options.quiet:
         say("\n".join(summary.lines(numbers)))
-        say(
-            "  "
-            + _written(
-                output,
-                len(done.summaries),
-                len(steps),
-                [path for path in (options.json, options.plot, options.modes) if path],
-            )
-        )
+        others = [path for path in (options.json, options.plot, options.modes) if path]
+        say(f"  {_written(output, len(done.summaries), len(steps), others)}")
     failed = [check["name"] for check in numbers["checks"] if not check["passed"]]
     if options.strict and failed:
         say(f"{len(failed)} of {len(numbers['checks'])} checks of the case failed: {', '.join(failed)}", error=True)

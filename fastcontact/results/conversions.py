@@ -105,14 +105,10 @@ def dataset(mesh: Mesh, steps: Iterable[StepResult], units: dict[str, str]) -> A
         "von_mises_signed": ((), (), "pressure"),
         "reaction": (("axis",), (dim,), "force"),
     }
-    data = {
-        name: (
-            ("step", "point", *dims),
-            over_steps([getattr(s, name) for s in found], (n, *shape)),
-            _unit(units, quantity),
-        )
-        for name, (dims, shape, quantity) in by_name.items()
-    }
+    data = {}
+    for name, (dims, shape, quantity) in by_name.items():
+        values = over_steps([getattr(s, name) for s in found], (n, *shape))
+        data[name] = (("step", "point", *dims), values, _unit(units, quantity))
     nodal = over_steps([layout.contact_pressure(mesh, step) for step in found], (n,))
     data["contact_pressure"] = (("step", "point"), nodal, _unit(units, "pressure"))
     data["contact_force"] = (("step", "contact", "axis"), of_pairs("force", (dim,)), _unit(units, "force"))

@@ -215,7 +215,7 @@ class Results(Sequence[StepResult]):
             ("kinematics", self.kinematics),
             (
                 "mesh",
-                f"{self.mesh.n_points} points, {', '.join(f'{len(b)} {name}' for name, b in self.mesh.cells.items())}",
+                ", ".join([f"{self.mesh.n_points} points", *(f"{len(b)} {n}" for n, b in self.mesh.cells.items())]),
             ),
             ("groups", ", ".join(self.mesh.group_names)),
             *(("warning", text) for text in self.warnings),

@@ -46,13 +46,8 @@ def draw_errors(ax: Any, all_series: Sequence[Series], quantity: str, units: Map
     for style, text in explained.items():
         ax.plot([], [], style, color="0.4", lw=1.0, label=text)
     _slope_triangles(ax, quantity, [series for _, series in known])
-    labels, size = (
-        (
-            labelled("mesh size h" if named else "facet length at the contact h", units, "length"),
-            "|value - limit| / limit",
-        ),
-        8 if few else 6.5,
-    )
+    along = labelled("mesh size h" if named else "facet length at the contact h", units, "length")
+    labels, size = (along, "|value - limit| / limit"), 8 if few else 6.5
     frame(ax, f"Mesh error of the {title(quantity)}", labels, scales=("plain log", "log"), legend_size=size)
     ax.grid(which="minor", alpha=0.12)
     if few:  # matplotlib does not see error bars in the way of the legend

@@ -80,11 +80,7 @@ def axis_stress(
             axes.plot(fine, curve, style, color=colour, lw=1.0)
         axes.plot([], [], f"k{style}", lw=1.0, label=label)
     title = title or f"Stresses on the axis, load factor {step.load_factor:g}"
-    depth_name, stress_name = (
-        labelled("depth under the surface", units, "length"),
-        labelled("stress", units, "pressure"),
-    )
-    axes.set(xlabel=depth_name, ylabel=stress_name)
+    axes.set(xlabel=labelled("depth under the surface", units, "length"), ylabel=labelled("stress", units, "pressure"))
     axes.set_title(title, fontsize="medium")
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8)
