@@ -108,7 +108,9 @@ def _named_units(model: Model) -> list[str]:
     """Compare moduli with those of solids, and the units with each other, where their names are known."""
     units = model.units
     pascal, texts = in_si(units, "pressure"), [text for text in [misfit(units)] if text]
-    for material, groups in model.materials if pascal is not None else ():
+    if pascal is None:
+        return texts
+    for material, groups in model.materials:
         low, high = (young * pascal for young in material.young)
         if low < SOLIDS[0] or high > SOLIDS[1]:
             E, limit, what = (high, SOLIDS[1], "diamond") if high > SOLIDS[1] else (low, SOLIDS[0], "aerogel")
