@@ -30,7 +30,13 @@ _MODULES = {
     "topology": "mesh.topology",
 }
 _NAMES = {
-    "analysis.contact_answers": ("ContactAnswers", "contact_answers", "contact_history", "contact_moment", "wear"),
+    "analysis.contact_resultants": (
+        "ContactResultants",
+        "contact_resultants",
+        "contact_history",
+        "contact_moment",
+        "wear",
+    ),
     "analysis.criteria": ("Criteria",),
     "analysis.modes": ("Modes", "modes"),
     "analysis.run": ("solve", "solve_steps"),

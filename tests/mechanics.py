@@ -136,7 +136,7 @@ def lost_at_seams(model: fc.Model, contact: fc.ContactResult, areas: np.ndarray)
     side, lost = surface(model.mesh, group), 0.0
     row = np.full(model.mesh.n_points, -1)
     row[side.points] = np.arange(len(side.points))
-    for seam in model.seams:
+    for seam in model.periodic_interfaces:
         a, b = row[seam.first], row[seam.second]
         a, b = a[(a >= 0) & (b >= 0)], b[(a >= 0) & (b >= 0)]
         shares = lumped_areas(side, model.mesh.points, model.kinematics == "axisymmetric")

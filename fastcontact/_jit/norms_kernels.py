@@ -15,10 +15,10 @@ def largest(x: Array) -> float:
 @kernel
 def largest_difference(x: Array, y: Array) -> float:
     """Return the largest of ``|x - y|`` (n,), 0 if there is none; NaN if there is one."""
-    found = 0.0
+    largest = 0.0
     for k in range(len(x)):
         value = x[k] - y[k]
-        found = max(found, abs(value))
+        largest = max(largest, abs(value))
         if value != value:
             return value
-    return found
+    return largest

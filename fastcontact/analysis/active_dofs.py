@@ -181,10 +181,10 @@ def constraints_on_unknowns(dofs: ActiveDofs, constraints: Constraints, lift: Ar
         Displacements at the beginning of the load step, from where slip is measured [length].
     """
     B, gap0 = dofs.rows(constraints.B, constraints.gap0, lift)
-    drift = constraints.drift if constraints.drift is not None else np.zeros((len(constraints.tangents), 1))
-    slips = [own - T @ start for T, own in zip(constraints.tangents, drift, strict=True)]
+    slip0 = constraints.slip0 if constraints.slip0 is not None else np.zeros((len(constraints.tangents), 1))
+    slips = [own - T @ start for T, own in zip(constraints.tangents, slip0, strict=True)]
     pairs = [dofs.rows(T, slip, lift) for T, slip in zip(constraints.tangents, slips, strict=True)]
     tangents = tuple(T for T, _ in pairs)
     return replace(
-        constraints, B=B, gap0=gap0, tangents=tangents, drift=np.stack([s for _, s in pairs]) if pairs else None
+        constraints, B=B, gap0=gap0, tangents=tangents, slip0=np.stack([s for _, s in pairs]) if pairs else None
     )

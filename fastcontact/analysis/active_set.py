@@ -65,12 +65,12 @@ def solve(
             changed |= active != watch.wanted
             active = watch.wanted
             continue
-        found = signs.of(u, forces, active, iteration)
-        if found.settled or iteration == accuracy.max_iterations:
-            return found
+        sets = signs.of(u, forces, active, iteration)
+        if sets.settled or iteration == accuracy.max_iterations:
+            return sets
         seen.add(active.tobytes())
-        one_by_one = one_by_one or found.wanted.tobytes() in seen
-        active = _first_changed(active, found.wanted) if one_by_one else found.wanted
+        one_by_one = one_by_one or sets.wanted.tobytes() in seen
+        active = _first_changed(active, sets.wanted) if one_by_one else sets.wanted
         iteration += 1
 
 
@@ -126,7 +126,7 @@ class _Watch:
 
         A set that changes back constraints that were `changed` before does not count either.
         """
-        found = self._signs.of(u, forces, self._active, 0, error)
-        again = (found.wanted != self._active) & self._changed
-        self.wanted = None if found.settled or again.any() else found.wanted
+        signs = self._signs.of(u, forces, self._active, 0, error)
+        again = (signs.wanted != self._active) & self._changed
+        self.wanted = None if signs.settled or again.any() else signs.wanted
         return self.wanted is not None

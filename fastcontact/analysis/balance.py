@@ -10,8 +10,8 @@ import numpy as np
 
 from fastcontact._jit.norms_kernels import largest
 from fastcontact.analysis.criteria import LOOSEST
+from fastcontact.analysis.floating_bodies import SLACK
 from fastcontact.analysis.problem import Problem
-from fastcontact.analysis.unsupported_bodies import SLACK
 from fastcontact.arrays import Array
 from fastcontact.elasticity.springs import ground_force
 from fastcontact.errors import ConvergenceError

@@ -21,7 +21,7 @@ from fastcontact.results.step import ContactResult, half_width
 
 
 def contact_result(
-    name: str, pair: Formulation, part: Constraints, solution: Solution, rows: slice, at: Configuration,
+    name: str, pair: Formulation, constraints: Constraints, solution: Solution, rows: slice, at: Configuration,
     axis: tuple[Array, Array] | None = None, displacement: Array | None = None,
 ) -> ContactResult:  # fmt: skip
     """Return the state of one pair at the end of a load step.
@@ -30,7 +30,7 @@ def contact_result(
     ----------
     name : str
     pair : Formulation
-    part : Constraints
+    constraints : Constraints
         Those of the pair in the last pairing.
     solution : Solution
         Of all pairs; those of this one are its `rows`.
@@ -45,14 +45,14 @@ def contact_result(
     points = pair.secondary.points
     coordinates = pair.points[points]
     multiplier, active = solution.multiplier[rows], solution.active[rows]
-    active = active if part.wetted is None else active & ~part.wetted.rows
+    active = active if constraints.wetted is None else active & ~constraints.wetted.rows
     gap, normal = pair.nodal_gap(at, displacement=displacement)
-    found = _closed(pair, part, multiplier, active[: len(part.normal_forces(multiplier))], gap, at)
-    closed = found.nodes
+    closed_nodes = _closed(pair, constraints, multiplier, active[: len(constraints.normal_forces(multiplier))], gap, at)
+    closed = closed_nodes.nodes
     if pair.options.tied:  # as the bodies lay at rest
         normal = pair.nodal_gap(replace(at, displacement=np.zeros_like(at.displacement)))[1]
-    along = _along_the_surface(part, solution, rows, normal, found)
-    forces = _forces(pair, part, multiplier, along)
+    along = _along_the_surface(constraints, solution, rows, normal, closed_nodes)
+    forces = _forces(pair, constraints, multiplier, along)
     faced = np.where(np.isfinite(normal), normal, 0.0)
     middle = contact_middle(pair, faced, np.einsum("nd,nd->n", forces.secondary, faced), closed, gap)
     return ContactResult(
@@ -62,13 +62,13 @@ def contact_result(
         coordinates=coordinates,
         abscissa=pair.secondary.abscissa if axis is None else _distance(coordinates, axis),
         gap=gap,
-        pressure=found.pressure,
-        multiplier=found.multiplier,
+        pressure=closed_nodes.pressure,
+        multiplier=closed_nodes.multiplier,
         force_vectors=forces.secondary,
         normal=normal,
         active=closed,
         force=forces.total,
-        radius=half_width(middle.places(part.positions), active, middle.across(part.positions)),
+        radius=half_width(middle.places(constraints.positions), active, middle.across(constraints.positions)),
         shear=along.shear,
         sticking=closed & along.sticking,
         middle=middle.position,
@@ -76,14 +76,14 @@ def contact_result(
         tangent=middle.tangent,
         primary_points=forces.primary_points,
         primary_force_vectors=forces.primary,
-        fluid_pressure=None if pair.options.source is None else _fluid(part, len(points)),
+        fluid_pressure=None if pair.options.source is None else _fluid(constraints, len(points)),
         **_obstacle(pair, at, coordinates + at.displacement[points], forces.secondary),
     )
 
 
-def _fluid(part: Constraints, count: int) -> Array:
+def _fluid(constraints: Constraints, count: int) -> Array:
     """Return the pressure of fluid at the nodes (count,) [pressure]."""
-    return np.zeros(count) if part.wetted is None else part.wetted.pressure
+    return np.zeros(count) if constraints.wetted is None else constraints.wetted.pressure
 
 
 def _obstacle(pair: Formulation, at: Configuration, deformed: Array, forces: Array) -> dict[str, Any]:
@@ -94,7 +94,7 @@ def _obstacle(pair: Formulation, at: Configuration, deformed: Array, forces: Arr
     return {
         "obstacle_displacement": at.obstacle.copy(),
         "obstacle_angle": None if side.rotation is None else at.angle,
-        "torque": side.torque(deformed, forces, at.stance),
+        "torque": side.torque(deformed, forces, at.pose),
     }
 
 
@@ -110,9 +110,9 @@ class _Forces:
     primary: Array
 
 
-def _forces(pair: Formulation, part: Constraints, multiplier: Array, along: _AlongTheSurface) -> _Forces:
+def _forces(pair: Formulation, constraints: Constraints, multiplier: Array, along: _AlongTheSurface) -> _Forces:
     """Return the contact forces on both sides of a pair."""
-    everywhere = part.force(multiplier, along.force).reshape(-1, pair.points.shape[1])
+    everywhere = constraints.force(multiplier, along.force).reshape(-1, pair.points.shape[1])
     opposite = pair.primary.points if isinstance(pair.primary, Surface) else np.empty(0, np.int32)
     forces = np.where(np.isin(pair.secondary.points, opposite)[:, None], 0.0, everywhere[pair.secondary.points])
     total = forces.sum(axis=0)
@@ -131,21 +131,21 @@ class _AlongTheSurface:
 
 
 def _along_the_surface(
-    part: Constraints, solution: Solution, rows: slice, normal: Array, found: _Closed
+    constraints: Constraints, solution: Solution, rows: slice, normal: Array, closed_nodes: _Closed
 ) -> _AlongTheSurface:
     """Return the tangential results of a pair; empty without friction or tie."""
     multiplier, everywhere = solution.multiplier[rows], np.ones(len(normal), bool)
-    if part.tied is not None and part.tied.directions:
-        _, tangential = part.tied.forces(multiplier)
-        shear = _nodal_shear(part, part.tied.directions, tangential, normal)
-        return _AlongTheSurface(np.where(found.nodes[:, None], shear, 0.0), everywhere)
-    if not (isinstance(solution, FrictionalEquilibrium) and part.tangents):
+    if constraints.tied is not None and constraints.tied.directions:
+        _, tangential = constraints.tied.forces(multiplier)
+        shear = _nodal_shear(constraints, constraints.tied.directions, tangential, normal)
+        return _AlongTheSurface(np.where(closed_nodes.nodes[:, None], shear, 0.0), everywhere)
+    if not (isinstance(solution, FrictionalEquilibrium) and constraints.tangents):
         return _AlongTheSurface(np.zeros_like(normal), everywhere)
     tangential = solution.tangential[rows]
-    shear = _nodal_shear(part, part.directions, tangential, normal, part.normal_forces(multiplier))
+    shear = _nodal_shear(constraints, constraints.directions, tangential, normal, constraints.normal_forces(multiplier))
     return _AlongTheSurface(
-        shear * found.kept[:, None],
-        _mostly_sticking(part, solution.sticking[rows], multiplier, part.pressure(multiplier)),
+        shear * closed_nodes.kept[:, None],
+        _mostly_sticking(constraints, solution.sticking[rows], multiplier, constraints.pressure(multiplier)),
         tangential,
     )
 
@@ -165,55 +165,64 @@ class _Closed:
     def kept(self) -> Array:
         """Part of the raw pressures (m,) that closed nodes keep; tractions are scaled alike.
 
-        At most all where a field undershoots: next to nothing of it may then be left at a node, and its shear anything.
+        At most one, where a field undershoots: hardly any of it may then be left at a node, and its shear is arbitrary.
         """
-        part = np.divide(self.pressure, self.own, out=np.ones_like(self.pressure), where=self.own > 0.0)
-        return np.where(self.nodes, np.minimum(part, 1.0) if self.own.min() < 0.0 else part, 0.0)
+        fraction = np.divide(self.pressure, self.own, out=np.ones_like(self.pressure), where=self.own > 0.0)
+        return np.where(self.nodes, np.minimum(fraction, 1.0) if self.own.min() < 0.0 else fraction, 0.0)
 
 
 def _closed(
-    pair: Formulation, part: Constraints, multiplier: Array, active: Mask, gap: Array, at: Configuration
+    pair: Formulation, constraints: Constraints, multiplier: Array, active: Mask, gap: Array, at: Configuration
 ) -> _Closed:
     """Return the closed nodes of a pair, and their pressures: those whose integral is the force."""
-    assert part.nodal is not None
-    forces, excluded = part.normal_forces(part.contact_forces(multiplier)), pair.options.excluded_nodes(pair.secondary)
-    over_side, shares = part.nodal.over_whole_side(forces), part.nodal.shares(forces)
-    closed = _closed_nodes(pair, part, active, gap, over_side, at) & ~excluded
-    closed, pressure = _carried(pair, part, closed, over_side, shares)
-    own = part.nodal.pressure(forces) * part.nodal.covered
-    return _Closed(closed, pressure, np.where(excluded, 0.0, over_side), own)
+    assert constraints.nodal is not None
+    forces = constraints.normal_forces(constraints.contact_forces(multiplier))
+    excluded = pair.options.excluded_nodes(pair.secondary)
+    over_side, shares = constraints.nodal.over_whole_side(forces), constraints.nodal.shares(forces)
+    closed = _closed_nodes(pair, constraints, active, gap, over_side, at) & ~excluded
+    closed, pressure = _carried(pair, constraints, closed, over_side, shares)
+    nodal = constraints.nodal.pressure(forces) * constraints.nodal.covered
+    return _Closed(closed, pressure, np.where(excluded, 0.0, over_side), nodal)
 
 
-def nodal_pressure(pair: Formulation, part: Constraints, multiplier: Array, closed: Mask) -> Array:
+def nodal_pressure(pair: Formulation, constraints: Constraints, multiplier: Array, closed: Mask) -> Array:
     """Return the reported nodal pressures (n_nodes,) for multipliers (m,) [force] and `closed` nodes [pressure]."""
-    assert part.nodal is not None
-    forces = part.normal_forces(part.contact_forces(multiplier))
-    return _carried(pair, part, closed, part.nodal.over_whole_side(forces), part.nodal.shares(forces))[1]
+    assert constraints.nodal is not None
+    forces = constraints.normal_forces(constraints.contact_forces(multiplier))
+    return _carried(
+        pair, constraints, closed, constraints.nodal.over_whole_side(forces), constraints.nodal.shares(forces)
+    )[1]
 
 
-def _carried(pair: Formulation, part: Constraints, closed: Mask, nodal: Array, shares: Array) -> tuple[Mask, Array]:
+def _carried(
+    pair: Formulation, constraints: Constraints, closed: Mask, nodal: Array, shares: Array
+) -> tuple[Mask, Array]:
     """Return `carried` for a pair."""
-    assert part.nodal is not None
-    return carried(closed, nodal, shares, part.nodal.nodal_areas, pair.secondary, part.equality is not None)
+    assert constraints.nodal is not None
+    return carried(
+        closed, nodal, shares, constraints.nodal.nodal_areas, pair.secondary, constraints.equality is not None
+    )
 
 
 def _closed_nodes(
-    pair: Formulation, part: Constraints, active: Mask, gap: Array, pressure: Array, at: Configuration
+    pair: Formulation, constraints: Constraints, active: Mask, gap: Array, pressure: Array, at: Configuration
 ) -> Mask:
     """Return which secondary nodes are in contact: by their pressure, or because they never open again."""
-    assert part.nodal is not None
+    assert constraints.nodal is not None
     if pair.options.always_closed:
-        covered = part.nodal.covered
+        covered = constraints.nodal.covered
         # Nodes that stand out beyond the other side face nothing themselves, but parts of their facets may.
         return np.isfinite(gap) if isinstance(covered, float) else np.isfinite(gap) | (covered > 0.0)
     # Tension holds a layer as pressure closes a gap.
-    closed = part.nodal.closed_nodes(active, gap, pressure if pair.options.cohesion is None else np.abs(pressure))
+    closed = constraints.nodal.closed_nodes(
+        active, gap, pressure if pair.options.cohesion is None else np.abs(pressure)
+    )
     for_good = pair.never_opening(pair.points[pair.secondary.points], at)
     return closed if for_good is None else closed | (for_good & np.isfinite(gap))
 
 
 def _nodal_shear(
-    part: Constraints,
+    constraints: Constraints,
     directions: tuple[Array, ...],
     tangential: Array,
     normal: Array,
@@ -224,7 +233,7 @@ def _nodal_shear(
     Frames turn from point to point: the traction is that of the Cartesian components of the forces, and its part along
     the nodal normals is no shear.
     """
-    nodal = part.nodal
+    nodal = constraints.nodal
     assert nodal is not None
     forces = np.einsum("nk,ndk->nd", tangential, np.stack(directions, axis=2))
     if along_normal is not None:
@@ -233,12 +242,12 @@ def _nodal_shear(
     return traction - np.einsum("nd,nd->n", traction, normal)[:, None] * normal
 
 
-def _mostly_sticking(part: Constraints, sticking: Mask, multiplier: Array, pressure: Array) -> Mask:
+def _mostly_sticking(constraints: Constraints, sticking: Mask, multiplier: Array, pressure: Array) -> Mask:
     """Return the nodes to which more force comes from sticking constraints than from sliding ones."""
     if len(sticking) == len(pressure):
         return sticking
-    assert part.nodal is not None
-    return part.nodal.pressure(np.where(sticking, multiplier, 0.0)) > 0.5 * pressure
+    assert constraints.nodal is not None
+    return constraints.nodal.pressure(np.where(sticking, multiplier, 0.0)) > 0.5 * pressure
 
 
 def _distance(positions: Array, axis: tuple[Array, Array]) -> Array:

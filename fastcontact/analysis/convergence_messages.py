@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact.analysis.floating_bodies import FloatingBodies, RigidPosition
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
-from fastcontact.analysis.unsupported_bodies import RigidPosition, UnsupportedBodies
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.constraints import StackedConstraints
 
@@ -50,15 +50,15 @@ def active_set_cycles(problem: Problem, constraints: StackedConstraints, solutio
         )
     count = int((solution.active != solution.wanted).sum())
     many = "1 constraint still changes" if count == 1 else f"{count} constraints still change"
-    what = f"{many}, at {named_nodes(problem, nodes)}" if count else "sliding constraints still turn"
+    cause = f"{many}, at {named_nodes(problem, nodes)}" if count else "sliding constraints still turn"
     other = ", the direct linear solver" if problem.solver.iterative else ""
     return (
-        f"the active set did not settle in {solution.iterations} iterations: {what}. Use more load steps{other} or more "
+        f"the active set did not settle in {solution.iterations} iterations: {cause}. Use more load steps{other} or more "
         "iterations (max_active_set_iterations)"
     )
 
 
-def no_contact_stops(bodies: UnsupportedBodies, work: Array) -> str:
+def no_contact_stops(bodies: FloatingBodies, work: Array) -> str:
     """Return the message for loads that pull bodies away; `work` (k,) is their resultant on each free motion [force]."""
     return (
         f"the loads pull bodies away, no contact stops them ({'; '.join(bodies.names)}; resultant up to "
@@ -66,7 +66,7 @@ def no_contact_stops(bodies: UnsupportedBodies, work: Array) -> str:
     )
 
 
-def friction_exceeded(bodies: UnsupportedBodies, work: Array, friction: tuple[float, float]) -> str:
+def friction_exceeded(bodies: FloatingBodies, work: Array, friction: tuple[float, float]) -> str:
     """Return the message for loads beyond the friction cone; `friction` are the coefficients needed and given."""
     needed, largest = friction
     return (
@@ -77,26 +77,26 @@ def friction_exceeded(bodies: UnsupportedBodies, work: Array, friction: tuple[fl
     )
 
 
-def not_balanced(bodies: UnsupportedBodies, found: RigidPosition, load: float, friction: bool) -> str:
+def not_balanced(bodies: FloatingBodies, rigid: RigidPosition, load: float, friction: bool) -> str:
     """Return the message for bodies whose springs still carry force under a load [force], with `friction` or without."""
     more = "Add a support or more friction, for which the loads may be too large," if friction else "Add a support,"
     return (
-        f"contact does not hold {'; '.join(bodies.moving(found))}: after {found.positions} positions "
-        f"tried, a force of {np.abs(found.spring_force).max():.3g} is still missing for equilibrium under a load of "
+        f"contact does not hold {'; '.join(bodies.moving(rigid))}: after {rigid.positions} positions "
+        f"tried, a force of {np.abs(rigid.spring_force).max():.3g} is still missing for equilibrium under a load of "
         f"{load:.3g}. {more} or use more load steps"
     )
 
 
 def nearest_nodes(problem: Problem, constraints: StackedConstraints, rows: Indices) -> Nodes:
     """Return, by contact pair, the secondary nodes next to constraints, counted through the pairs."""
-    found: Nodes = {}
-    for name, own in constraints.rows().items():
-        mine = rows[(rows >= own.start) & (rows < own.stop)] - own.start
+    nodes: Nodes = {}
+    for name, rows_of_pair in constraints.rows().items():
+        mine = rows[(rows >= rows_of_pair.start) & (rows < rows_of_pair.stop)] - rows_of_pair.start
         if len(mine):
             points = problem.pairs[name].secondary.points
             apart = constraints.parts[name].positions[mine][:, None] - problem.model.mesh.points[points][None]
-            found[name] = np.unique(points[np.linalg.norm(apart, axis=2).argmin(axis=1)]).tolist()
-    return found
+            nodes[name] = np.unique(points[np.linalg.norm(apart, axis=2).argmin(axis=1)]).tolist()
+    return nodes
 
 
 def _most_moved(problem: Problem, change: Array) -> Nodes:

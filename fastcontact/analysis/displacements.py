@@ -27,7 +27,7 @@ def solve_displacements(
         v = loaded.solve(*none, guess=system.unknowns(start.u, lift))[0]
         return system.displacement(v, lift), np.zeros(len(lift))
     contact_force, rigid = settled.force, settled.iterate.rigid
-    if problem.unsupported_bodies is not None and rigid is not None:
-        lift = lift + problem.unsupported_bodies.rigid(rigid.position)
+    if problem.floating_bodies is not None and rigid is not None:
+        lift = lift + problem.floating_bodies.rigid(rigid.position)
     v = loaded.full_solution(system.reduced(contact_force), settled.solution.u)
     return system.displacement(v, lift), contact_force

@@ -38,8 +38,8 @@ class Extrapolation:
         """Return the extension to the loads of the next step: prescribed displacements and forces, each its own array."""
         loads, ratio = (*self.loads[-2:], tuple(part.copy() for part in parts)), 0.0
         if len(self.states) == 2 and len(loads) == 3:
-            found = next((r for r in map(_ratio, *loads) if r is not None), 0.0)
-            ratio = found if 0.0 < found <= FARTHEST else 0.0
+            growth = next((r for r in map(_ratio, *loads) if r is not None), 0.0)
+            ratio = growth if 0.0 < growth <= FARTHEST else 0.0
         return Extrapolation(ratio, loads, self.states)
 
     def converged(self, u: Array, contact: Mapping[str, GapsAndForces]) -> Extrapolation:

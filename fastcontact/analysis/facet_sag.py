@@ -15,7 +15,7 @@ from fastcontact.arrays import Array, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.integration import fine_rule
-from fastcontact.contact.obstacles.rigid_side import RigidSide, Stance
+from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.pairing import Candidates
 from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.results.step import ContactResult, StepResult
@@ -27,7 +27,7 @@ DOUBTFUL, AGAINST_RIGID = {1: 0.5, 2: 0.1}, 0.2
 
 def sag_warnings(problem: Problem, state: State, last: StepResult) -> dict[str, str]:
     """Return by name a warning for each pair that chords may push apart by much of its pressure in the `last` step."""
-    found, load, displacement = {}, problem.load_at(last.load_factor), problem.displacement(state.u)
+    warnings, load, displacement = {}, problem.load_at(last.load_factor), problem.displacement(state.u)
     for name, pair in problem.pairs.items():
         contact = last.contact[name]
         corrected = pair.smoothing is not None or not isinstance(pair.normals, str)
@@ -37,8 +37,8 @@ def sag_warnings(problem: Problem, state: State, last: StepResult) -> dict[str, 
         off = _standing_off(pair, at, contact.active)
         text = _text(pair, float(np.ptp(off)), contact) if len(off) else ""
         if text:
-            found[name] = f"contact '{name}': {text}"
-    return found
+            warnings[name] = f"contact '{name}': {text}"
+    return warnings
 
 
 def _text(pair: Formulation, spread: float, contact: ContactResult) -> str:
@@ -71,9 +71,9 @@ def _standing_off(pair: Formulation, at: Configuration, active: Mask) -> Array:
     closed[pair.secondary.points[active]] = True
     if isinstance(pair.primary, RigidSide):
         rows = np.flatnonzero(closed[points.nodes].all(axis=1))
-        nodes, stance = points.nodes[rows], Stance(at.obstacle, at.angle)
-        at_nodes = pair.primary.facing(deformed[nodes].reshape(-1, deformed.shape[1]), stance)[0].reshape(nodes.shape)
-        inside = pair.primary.facing(points.positions(deformed)[rows], stance)[0]
+        nodes, pose = points.nodes[rows], Pose(at.obstacle, at.angle)
+        at_nodes = pair.primary.facing(deformed[nodes].reshape(-1, deformed.shape[1]), pose)[0].reshape(nodes.shape)
+        inside = pair.primary.facing(points.positions(deformed)[rows], pose)[0]
         return np.einsum("nk,nk->n", points.shape[rows], at_nodes) - inside
     smoothing, facing = Smoothing.of(pair.secondary, pair.primary, pair.points), pair.facing(points, at)
     rows = np.flatnonzero(facing.paired & closed[points.nodes].any(axis=1))

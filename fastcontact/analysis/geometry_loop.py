@@ -56,7 +56,7 @@ class Plan:
         """Return the plan that the criteria, the formulations and the linear solver of a problem ask for."""
         criteria = problem.criteria
         fixed = 0 if criteria.keep_pairing else criteria.geometry_updates
-        free = fixed is None and problem.unsupported_bodies is None
+        free = fixed is None and problem.floating_bodies is None
         return cls(
             until_settled=fixed is None,
             limit=criteria.max_geometry_updates if fixed is None else fixed,
@@ -117,7 +117,7 @@ def settle_geometry(
     except ConvergenceError as error:
         error.history = error.history or iterate.history
         raise
-    nodes = SharedNodes.of(settled.constraints, step.problem.model.seams)
+    nodes = SharedNodes.of(settled.constraints, step.problem.model.periodic_interfaces)
     if nodes is None:
         return settled
     return replace(settled, solution=nodes.shared(settled.solution, settled.constraints, settled.iterate.u))
@@ -136,8 +136,8 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
         constraints = pair_surfaces(problem, step.state, step.load, iterate)
         active = initially_active(constraints, iterate, extrapolation if plan.extrapolate and update == 0 else None)
         accuracy = tolerances.accuracy(step.dofs.scale(iterate.u, step.load.lift), single)
-        solution, part = _solve_once(step, constraints, iterate, active, accuracy)
-        moved = _move(step, iterate, constraints, solution, part)
+        solution, fraction = _solve_once(step, constraints, iterate, active, accuracy)
+        moved = _move(step, iterate, constraints, solution, fraction)
         if not (solution.settled or single or tolerances.inexact):
             _raise_cycling(problem, constraints, solution, iterate)
         if not plan.until_settled:
@@ -147,10 +147,10 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
             watch.forget()
         elif moved.change <= tolerances.enough(update, moved.size):
             return settled
-        elif scatter := watch.seen(part, settled.force, moved.change, moved.size, tolerances.noise(moved.size)):
+        elif scatter := watch.seen(fraction, settled.force, moved.change, moved.size, tolerances.noise(moved.size)):
             _log_scatter(scatter, problem.criteria.geometry)
             return replace(settled, scatter=scatter)
-        mixed = mixing.next(moved.before, part, solution, tolerances.inexact, constraints)
+        mixed = mixing.next(moved.before, fraction, solution, tolerances.inexact, constraints)
         iterate.u = iterate.u if mixed is None else step.dofs.put(iterate.u, mixed)
         tolerances.tighten(moved.relative, solution.residual)
         if plan.extrapolate and update == PATIENT_UPDATES:
@@ -164,7 +164,7 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
             mixing.restart()
             watch.forget()
     if plan.until_settled:
-        changed = step.dofs.put(np.zeros_like(iterate.u), part - moved.before)
+        changed = step.dofs.put(np.zeros_like(iterate.u), fraction - moved.before)
         raise ConvergenceError(geometry_moves(problem, iterate.history, changed, plan.limit), iterate.history)
     fixed = plan.limit and not problem.criteria.keep_pairing
     return SettledContact(constraints, solution, iterate, (plan.limit, moved.relative) if fixed else None)
@@ -173,8 +173,8 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
 def _solve_once(
     step: StepContext, constraints: StackedConstraints, iterate: Iterate, active: Mask, accuracy: Accuracy
 ) -> tuple[Solution, Array]:
-    """Solve the inequalities of a pairing, those of nodes in several pairs or at both ends of a seam once."""
-    nodes = SharedNodes.of(constraints, step.problem.model.seams)
+    """Solve the inequalities of a pairing, those of nodes in several pairs or at both ends of a period once."""
+    nodes = SharedNodes.of(constraints, step.problem.model.periodic_interfaces)
     if nodes is None:
         return solve_inequalities(step, constraints, iterate, active & constraints.usable, accuracy)
     once = nodes.once(constraints)
@@ -195,14 +195,14 @@ class _Moved:
 
 
 def _move(
-    step: StepContext, iterate: Iterate, constraints: StackedConstraints, solution: Solution, part: Array
+    step: StepContext, iterate: Iterate, constraints: StackedConstraints, solution: Solution, fraction: Array
 ) -> _Moved:
-    """Let the iterate take the active displacements `part` (k,) of a solution."""
+    """Let the iterate take the active displacements `fraction` (k,) of a solution."""
     before = step.dofs.of(iterate.u)
-    iterate.u = step.dofs.put(iterate.u, part)
+    iterate.u = step.dofs.put(iterate.u, fraction)
     # Rigid motions of bodies that only contact holds do not count.
     size = max(step.dofs.size(solution.u), largest(step.load.lift))
-    moved = _Moved(before, largest_difference(part, before), size)
+    moved = _Moved(before, largest_difference(fraction, before), size)
     iterate.remember(constraints, solution)
     iterate.history.append(
         {
@@ -246,7 +246,7 @@ class _Mixing:
         self._accelerated.restart()
 
     def next(
-        self, before: Array, part: Array, solution: Solution, inexact: bool, constraints: StackedConstraints
+        self, before: Array, fraction: Array, solution: Solution, inexact: bool, constraints: StackedConstraints
     ) -> Array | None:
         """Return the active displacements (k,) to pair at next; None for those of the solution [length]."""
         state = constraints.state(solution.active)
@@ -255,4 +255,4 @@ class _Mixing:
         if inexact or not same:
             self._accelerated.restart()
         # An inexact solution stands still where it is not right yet.
-        return None if inexact else self._accelerated.mixed(before, part)
+        return None if inexact else self._accelerated.mixed(before, fraction)

@@ -109,7 +109,7 @@ class Heat:
         """
         n = (self.model.mesh.n_points,)
         rise, loads, ambient = (
-            combined(own, self.ramp, instant, n) for own in (self.prescribed, self.powers, self.ambient)
+            combined(by_ramp, self.ramp, instant, n) for by_ramp in (self.prescribed, self.powers, self.ambient)
         )
         rubbed = np.zeros(n) if friction is None else friction
         inner = self.matrix if contact is None else csr_array(self.matrix + contact)

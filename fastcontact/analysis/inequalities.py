@@ -11,11 +11,11 @@ from fastcontact._jit.norms_kernels import largest
 from fastcontact.analysis import active_set
 from fastcontact.analysis.active_dofs import ActiveDofs, constraints_on_unknowns
 from fastcontact.analysis.convergence_messages import friction_exceeded, no_contact_stops, not_balanced
+from fastcontact.analysis.floating_bodies import FloatingBodies
 from fastcontact.analysis.iterate import Iterate
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import Accuracy, Solution
 from fastcontact.analysis.state import State
-from fastcontact.analysis.unsupported_bodies import UnsupportedBodies
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.constraints import Constraints, StackedConstraints
 from fastcontact.contact.obstacles.rigid_side import RigidSide
@@ -58,11 +58,11 @@ class StepContext:
         """Return which constraints (m,) supports and obstacles move past the other side in the step."""
         slips = np.stack([T @ self.prescribed_motion for T in constraints.tangents])
         scale = largest(self.prescribed_motion)
-        if constraints.drift is not None and isinstance(constraints, StackedConstraints):
+        if constraints.slip0 is not None and isinstance(constraints, StackedConstraints):
             for name, rows in constraints.rows().items():
                 if isinstance(self.problem.pairs[name].primary, RigidSide):
-                    slips[:, rows] += constraints.drift[:, rows]
-                    scale = max(scale, largest(constraints.drift[:, rows]))
+                    slips[:, rows] += constraints.slip0[:, rows]
+                    scale = max(scale, largest(constraints.slip0[:, rows]))
         return np.asarray((np.abs(slips) > ROUND_OFF * scale).any(axis=0))
 
 
@@ -76,7 +76,7 @@ def solve_inequalities(
     step : StepContext
     constraints : Constraints
     iterate : Iterate
-        Keeps the solution with friction, and the rigid position of unsupported bodies.
+        Keeps the solution with friction, and the rigid position of floating bodies.
     active : ndarray of bool (m,)
         Set to start from.
     accuracy : Accuracy
@@ -87,8 +87,8 @@ def solve_inequalities(
     part : ndarray (k,)
         The active displacements [length].
     """
-    if step.problem.unsupported_bodies is not None:
-        return _with_unsupported_bodies(step, step.problem.unsupported_bodies, constraints, iterate, active, accuracy)
+    if step.problem.floating_bodies is not None:
+        return _with_floating_bodies(step, step.problem.floating_bodies, constraints, iterate, active, accuracy)
     solution = _solve(step, constraints, iterate, active, accuracy, step.load.lift, iterate.u)
     return solution, step.dofs.displacement(solution.u, step.load.lift)
 
@@ -100,20 +100,20 @@ def _solve(
 
     `lift` (n_dofs,) is what they prescribe, `guess` (n_dofs,) are displacements to start from [length].
     """
-    own = constraints_on_unknowns(step.dofs, constraints, lift, step.state.u)
+    condensed = constraints_on_unknowns(step.dofs, constraints, lift, step.state.u)
     u = step.dofs.unknowns(guess, lift)
     if not constraints.tangents:
-        return active_set.solve(step.loaded, own, active, accuracy, u)
+        return active_set.solve(step.loaded, condensed, active, accuracy, u)
     from fastcontact.analysis.friction import solve as friction
 
-    own = replace(own, driven=step.driven(constraints))
-    iterate.frictional = friction.solve(step.loaded, own, active, accuracy, u, iterate.frictional)
+    condensed = replace(condensed, driven=step.driven(constraints))
+    iterate.frictional = friction.solve(step.loaded, condensed, active, accuracy, u, iterate.frictional)
     return iterate.frictional
 
 
-def _with_unsupported_bodies(
+def _with_floating_bodies(
     step: StepContext,
-    bodies: UnsupportedBodies,
+    bodies: FloatingBodies,
     constraints: Constraints,
     iterate: Iterate,
     active: Mask,
@@ -135,20 +135,20 @@ def _with_unsupported_bodies(
         moved = _approach(step, bodies, constraints, iterate.u)
         start = start if active.any() else start + moved
     noise = 10 * problem.solver.tolerance
-    found = bodies.settle(
+    rigid = bodies.settle(
         solve_at, start, state.largest_rigid_force, noise, state.gap_round_off,
         None if iterate.rigid is None else iterate.rigid.derivative,
     )  # fmt: skip
-    if found.state.settled and not found.slack:
+    if rigid.state.settled and not rigid.slack:
         rubbing = bool(constraints.coefficients.any())
-        text = not_balanced(bodies, found, state.largest_rigid_force, rubbing)
+        text = not_balanced(bodies, rigid, state.largest_rigid_force, rubbing)
         raise ConvergenceError(text, iterate.history)
-    iterate.rigid = found
-    at = lift + bodies.rigid(found.position)
-    return found.state, problem.system.displacement(found.state.u, at)
+    iterate.rigid = rigid
+    at = lift + bodies.rigid(rigid.position)
+    return rigid.state, problem.system.displacement(rigid.state.u, at)
 
 
-def _approach(step: StepContext, bodies: UnsupportedBodies, constraints: Constraints, u: Array) -> Array:
+def _approach(step: StepContext, bodies: FloatingBodies, constraints: Constraints, u: Array) -> Array:
     """Return how far (k,) rigid bodies move until the loads hold them in contact [length].
 
     Raises
@@ -159,9 +159,9 @@ def _approach(step: StepContext, bodies: UnsupportedBodies, constraints: Constra
     work = generalised(bodies.motions, step.load.force)
     rows, gap0 = resisting(constraints)
     size = float(np.ptp(step.problem.model.mesh.points, axis=0).max())
-    found = stopped_at(rows @ bodies.motions.displacement, gap0 + rows @ u, work, size)
-    if found is None:
+    stop = stopped_at(rows @ bodies.motions.displacement, gap0 + rows @ u, work, size)
+    if stop is None:
         more = needed_friction(constraints, bodies.motions.displacement, u, work, size)
         text = no_contact_stops(bodies, work) if more is None else friction_exceeded(bodies, work, more)
         raise ConvergenceError(text, smaller_steps_help=False)
-    return found
+    return stop

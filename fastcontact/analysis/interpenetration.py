@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array, Mask
-from fastcontact.contact.obstacles.rigid_side import RigidSide, Stance
+from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.surface import Surface
 from fastcontact.mesh.topology import bodies, outer_facets
 from fastcontact.model.body_overlap import depths
@@ -30,9 +30,9 @@ def interpenetration(problem: Problem, state: State, last: StepResult) -> list[s
     """Return warnings about bodies inside of each other, and of rigid obstacles, at the end of the `last` step."""
     mesh, u = problem.model.mesh, problem.displacement(state.u)
     joined = _joined(problem)
-    found = list(depths(mesh, problem.model.kinematics, mesh.points + u))
+    inside = list(depths(mesh, problem.model.kinematics, mesh.points + u))
     return [
-        *_without_contact(problem, joined, found), *_beside_contact(problem, last, joined, found),
+        *_without_contact(problem, joined, inside), *_beside_contact(problem, last, joined, inside),
         *_through_obstacles(problem, state, last),
     ]  # fmt: skip
 
@@ -40,25 +40,25 @@ def interpenetration(problem: Problem, state: State, last: StepResult) -> list[s
 def _joined(problem: Problem) -> Mapping[frozenset[int], Sequence[str]]:
     """Return by two bodies the contact pairs between them; none where they are the sides of a pretension section."""
     body = bodies(problem.model.mesh)[1]
-    found: dict[frozenset[int], list[str]] = {}
+    groups: dict[frozenset[int], list[str]] = {}
     for name, pair in problem.pairs.items():
         if isinstance(pair.primary, Surface):
             for a in np.unique(body[pair.secondary.points]).tolist():
                 for b in np.unique(body[pair.primary.points]).tolist():
-                    found.setdefault(frozenset((a, b)), []).append(name)
+                    groups.setdefault(frozenset((a, b)), []).append(name)
     for cut in problem.model.pretensions:
-        found[frozenset((int(body[cut.nodes[0]]), int(body[cut.opposite[0]])))] = []
-    return found
+        groups[frozenset((int(body[cut.nodes[0]]), int(body[cut.opposite[0]])))] = []
+    return groups
 
 
 def _without_contact(
-    problem: Problem, joined: Mapping[frozenset[int], Sequence[str]], found: Sequence[Inside]
+    problem: Problem, joined: Mapping[frozenset[int], Sequence[str]], inside: Sequence[Inside]
 ) -> list[str]:
     """Return warnings about bodies that no contact pair joins, the deepest first, two bodies once."""
     mesh = problem.model.mesh
     _, body = bodies(mesh)
     texts: dict[frozenset[int], str] = {}
-    for number, other, points, depth in sorted(found, key=lambda entry: -float(entry[3].max())):
+    for number, other, points, depth in sorted(inside, key=lambda entry: -float(entry[3].max())):
         both, row = frozenset((number, other)), int(np.argmax(depth))
         if both not in joined and both not in texts and depth[row] > ROUND_OFF * np.ptp(mesh.points, axis=0).max():
             where = mesh.points[points[row]]
@@ -71,22 +71,24 @@ def _without_contact(
 
 
 def _beside_contact(
-    problem: Problem, last: StepResult, joined: Mapping[frozenset[int], Sequence[str]], found: Sequence[Inside]
+    problem: Problem, last: StepResult, joined: Mapping[frozenset[int], Sequence[str]], inside: Sequence[Inside]
 ) -> list[str]:
     """Return warnings about bodies that pass through each other where the groups of their contact pairs lack facets."""
     mesh, texts = problem.model.mesh, []
     _, body = bodies(mesh)
     for both, names in joined.items():
-        own = [entry for entry in found if names and {*entry[:2]} == both]
-        if not own or any(problem.pairs[name].options.wear for name in names):  # what is worn off is still in the mesh
+        entries = [entry for entry in inside if names and {*entry[:2]} == both]
+        if not entries or any(
+            problem.pairs[name].options.wear for name in names
+        ):  # what is worn off is still in the mesh
             continue
-        points, depth = np.concatenate([entry[2] for entry in own]), np.concatenate([entry[3] for entry in own])
+        points, depth = np.concatenate([entry[2] for entry in entries]), np.concatenate([entry[3] for entry in entries])
         held, faced = (mask[points] for mask in _held(problem, last, names))
         deformed = max(float(np.ptp(last.displacement[body == number], axis=0).max()) for number in both)
         limit = max(BESIDE * deformed, HELD * float(depth[held].max(initial=0.0)))
         depth[held | faced] = 0.0
         row = int(np.argmax(depth))
-        if depth[row] > limit and depth[row] - _at_rest(problem, own, int(points[row])) > limit:
+        if depth[row] > limit and depth[row] - _at_rest(problem, entries, int(points[row])) > limit:
             what = " and ".join(body_name(mesh, body, number) for number in sorted(both))
             texts.append(_lacking(problem, names[0], f"bodies {what} pass through each other", depth[row], points[row]))
     return texts
@@ -118,13 +120,13 @@ def _through_obstacles(problem: Problem, state: State, last: StepResult) -> list
     for name, pair in problem.pairs.items():
         if not isinstance(pair.primary, RigidSide) or pair.options.wear:  # what is worn off is still in the mesh
             continue
-        own = pair.secondary.points
-        beside = [block[np.isin(block, own).any(axis=1)].ravel() for block in outer_facets(mesh).values()]
-        points = np.setdiff1d(np.concatenate(beside), own)
+        nodes = pair.secondary.points
+        beside = [block[np.isin(block, nodes).any(axis=1)].ravel() for block in outer_facets(mesh).values()]
+        points = np.setdiff1d(np.concatenate(beside), nodes)
         if not len(points):
             continue
-        at_rest = pair.primary.facing(mesh.points[points], Stance(np.zeros(mesh.dim)))[0]
-        now = Stance(state.obstacles[name], state.angles.get(name, 0.0))
+        at_rest = pair.primary.facing(mesh.points[points], Pose(np.zeros(mesh.dim)))[0]
+        now = Pose(state.obstacles[name], state.angles.get(name, 0.0))
         gap = pair.primary.facing(mesh.points[points] + u[points], now)[0]
         inside = last.contact[name].gap
         deepest = -float(np.min(inside, initial=0.0, where=np.isfinite(inside)))
@@ -135,10 +137,10 @@ def _through_obstacles(problem: Problem, state: State, last: StepResult) -> list
     return texts
 
 
-def _lacking(problem: Problem, name: str, what: str, depth: float, point: int) -> str:
+def _lacking(problem: Problem, name: str, subject: str, depth: float, point: int) -> str:
     where, pair = np.array2string(problem.model.mesh.points[point], precision=4), problem.pairs[name]
     between = "' and '".join(side.group for side in (pair.secondary, pair.primary) if isinstance(side, Surface))
     return (
-        f"contact '{name}' lacks facets: {what} by {depth:.4g} at point {point} {where}, beside '{between}'; "
+        f"contact '{name}' lacks facets: {subject} by {depth:.4g} at point {point} {where}, beside '{between}'; "
         "its force is too small, add the facets there"
     )

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from fastcontact.analysis.extrapolation import Extrapolation
+from fastcontact.analysis.floating_bodies import RigidPosition
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
 from fastcontact.analysis.state import State
-from fastcontact.analysis.unsupported_bodies import RigidPosition
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.constraints import Constraints, StackedConstraints, stacked
 from fastcontact.contact.obstacles.rigid_side import RigidSide
@@ -33,7 +33,7 @@ class Iterate:
     frictional : FrictionalEquilibrium, optional
         The last solution with friction.
     rigid : RigidPosition, optional
-        The last position of unsupported bodies.
+        The last position of floating bodies.
     history : list of dict
         An entry for each pairing.
     rounded : bool
@@ -77,8 +77,8 @@ def pair_surfaces(problem: Problem, state: State, load: StepLoad, iterate: Itera
         at = replace(problem.configuration(name, state, load, paired_at, u), pressure=iterate.pressure.get(name))
         turns = isinstance(pair.primary, RigidSide) and pair.primary.rotation is not None
         moved = at.obstacle - at.obstacle_start if turns else None
-        part = pair.constraints(replace(at, rounded=True) if iterate.rounded else at)
-        parts[name] = problem.force_driven.constraints(name, part, positions.get(name, still), moved)
+        constraints_of_pair = pair.constraints(replace(at, rounded=True) if iterate.rounded else at)
+        parts[name] = problem.force_driven.constraints(name, constraints_of_pair, positions.get(name, still), moved)
     return stacked(parts)
 
 
@@ -88,14 +88,14 @@ def initially_active(constraints: StackedConstraints, iterate: Iterate, extrapol
     return np.concatenate(sets)
 
 
-def _start_of(name: str, part: Constraints, iterate: Iterate, extrapolation: Extrapolation | None) -> Mask:
-    if part.equality is not None and part.equality.all():
-        return part.equality
+def _start_of(name: str, constraints: Constraints, iterate: Iterate, extrapolation: Extrapolation | None) -> Mask:
+    if constraints.equality is not None and constraints.equality.all():
+        return constraints.equality
     if name not in iterate.active:
-        return np.zeros(len(part), bool)
-    found = part.initially_active(iterate.u, iterate.pressure[name])
-    if found is not None:
-        return found
+        return np.zeros(len(constraints), bool)
+    active = constraints.initially_active(iterate.u, iterate.pressure[name])
+    if active is not None:
+        return active
     last = iterate.active[name]
     return last if extrapolation is None else extrapolation.active(name, last)
 

@@ -19,10 +19,10 @@ from fastcontact.analysis.balance import Balance, balance
 from fastcontact.analysis.displacements import solve_displacements, with_loads
 from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
 from fastcontact.analysis.inequalities import StepContext
-from fastcontact.analysis.keep_contact import keep_contact, keep_path
 from fastcontact.analysis.newton import newton
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
+from fastcontact.analysis.step_history import keep_path, save_contact_history
 from fastcontact.analysis.step_result import contact_results, counted, recover
 from fastcontact.analysis.thermal_coupling import Heated, expanded, first_rise, settle_heat
 from fastcontact.arrays import Array
@@ -59,11 +59,17 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     loaded = with_loads(problem, load)
     start, expected = prepare_start(problem, state, load, loaded)
     if problem.bodies is not None:
-        found = newton(problem, start, load, expected)
+        solution = newton(problem, start, load, expected)
         done = problem.solver.counters.iterations - solved_before
-        iterations = {**counted(found.settled, done), **found.counts, "history": found.history}
+        iterations = {**counted(solution.settled, done), **solution.counts, "history": solution.history}
         return _ended(
-            problem, start, load, found.settled, (found.u, found.balance, iterations), (index, instant), found.bodies
+            problem,
+            start,
+            load,
+            solution.settled,
+            (solution.u, solution.balance, iterations),
+            (index, instant),
+            solution.bodies,
         )
 
     def solve(under: StepLoad, before: SettledContact | None) -> tuple[SettledContact | None, Array, Balance]:
@@ -92,14 +98,14 @@ def _balanced(
 
 def _ended(
     problem: Problem, start: State, load: StepLoad, settled: SettledContact | None,
-    solution: tuple[Array, Balance, dict[str, Any]], place: tuple[int, float], bodies: DeformedBodies | None,
+    solution: tuple[Array, Balance, dict[str, Any]], instant: tuple[int, float], bodies: DeformedBodies | None,
     heated: Heated | None = None,
 ) -> tuple[State, StepResult]:  # fmt: skip
     """Return state and result of a load step, from its displacements, the balance of forces and the iterations."""
     u, balanced, iterations = solution
     end = replace(
         start, u=u, largest_force=balanced.largest, obstacles=problem.obstacles_at(load, u), angles=load.angles,
-        history=start.history if bodies is None else bodies.history, instant=place[1],
+        history=start.history if bodies is None else bodies.history, instant=instant[1],
         rise=None if heated is None else heated.rise,
     )  # fmt: skip
     contact: dict[str, ContactResult] = {}
@@ -111,10 +117,10 @@ def _ended(
         end = replace(end, work=start.work.after(balanced.energy, 0.0, (0.0, 0.0, 0.0)))
     if end.work is not None:
         iterations["work"] = end.work.told()
-    if problem.unsupported_bodies is not None and end.rigid is not None:
-        iterations["regularised"] = problem.unsupported_bodies.report(end.rigid, end.largest_rigid_force)
+    if problem.floating_bodies is not None and end.rigid is not None:
+        iterations["regularised"] = problem.floating_bodies.report(end.rigid, end.largest_rigid_force)
     end = replace(end, solver=problem.solver.snapshot())
-    result = recover(problem, end, contact, balanced.reaction, iterations, place, bodies)
+    result = recover(problem, end, contact, balanced.reaction, iterations, instant, bodies)
     return end, result if heated is None else heated.told(problem, result)
 
 
@@ -132,8 +138,8 @@ def prepare_start(problem: Problem, state: State, load: StepLoad, loaded: Loaded
         # displacements, of which each has an error of some units in its last place.
         alone = largest(loaded.full_solution(zero))
         round_off = max(round_off, 16 * np.finfo(float).eps * alone)
-    if problem.unsupported_bodies is not None:
-        forces = generalised(problem.unsupported_bodies.motions, load.force)
+    if problem.floating_bodies is not None:
+        forces = generalised(problem.floating_bodies.motions, load.force)
         rigid_force = max(rigid_force, float(np.abs(forces).max()))
     start = replace(
         state, gap_round_off=round_off, largest_rigid_force=rigid_force, rigid=None, last_change=None,
@@ -172,7 +178,7 @@ def after_contact(
     problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State, energy: tuple[float, float]
 ) -> tuple[State, dict[str, ContactResult]]:
     """Return the state at the end of the step with its contact history, and the results of all contact pairs."""
-    end = keep_contact(problem, start, load, settled, end)
+    end = save_contact_history(problem, start, load, settled, end)
     results = contact_results(problem, start, load, settled, end)
     end, results = keep_path(problem, start, load, settled, end, results, energy)
     return end.after_touching(name for name, pair in results.items() if pair.active.any()), results

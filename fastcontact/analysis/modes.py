@@ -23,7 +23,7 @@ from fastcontact.elasticity.constrained_system import System
 from fastcontact.elasticity.inertia_loads import Densities
 from fastcontact.elasticity.mass import mass, stress_stiffness
 from fastcontact.elasticity.material_field import MaterialField
-from fastcontact.elasticity.relations import stacked_rows
+from fastcontact.elasticity.multipoint_constraints import stacked_rows
 from fastcontact.elasticity.springs import stiffened
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.errors import ModelError
@@ -75,11 +75,11 @@ class Modes(Sequence[StepResult]):
     def __len__(self) -> int:
         return len(self.frequencies)
 
-    def __getitem__(self, place: Any) -> Any:
+    def __getitem__(self, index: Any) -> Any:
         """Return a mode as a step: its shape, the stress of that, and the frequency as load factor."""
-        if isinstance(place, slice):
-            return [self[k] for k in range(*place.indices(len(self)))]
-        number, model = range(len(self))[place], self._model
+        if isinstance(index, slice):
+            return [self[k] for k in range(*index.indices(len(self)))]
+        number, model = range(len(self))[index], self._model
         u = self.shapes[number]
         stress = recovery.nodal_stress(
             model.mesh, model.kinematics, self._field.moduli, self._field.loops, u, self._field.treatment
@@ -103,7 +103,7 @@ class Modes(Sequence[StepResult]):
 
     def _rows(self, numbers: str) -> list[tuple[str, ...]]:
         return [
-            (str(k + 1), numbers.format(f), *(numbers.format(own) for own in masses))
+            (str(k + 1), numbers.format(f), *(numbers.format(mass) for mass in masses))
             for k, (f, masses) in enumerate(zip(self.frequencies, self.effective_mass))
         ]
 
@@ -220,13 +220,13 @@ def _stiffness(model: Model, step: StepResult | None, field: MaterialField) -> b
 
 def _uniform(model: Model, K: bsr_array, M: bsr_array) -> float:
     """Return the least quotient of energies [1 / time^2] of uniform deformations, which grow with one coordinate each."""
-    points, found = model.mesh.points - model.mesh.points.mean(axis=0), []
+    points, densities = model.mesh.points - model.mesh.points.mean(axis=0), []
     for component in range(model.mesh.dim):
         for axis in range(model.mesh.dim):
             u = np.zeros_like(points)
             u[:, component] = points[:, axis]
-            found.append(float(u.ravel() @ (K @ u.ravel())) / float(u.ravel() @ (M @ u.ravel())))
-    return min((own for own in found if own > 0.0), default=1.0)
+            densities.append(float(u.ravel() @ (K @ u.ravel())) / float(u.ravel() @ (M @ u.ravel())))
+    return min((own for own in densities if own > 0.0), default=1.0)
 
 
 def _modes(model: Model, field: MaterialField, M: bsr_array, values: Array, vectors: Array) -> Modes:

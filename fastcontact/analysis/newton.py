@@ -93,23 +93,23 @@ def newton(problem: Problem, start: State, load: StepLoad, expected: float) -> N
     return _iterated(problem, start, load, expected, start.u)
 
 
-def _iterated(problem: Problem, start: State, load: StepLoad, expected: float, place: Array) -> NewtonSolution:
-    """Return the equilibrium of a load step by iterations that begin at displacements `place` (n_dofs,) [length]."""
+def _iterated(problem: Problem, start: State, load: StepLoad, expected: float, origin: Array) -> NewtonSolution:
+    """Return the equilibrium of a load step by iterations that begin at displacements `origin` (n_dofs,) [length]."""
     iterate = Iterate.of(start)
     history: list[dict[str, Any]] = []
-    u, bodies, changes = place, problem.deformed(place, start), [1.0]
+    u, bodies, changes = origin, problem.deformed(origin, start), [1.0]
     for _ in range(MOST):
         settled, target, force = _solve(problem, start, load, (bodies, u), iterate, (expected, changes[-1]))
         before, here = u, bodies
-        u, bodies, part = _reach(problem, start, u, target)
+        u, bodies, fraction = _reach(problem, start, u, target)
         balanced = _balanced(problem, start, load, (u, bodies), force)
-        if history and part == 1.0 and balanced.excess > 1.0:
-            u, bodies, part = _searched(problem, start, load, (before, here), (u, bodies), force)
-            balanced = _balanced(problem, start, load, (u, bodies), force) if part < 1.0 else balanced
+        if history and fraction == 1.0 and balanced.excess > 1.0:
+            u, bodies, fraction = _searched(problem, start, load, (before, here), (u, bodies), force)
+            balanced = _balanced(problem, start, load, (u, bodies), force) if fraction < 1.0 else balanced
         moved, size = largest_difference(u, before), max(largest(u), largest(load.lift))
         changes.append(moved / size if size else 0.0)
-        history.append(_told(iterate, changes[-1], balanced, part))
-        if part == 1.0 and balanced.excess <= 1.0 and (_still(problem, changes) or moved <= start.gap_round_off):
+        history.append(_told(iterate, changes[-1], balanced, fraction))
+        if fraction == 1.0 and balanced.excess <= 1.0 and (_still(problem, changes) or moved <= start.gap_round_off):
             return NewtonSolution(settled, u, balanced, bodies, history)
         if len(changes) > PATIENCE and min(changes[-PATIENCE:]) > FALL * min(changes[:-PATIENCE]):
             break
@@ -184,14 +184,14 @@ def _reach(problem: Problem, start: State, u: Array, target: Array) -> tuple[Arr
 
     Half of the way, of that half, and so on, is gone where cells turn inside out farther on.
     """
-    part = 1.0
+    fraction = 1.0
     for _ in range(HALVINGS):
-        there = target if part == 1.0 else u + part * (target - u)
+        there = target if fraction == 1.0 else u + fraction * (target - u)
         try:
-            return there, problem.deformed(there, start), part
+            return there, problem.deformed(there, start), fraction
         except ConvergenceError as error:
             failed = error
-        part *= 0.5
+        fraction *= 0.5
     raise failed
 
 
@@ -211,23 +211,23 @@ def _searched(
 
     (u, here), (target, there) = begin, end
     along = problem.system.unknowns(target - u)
-    first, last, part = slope(u, here), slope(target, there), 1.0
+    first, last, fraction = slope(u, here), slope(target, there), 1.0
     for _ in range(SEARCHES):
         if not last > OVERSHOT * abs(first):
             break
-        part *= max(abs(first) / (abs(first) + last), LEAST)
-        target = u + part * (end[0] - u)
+        fraction *= max(abs(first) / (abs(first) + last), LEAST)
+        target = u + fraction * (end[0] - u)
         there = problem.deformed(target, start)
         last = slope(target, there)
-    return target, there, part
+    return target, there, fraction
 
 
-def _told(iterate: Iterate, change: float, balanced: Balance, part: float) -> dict[str, Any]:
+def _told(iterate: Iterate, change: float, balanced: Balance, fraction: float) -> dict[str, Any]:
     """Return the entry of an iteration in the history."""
     inner = iterate.history
     return {
         "displacement_change": change, "residual": balanced.relative, "pairings": len(inner),
         "active": inner[-1]["active"] if inner else 0,
         "active_set_iterations": sum(entry["active_set_iterations"] for entry in inner),
-        **({} if part == 1.0 else {"damped": part}),
+        **({} if fraction == 1.0 else {"damped": fraction}),
     }  # fmt: skip

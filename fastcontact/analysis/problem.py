@@ -14,9 +14,9 @@ from scipy.sparse import bsr_array, csr_array, eye_array, kron
 from fastcontact._jit import parallel
 from fastcontact.analysis.active_dofs import ActiveDofs, SurfaceDofs
 from fastcontact.analysis.criteria import Criteria
+from fastcontact.analysis.floating_bodies import FloatingBodies, RigidPosition
 from fastcontact.analysis.heat import Heat, prepared_heat
 from fastcontact.analysis.state import State
-from fastcontact.analysis.unsupported_bodies import RigidPosition, UnsupportedBodies
 from fastcontact.analysis.work import Work
 from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.contact.configuration import Configuration
@@ -29,8 +29,8 @@ from fastcontact.elasticity.following_pressure import FollowingPressure
 from fastcontact.elasticity.initial_states import InitialState
 from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.elasticity.material_sides import MaterialSides, material_sides
+from fastcontact.elasticity.multipoint_constraints import stacked_rows
 from fastcontact.elasticity.nonlinear_bodies import WHOLE, DeformedBodies, NonlinearBodies
-from fastcontact.elasticity.relations import stacked_rows
 from fastcontact.elasticity.springs import spring_force, stiffened, too_stiff
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 from fastcontact.elasticity.temperature import Temperature
@@ -97,7 +97,7 @@ class Problem:
         Materials of all solid cells.
     system : System
         Stiffness, supports and relations.
-    unsupported_bodies : UnsupportedBodies, optional
+    floating_bodies : FloatingBodies, optional
         Bodies held by contact alone, if there are any.
     dofs : ActiveDofs
         The displacement components that a pairing solves for.
@@ -129,7 +129,7 @@ class Problem:
     field: MaterialField
     sides: MaterialSides
     system: System
-    unsupported_bodies: UnsupportedBodies | None
+    floating_bodies: FloatingBodies | None
     dofs: ActiveDofs
     contact_dofs: Indices
     force_driven: ForceDrivenObstacles
@@ -177,7 +177,7 @@ class Problem:
 
     def factors(self, histories: Iterable[Temperature | InitialState], instant: float) -> list[float]:
         """Return the load factors of temperatures or initial states at an instant of the ramp [-]."""
-        return [multiplier(own.ramp, self.ramp, instant) for own in histories]
+        return [multiplier(history.ramp, self.ramp, instant) for history in histories]
 
     def displacement(self, u: Array) -> Array:
         """Return the displacements (n_points, dim) of the mesh of all displacements u (n_dofs,) [length]."""
@@ -257,13 +257,13 @@ class Problem:
             K.sort_indices()
         system = self.system.renewed(self.force_driven.stiffness(K))
         force += load.force + system.K @ u
-        if self.unsupported_bodies is not None and rigid is not None:  # turned bodies under load are not free to turn
-            force -= system.K @ self.unsupported_bodies.rigid(rigid.position)
+        if self.floating_bodies is not None and rigid is not None:  # turned bodies under load are not free to turn
+            force -= system.K @ self.floating_bodies.rigid(rigid.position)
         solver = copy.copy(self.solver)
         involved = system.involved(self.contact_dofs)
         modes = self.force_driven.near_nullspace(near_nullspace(self.model))
-        involved = _prepare_solver(solver, system, self.unsupported_bodies, modes, involved)
-        dofs = active_dofs(system, self.contact_dofs, involved, self.pairs, self.unsupported_bodies, solver)
+        involved = _prepare_solver(solver, system, self.floating_bodies, modes, involved)
+        dofs = active_dofs(system, self.contact_dofs, involved, self.pairs, self.floating_bodies, solver)
         return replace(self, system=system, solver=solver, dofs=dofs), replace(load, force=force)
 
     def initial_state(self) -> State:
@@ -318,11 +318,11 @@ def prepare(
         driven.relations(model.relations),
         driven.without_stiffness,
     )
-    solver.corner_functions = _corner_functions(pairs.values(), K.shape[0], mesh.dim)
+    solver.basis_transformation = _basis_transformation(pairs.values(), K.shape[0], mesh.dim)
     contact_dofs = _contact_dofs(mesh, pairs, len(driven))
     involved = system.involved(contact_dofs)
     motions = driven.motions(free_motions(mesh, model.kinematics, supported, model.holding_rows()))
-    bodies = UnsupportedBodies(motions, system, involved) if len(motions) else None
+    bodies = FloatingBodies(motions, system, involved) if len(motions) else None
     involved = _prepare_solver(solver, system, bodies, driven.near_nullspace(near_nullspace(model)), involved)
     return Problem(
         model, ramp, criteria, solver, pairs, field, sides, system, bodies,
@@ -335,7 +335,7 @@ def prepare(
 
 def active_dofs(
     system: System, contact_dofs: Indices, involved: Indices, pairs: Mapping[str, Formulation],
-    bodies: UnsupportedBodies | None, solver: LinearSolver,
+    bodies: FloatingBodies | None, solver: LinearSolver,
 ) -> ActiveDofs:  # fmt: skip
     """Return the displacement components that a pairing solves for."""
     if pairs and bodies is None and solver.condenses:
@@ -346,15 +346,15 @@ def active_dofs(
 def _forces(model: Model) -> dict[Table | None, Array]:
     """Return by history the nodal forces (n_points, dim) of loads, heat and initial states at multiplier 1 [force]."""
     forces = model.forces_by_ramp()
-    for own, values in (*model.thermal_forces_by_ramp().items(), *model.initial_forces_by_ramp().items()):
-        forces[own] = forces[own] + values if own in forces else values
+    for table, values in (*model.thermal_forces_by_ramp().items(), *model.initial_forces_by_ramp().items()):
+        forces[table] = forces[table] + values if table in forces else values
     return forces
 
 
 def _prepare_solver(
-    solver: LinearSolver, system: System, bodies: UnsupportedBodies | None, modes: Array, involved: Indices
+    solver: LinearSolver, system: System, bodies: FloatingBodies | None, modes: Array, involved: Indices
 ) -> Indices:
-    """Give the linear solver the matrix, with the springs of unsupported bodies; return the unknowns of contact."""
+    """Give the linear solver the matrix, with the springs of floating bodies; return the unknowns of contact."""
     matrix = system.matrix if bodies is None else bodies.with_springs(system.matrix)
     if bodies is not None:
         involved = np.union1d(involved, bodies.dofs)
@@ -373,14 +373,14 @@ def _contact_dofs(mesh: Any, pairs: Mapping[str, Formulation], n_driven: int) ->
     return (np.concatenate([points, moved])[:, None].astype(np.intp) * mesh.dim + np.arange(mesh.dim)).ravel()
 
 
-def _corner_functions(pairs: Iterable[Formulation], n: int, dim: int) -> csr_array | None:
-    """Return the `Formulation.corner_functions` of all pairs as rows of displacement components (n, n)."""
+def _basis_transformation(pairs: Iterable[Formulation], n: int, dim: int) -> csr_array | None:
+    """Return the `Formulation.basis_transformation` of all pairs as rows of displacement components (n, n)."""
     total = None
     for pair in pairs:
-        if (own := pair.corner_functions) is not None:
-            own = csr_array(kron(own, eye_array(dim), format="csr"))
-            own.resize((n, n))
-            total = own if total is None else csr_array(total.maximum(own))
+        if (functions := pair.basis_transformation) is not None:
+            functions = csr_array(kron(functions, eye_array(dim), format="csr"))
+            functions.resize((n, n))
+            total = functions if total is None else csr_array(total.maximum(functions))
     return total
 
 

@@ -59,8 +59,8 @@ def check(step: StepResult, case: dict[str, Any], model: Model) -> None:
 def _formulations(then: dict[str, str], now: dict[str, str], model: Model) -> str:
     """Return which formulations to name, as the end of a message, where pairs differ in nothing else."""
     changed = [pair.name for pair in model.contact if then.get(key := f"contact '{pair.name}'") != now[key]]
-    found = {name: formulation_behind(model, name, then.get(f"contact '{name}'")) for name in changed}
-    named = [f"contact '{name}' had {text}" for name, text in found.items() if text]
+    formulations = {name: formulation_behind(model, name, then.get(f"contact '{name}'")) for name in changed}
+    named = [f"contact '{name}' had {text}" for name, text in formulations.items() if text]
     return f" ({'; '.join(named)}: name that)" if named else ""
 
 

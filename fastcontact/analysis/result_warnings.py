@@ -10,8 +10,8 @@ import numpy as np
 
 from fastcontact.analysis.facet_sag import sag_warnings
 from fastcontact.analysis.interpenetration import interpenetration
+from fastcontact.analysis.periodic_interfaces import periodicity_warnings
 from fastcontact.analysis.problem import Problem
-from fastcontact.analysis.seams import seam_warnings
 from fastcontact.analysis.state import State
 from fastcontact.analysis.stress_scatter import scatter_warnings
 from fastcontact.analysis.volumetric_locking import locking_warning
@@ -50,23 +50,23 @@ IMBALANCE = 0.02
 
 def result_warnings(problem: Problem, state: State, last: StepResult) -> list[str]:
     """Return the warnings about an analysis whose `last` step ended in a state."""
-    found = [*interpenetration(problem, state, last), *_carrying_springs(problem, state)]
+    warnings = [*interpenetration(problem, state, last), *_carrying_springs(problem, state)]
     if problem.model.strain == "small":
-        found += [*_large_strain(problem, last), *_large_rotation(problem, state)]
+        warnings += [*_large_strain(problem, last), *_large_rotation(problem, state)]
     if problem.bodies is None:
-        found += locking_warning(problem, state.u) or scatter_warnings(problem, last)
-    found += [problem.solver.gave_up] if problem.solver.gave_up else []
+        warnings += locking_warning(problem, state.u) or scatter_warnings(problem, last)
+    warnings += [problem.solver.gave_up] if problem.solver.gave_up else []
     load = problem.load_at(last.load_factor)
     loaded, sagging = bool(load.force.any() or load.lift.any()), sag_warnings(problem, state, last)
     for name, pair in problem.pairs.items():
         contact = last.contact[name]
         if pair.options.gap_only:
             continue
-        found += [*_deep(pair, contact, state.u), *_lost(pair, contact, name in state.touched, loaded)]
-        found += [sagging[name]] if name in sagging else _unresolved(name, pair, contact)
-        found += [*wavering(pair, contact), *_too_fast(name, pair, state)]
+        warnings += [*_deep(pair, contact, state.u), *_lost(pair, contact, name in state.touched, loaded)]
+        warnings += [sagging[name]] if name in sagging else _unresolved(name, pair, contact)
+        warnings += [*wavering(pair, contact), *_too_fast(name, pair, state)]
     return [
-        *found, *seam_warnings(problem, last), *_unsettled(state), *_loose(problem, last), *_unbalanced(state)
+        *warnings, *periodicity_warnings(problem, last), *_unsettled(state), *_loose(problem, last), *_unbalanced(state)
     ]  # fmt: skip
 
 
@@ -154,9 +154,9 @@ def _loose(problem: Problem, last: StepResult) -> Iterator[str]:
 
 
 def _carrying_springs(problem: Problem, state: State) -> Iterator[str]:
-    if problem.unsupported_bodies is None or state.rigid is None:
+    if problem.floating_bodies is None or state.rigid is None:
         return
-    told = problem.unsupported_bodies.report(state.rigid, state.largest_rigid_force)
+    told = problem.floating_bodies.report(state.rigid, state.largest_rigid_force)
     if told["relative_to_load"] > problem.criteria.relative:
         yield (
             f"the springs that regularise {'; '.join(told['motions'])} still carry {told['relative_to_load']:.1e} of "
@@ -222,7 +222,7 @@ def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
 
     That of linear kinematics, half the curl of the displacement (n_points, dim).
     """
-    square, place, displacement = 0.0, np.zeros(mesh.dim), np.ascontiguousarray(displacement)
+    square, point, displacement = 0.0, np.zeros(mesh.dim), np.ascontiguousarray(displacement)
     for name, block in mesh.solids.items():
         element = elements.get(name)
         centre = element.nodes[: element.n_corners].mean(axis=0)[None]
@@ -230,8 +230,8 @@ def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
             mesh.points, block, element.shape(centre), element.gradient(centre), displacement
         )
         if most > square:
-            square, place = most, mesh.points[block[row]].mean(axis=0)
-    return float(square**0.5), place
+            square, point = most, mesh.points[block[row]].mean(axis=0)
+    return float(square**0.5), point
 
 
 def _lost(pair: Formulation, contact: ContactResult, touched: bool, loaded: bool) -> Iterator[str]:

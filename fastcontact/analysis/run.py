@@ -160,7 +160,7 @@ def _touched(steps: Sequence[StepResult]) -> frozenset[str]:
     """Return the names of the contact pairs that were closed in any of the steps; usually the last step suffices."""
     touched: set[str] = set()
     for step in reversed(steps):
-        touched |= {name for name, found in step.contact.items() if found.active.any()}
+        touched |= {name for name, contact in step.contact.items() if contact.active.any()}
         if len(touched) == len(step.contact):
             break
     return frozenset(touched)
@@ -185,10 +185,10 @@ def _marched(
     for index, instant in enumerate(instants, start=before + 1):
         problem, state = go_on(prepared, model, problem, state, begin)
         state, step = step_halving.advance(problem, state, index, begin, instant)
-        found = result_warnings(problem, state, step) if instant == instants[-1] else []
-        for text in found:
+        warnings = result_warnings(problem, state, step) if instant == instants[-1] else []
+        for text in warnings:
             warn(text)
-        told = (*doubtful * (index == 1), *found)
+        told = (*doubtful * (index == 1), *warnings)
         yield replace(step, warnings=told, restart=restart.taken(problem, state, case))
         del step  # before the next one is computed
         begin = instant

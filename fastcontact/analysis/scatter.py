@@ -2,7 +2,7 @@
 
 How much round-off there is depends on the condition of the stiffness and of the constraints, which nothing tells beforehand;
 the last displacements show it. An iteration that still converges, however slowly, goes on in one direction: over a window
-its displacements lie as far apart as all changes together. Round-off goes to and fro: they lie hardly farther apart than one
+its displacements lie as far apart as all changes together. Round-off oscillates: they lie hardly farther apart than one
 change. So does what iterative linear solutions leave, of which is known how large it may be.
 """
 
@@ -49,8 +49,8 @@ class Watch:
         self._forces: list[Array] = []
         self._changes: list[float] = []
 
-    def seen(self, part: Array, force: Array, change: float, size: float, noise: float = 0.0) -> Scatter | None:
-        """Take the displacements `part` (k,) [length] and contact forces (n,) [force] of an update; return their scatter.
+    def seen(self, unknowns: Array, force: Array, change: float, size: float, noise: float = 0.0) -> Scatter | None:
+        """Take the displacements `unknowns` (k,) [length] and contact forces (n,) [force] of an update; return their scatter.
 
         Parameters
         ----------
@@ -70,7 +70,7 @@ class Watch:
         if not change <= DISPLACEMENT * size:
             self.forget()
             return None
-        self._parts.append(part.copy())
+        self._parts.append(unknowns.copy())
         self._forces.append(force.copy())
         self._changes.append(change)
         del self._parts[:-WINDOW], self._forces[:-WINDOW], self._changes[:-WINDOW]
@@ -79,11 +79,13 @@ class Watch:
         if len(self._changes) < window:
             return None
         changes, half = self._changes[-window:], window // 2
-        found = Scatter(_apart(self._parts[-window:]) / size, _apart(self._forces[-window:]) / (largest(force) or 1.0))
+        scatter = Scatter(
+            _apart(self._parts[-window:]) / size, _apart(self._forces[-window:]) / (largest(force) or 1.0)
+        )
         declining = np.median(changes[half:]) < DECLINE * np.median(changes[:half])
-        if declining or found.displacement * size > apart * float(np.median(changes)):
+        if declining or scatter.displacement * size > apart * float(np.median(changes)):
             return None
-        return found if found.displacement <= DISPLACEMENT and found.force <= FORCE else None
+        return scatter if scatter.displacement <= DISPLACEMENT and scatter.force <= FORCE else None
 
     def forget(self) -> None:
         """Begin anew."""

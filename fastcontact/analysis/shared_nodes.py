@@ -4,7 +4,7 @@ A node of several pairs behaves as that of one pair over all their facets. Its c
 the sum of their forces alone, and equations that repeat each other cannot be eliminated: their mean is solved for. It stands
 for the area of all, so that penalties add up, and has the mean of their coefficients of friction. Each pair then carries the
 part that its area is of all their areas, so that the pressure is the same. Of several clearances at one place the smallest
-alone can close. What gives way along the normal by penalties and different clearances repeats nothing.
+alone can close. Constraints with a normal compliance or with different clearances are independent.
 
 Two nodes at the ends of a part that repeats itself are one node, too: its gap, weighted over the facets at both ends, is the
 mean of theirs by area. Tangents at the second end are turned to the first one before they are compared.
@@ -23,7 +23,7 @@ from scipy.sparse.csgraph import connected_components
 from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints, StackedConstraints
-from fastcontact.model.periodicity import Seam
+from fastcontact.model.periodicity import PeriodicInterface
 
 # Entries of rows [-] that differ by less are the same.
 SAME = 1e-9
@@ -44,7 +44,7 @@ class SharedNodes:
     part, along : ndarray (m,)
         Of the normal and of the tangential forces of a place, the part of each constraint [-].
     frame : ndarray (m, k, dim)
-        Tangents of the constraints, at second ends of seams as they are at the first one [-].
+        Tangents of the constraints, at second ends of periods as they are at the first one [-].
     """
 
     place: Indices
@@ -54,23 +54,23 @@ class SharedNodes:
     frame: Array
 
     @classmethod
-    def of(cls, constraints: StackedConstraints, seams: Sequence[Seam] = ()) -> SharedNodes | None:
-        """Return those of the constraints of all pairs; None where no node is in several, or at both ends of a seam."""
-        if len(constraints.parts) < 2 and not seams:
+    def of(cls, constraints: StackedConstraints, interfaces: Sequence[PeriodicInterface] = ()) -> SharedNodes | None:
+        """Return those of the constraints of all pairs; None where no node is in several, or at both ends of a period."""
+        if len(constraints.parts) < 2 and not interfaces:
             return None
         first, second, behind = _alike(constraints)
-        ends = _at_seams(constraints, seams, behind)
+        ends = _at_periodic_interfaces(constraints, interfaces, behind)
         if not len(second) + len(behind) + ends.shape[1]:
             return None
-        place = _places(constraints, np.hstack([np.stack([first, second]), ends]))
-        return cls(place, behind, *_parts(constraints, place), _frame(constraints, seams))
+        representative = _places(constraints, np.hstack([np.stack([first, second]), ends]))
+        return cls(representative, behind, *_parts(constraints, representative), _frame(constraints, interfaces))
 
     @property
     def idle(self) -> Mask:
         """Constraints (m,) that are not solved for."""
-        found = self.place != np.arange(len(self.place))
-        found[self.behind] = True
-        return found
+        redundant = self.place != np.arange(len(self.place))
+        redundant[self.behind] = True
+        return redundant
 
     def closed(self, active: Mask) -> Mask:
         """Return the places (m,) at which some of the constraints (m,) are active."""
@@ -103,8 +103,8 @@ class SharedNodes:
             if constraints.elastic_slip is not None:
                 weight = np.divide(stiffness, total[self.place], out=np.zeros_like(total), where=np.isfinite(stiffness))
                 merged["elastic_slip"] = self._mean(constraints.elastic_slip.T, weight).T
-        if constraints.drift is not None:
-            merged["drift"] = self._mean(constraints.drift.T, self.along).T
+        if constraints.slip0 is not None:
+            merged["slip0"] = self._mean(constraints.slip0.T, self.along).T
         if constraints.friction is not None:
             merged["friction"] = self.summed(self.part * constraints.friction)
         return replace(constraints, **merged).without(self.idle)  # type: ignore[arg-type]
@@ -130,16 +130,16 @@ class SharedNodes:
 
     def shared(self, solution: Solution, constraints: StackedConstraints, u: Array) -> Solution:
         """Return a solution of `once` at displacements `u` (n_dofs,) [length] with forces that all constraints share."""
-        place = self.place
-        normal, gap = self.part * solution.multiplier[place], solution.gap[place]
+        representative = self.place
+        normal, gap = self.part * solution.multiplier[representative], solution.gap[representative]
         gap[self.behind] = constraints.gaps(u)[self.behind]
-        active = solution.active[place]
+        active = solution.active[representative]
         if not isinstance(solution, FrictionalEquilibrium):
             return replace(solution, multiplier=normal, gap=gap, active=active, wanted=active)
         frame = self.frame
 
         def turned(along: Array) -> Array:
-            return np.einsum("md,mkd->mk", np.einsum("mk,mkd->md", along, frame)[place], frame)
+            return np.einsum("md,mkd->mk", np.einsum("mk,mkd->md", along, frame)[representative], frame)
 
         return replace(
             solution,
@@ -147,36 +147,39 @@ class SharedNodes:
             gap=gap,
             slip=np.where(self.idle[:, None], turned(solution.slip), solution.slip),
             active=active,
-            sticking=solution.sticking[place],
+            sticking=solution.sticking[representative],
             tangential=self.along[:, None]
             * np.where(self.idle[:, None], turned(solution.tangential), solution.tangential),
         )
 
 
-def _frame(constraints: StackedConstraints, seams: Sequence[Seam]) -> Array:
-    """Return the tangents (m, k, dim) of constraints, those at second ends of seams turned back to the first one [-]."""
+def _frame(constraints: StackedConstraints, interfaces: Sequence[PeriodicInterface]) -> Array:
+    """Return the tangents (m, k, dim) of constraints, those at second ends of periods turned back to the first one [-]."""
     m, dim = constraints.positions.shape
     frame = np.stack(constraints.directions, axis=1) if constraints.directions else np.zeros((m, 0, dim))
-    for seam in seams:
-        if seam.turn is not None and constraints.nodes is not None:
-            there = np.isin(constraints.nodes, seam.second)
-            frame[there] = frame[there] @ seam.turn
+    for interface in interfaces:
+        if interface.turn is not None and constraints.nodes is not None:
+            there = np.isin(constraints.nodes, interface.second)
+            frame[there] = frame[there] @ interface.turn
     return frame
 
 
-def _at_seams(constraints: StackedConstraints, seams: Sequence[Seam], behind: Indices) -> Indices:
+def _at_periodic_interfaces(
+    constraints: StackedConstraints, interfaces: Sequence[PeriodicInterface], behind: Indices
+) -> Indices:
     """Return constraints (2, k) of a pair at the two nodes of one point."""
     nodes, usable = _nodes(constraints), np.isfinite(_areas(constraints)) & constraints.usable
     usable[behind] = False
-    found = [np.empty((2, 0), np.intp)]
-    for rows in constraints.rows().values() if seams else ():
-        own = rows.start + np.flatnonzero(usable[rows] & (nodes[rows] >= 0))
-        row = np.full(max(*(max(seam.first.max(), seam.second.max()) for seam in seams), nodes.max()) + 1, -1)
-        row[nodes[own]] = own
-        for seam in seams:
-            both = row[np.stack([seam.first, seam.second])]
-            found.append(both[:, (both >= 0).all(axis=0) & (both[0] != both[1])])
-    ends = np.hstack(found)
+    pairs = [np.empty((2, 0), np.intp)]
+    for rows in constraints.rows().values() if interfaces else ():
+        usable_rows = rows.start + np.flatnonzero(usable[rows] & (nodes[rows] >= 0))
+        last = max(int(end.max()) for interface in interfaces for end in interface[:2])
+        row = np.full(max(last, int(nodes.max())) + 1, -1)
+        row[nodes[usable_rows]] = usable_rows
+        for interface in interfaces:
+            both = row[np.stack([interface.first, interface.second])]
+            pairs.append(both[:, (both >= 0).all(axis=0) & (both[0] != both[1])])
+    ends = np.hstack(pairs)
     if constraints.equality is not None:
         ends = ends[:, constraints.equality[ends[0]] == constraints.equality[ends[1]]]
     return ends
@@ -197,25 +200,25 @@ def _stiffness(softness: Array) -> Array:
     return np.divide(1.0, softness, out=np.full_like(softness, np.inf), where=softness > 0.0)
 
 
-def _parts(constraints: StackedConstraints, place: Indices) -> tuple[Array, Array]:
+def _parts(constraints: StackedConstraints, representative: Indices) -> tuple[Array, Array]:
     """Return the parts (m,) of normal and tangential forces of places (m,) that constraints carry [-].
 
-    Normal forces by stiffness where all give way, by area among those that do not. Tangential forces as far as friction
+    Normal forces by stiffness where all are compliant, by area among exact ones. Tangential forces as far as friction
     can carry them: what slides then slides in each pair.
     """
-    m = len(place)
-    several = np.bincount(place, minlength=m)[place] > 1  # others need not stand for an area
+    m = len(representative)
+    several = np.bincount(representative, minlength=m)[representative] > 1  # others need not stand for an area
     weight = np.where(several, _areas(constraints), 1.0)
     if constraints.softness is not None:
         hard = constraints.softness == 0.0
-        held = np.bincount(place, hard, minlength=m)[place] > 0
+        held = np.bincount(representative, hard, minlength=m)[representative] > 0
         weight = np.where(several & ~held, _stiffness(constraints.softness), np.where(hard | ~several, weight, 0.0))
-    part = weight / np.bincount(place, weight, minlength=m)[place]
+    fraction = weight / np.bincount(representative, weight, minlength=m)[representative]
     if constraints.friction is None:
-        return part, part
-    rubbing = part * constraints.friction
-    total = np.bincount(place, rubbing, minlength=m)[place]
-    return part, np.where(several, np.divide(rubbing, total, out=part.copy(), where=total > 0.0), 1.0)
+        return fraction, fraction
+    rubbing = fraction * constraints.friction
+    total = np.bincount(representative, rubbing, minlength=m)[representative]
+    return fraction, np.where(several, np.divide(rubbing, total, out=fraction.copy(), where=total > 0.0), 1.0)
 
 
 def _areas(constraints: StackedConstraints) -> Array:
@@ -227,18 +230,18 @@ def _areas(constraints: StackedConstraints) -> Array:
 
 def _nodes(constraints: StackedConstraints) -> Indices:
     """Return the node of each constraint (m,), -1 without one or where a compliance couples it with others."""
-    found = []
+    nodes = []
     for part in constraints.parts.values():
         coupled = part.compliance is not None or part.low_rank_compliance is not None
-        found.append(np.full(len(part), -1) if part.nodes is None or coupled else part.nodes)
-    return np.concatenate(found).astype(np.intp)
+        nodes.append(np.full(len(part), -1) if part.nodes is None or coupled else part.nodes)
+    return np.concatenate(nodes).astype(np.intp)
 
 
 def _alike(constraints: StackedConstraints) -> tuple[Indices, Indices, Indices]:
     """Return constraints (k,) of a pair, those of other pairs (k,) that repeat them, and others that lie behind some.
 
     The latter face the same place along the same normal, with a larger clearance: what is in front of them holds their node,
-    unless it gives way.
+    unless it is compliant.
     """
     first, second = _of_one_node(constraints)
     if not len(first):
@@ -264,12 +267,12 @@ def _of_one_node(constraints: StackedConstraints) -> tuple[Indices, Indices]:
     usable = np.isfinite(_areas(constraints)) & constraints.usable & (nodes >= 0)
     order = np.flatnonzero(usable)
     order = order[np.lexsort((constraints.gap0[order], nodes[order]))]
-    node, found = nodes[order], [np.empty((2, 0), np.intp)]
+    node, pairs = nodes[order], [np.empty((2, 0), np.intp)]
     apart = 1
     while len(same := np.flatnonzero(node[apart:] == node[:-apart])):
-        found.append(np.stack([order[same], order[same + apart]]))
+        pairs.append(np.stack([order[same], order[same + apart]]))
         apart += 1
-    first, second = np.concatenate(found[::-1], axis=1)
+    first, second = np.concatenate(pairs[::-1], axis=1)
     return first, second
 
 

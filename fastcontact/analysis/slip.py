@@ -27,8 +27,8 @@ def slip_of_nodes(pair: Formulation, at: Configuration) -> Array:
     nodes = Candidates.nodes_of(pair.secondary)
     pairing = pair.facing(nodes, at, max(pair.projection_tolerance or 0.0, STANDS_OUT))
     directions = tangents(pairing.normal)
-    rows, drift = pair.slips(nodes, pairing, directions, at)
+    rows, slip0 = pair.slips(nodes, pairing, directions, at)
     along = np.stack([row @ (at.displacement - at.start).ravel() for row in rows])
-    along += 0.0 if drift is None else drift
+    along += 0.0 if slip0 is None else slip0
     slip = np.einsum("kn,knd->nd", along, np.stack(directions))
     return np.where(pairing.paired[:, None], slip, 0.0)

@@ -13,7 +13,7 @@ from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array
-from fastcontact.elasticity.relations import Relation, TemporaryRelation
+from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, TemporaryConstraint
 from fastcontact.model.model import Model
 from fastcontact.model.pretension import locked_lengths
 from fastcontact.results.step import StepResult
@@ -45,7 +45,7 @@ def go_on(
     begin : float
     """
     stage, kept = _stage(model, begin, problem.displacement(state.u), state.locked)
-    if [own.name for own in stage.relations] == [own.name for own in problem.model.relations]:
+    if [relation.name for relation in stage.relations] == [relation.name for relation in problem.model.relations]:
         return problem, state
     problem = prepared(stage)
     return problem, replace(
@@ -53,7 +53,7 @@ def go_on(
     )
 
 
-def at_present_length(model: Model) -> list[Relation]:
+def at_present_length(model: Model) -> list[MultiPointConstraint]:
     """Return the relations that keep all pretension sections as they are in small motions."""
     return [own.locked(model.mesh.points.size, 0.0) for own in model.pretensions]
 
@@ -70,16 +70,16 @@ def _stage(
     locks = [
         own.locked(model.mesh.points.size, lengths[own.label]) for own in model.pretensions if own.label in lengths
     ]
-    found: dict[str, float | Array] = {**lengths}
-    relations: list[Relation] = []
+    reached: dict[str, float | Array] = {**lengths}
+    relations: list[MultiPointConstraint] = []
     for own in model.relations:
-        if not isinstance(own, TemporaryRelation):
+        if not isinstance(own, TemporaryConstraint):
             relations.append(own)
         elif own.acts_from(begin):
-            found[own.name] = kept[own.name] if own.name in kept else own.rows @ displacement.ravel()
-            relations += own.after(np.asarray(found[own.name]))
-    if not locks and not any(isinstance(own, TemporaryRelation) for own in model.relations):
-        return model, found
+            reached[own.name] = kept[own.name] if own.name in kept else own.rows @ displacement.ravel()
+            relations += own.after(np.asarray(reached[own.name]))
+    if not locks and not any(isinstance(own, TemporaryConstraint) for own in model.relations):
+        return model, reached
     made = copy.copy(model)
     made.relations = [*relations, *locks]
-    return made, found
+    return made, reached

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact.analysis.extrapolation import Extrapolation
-from fastcontact.analysis.unsupported_bodies import RigidPosition
+from fastcontact.analysis.floating_bodies import RigidPosition
 from fastcontact.analysis.wear import Worn
 from fastcontact.analysis.work import ContactForces, Work
 from fastcontact.arrays import Array, Mask
@@ -67,7 +67,7 @@ class State:
     last_change : (int, float), optional
         The fixed number of geometry updates of the last step, and the relative change by the last one.
     rigid : RigidPosition, optional
-        Rigid position of unsupported bodies in the last step.
+        Rigid position of floating bodies in the last step.
     history : dict of str to ndarray (n_cells, n_q, 9)
         By solid element of nonlinear bodies, see `constitutive_kernels`; none before the first step.
     rise : ndarray (n_points,), optional
@@ -110,7 +110,7 @@ class State:
     def after_touching(self, pairs: Iterable[str]) -> State:
         """Return the state with these contact pairs closed; pairs that have touched keep their first contact."""
         touched = self.touched.union(pairs)
-        met = {name: place for name, place in self.first_contact.items() if name in touched}
+        met = {name: positions for name, positions in self.first_contact.items() if name in touched}
         return dataclasses.replace(self, touched=touched, first_contact=met)
 
     def to_dict(self, n_dofs: int) -> dict[str, Any]:
@@ -164,7 +164,7 @@ class State:
         """
         u = np.concatenate([displacement.ravel(), kept["obstacles"]])
         pairs, numbers = kept["pairs"], kept["numbers"]
-        found = {
+        values = {
             key: {name: own[key] for name, own in pairs.items() if own.get(key) is not None}
             for key in ("closed", "now", "first_contact", "traction", "angle", "slipped", "worn")
         }
@@ -177,13 +177,13 @@ class State:
             halved=int(numbers.get("halved", 0)),
             active=dict(kept["active"]),
             pressure=dict(kept["pressure"]),
-            obstacles={name: now.copy() for name, now in found["now"].items()},
-            angles=dict(found["angle"]),
-            worn={name: Worn(*parts) for name, parts in found["worn"].items()},
-            slipped=dict(found["slipped"]),
-            never_opening={name: (both[0], both[1]) for name, both in found["closed"].items()},
-            first_contact={name: (both[0], both[1]) for name, both in found["first_contact"].items()},
-            traction={name: (both[0], both[1]) for name, both in found["traction"].items()},
+            obstacles={name: now.copy() for name, now in values["now"].items()},
+            angles=dict(values["angle"]),
+            worn={name: Worn(*parts) for name, parts in values["worn"].items()},
+            slipped=dict(values["slipped"]),
+            never_opening={name: (both[0], both[1]) for name, both in values["closed"].items()},
+            first_contact={name: (both[0], both[1]) for name, both in values["first_contact"].items()},
+            traction={name: (both[0], both[1]) for name, both in values["traction"].items()},
             locked=dict(kept.get("locked", {})),
             bonds={name: Bond(**own) for name, own in kept.get("bonds", {}).items()},
             work=Work(**kept["work"]) if kept.get("work") else None,

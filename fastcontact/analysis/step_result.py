@@ -9,8 +9,8 @@ import numpy as np
 
 from fastcontact.analysis.contact_result import contact_result
 from fastcontact.analysis.geometry_loop import SettledContact
+from fastcontact.analysis.periodic_interfaces import joined
 from fastcontact.analysis.problem import Problem, StepLoad
-from fastcontact.analysis.seams import joined
 from fastcontact.analysis.state import State
 from fastcontact.analysis.true_pressure import on_deformed_surface
 from fastcontact.arrays import Array
@@ -25,7 +25,7 @@ from fastcontact.results.units import units_of_results
 
 def recover(
     problem: Problem, end: State, contact: dict[str, ContactResult], reaction: Array, iterations: dict[str, Any],
-    place: tuple[int, float], bodies: DeformedBodies | None = None,
+    instant: tuple[int, float], bodies: DeformedBodies | None = None,
 ) -> StepResult:  # fmt: skip
     """Return the result of a load step.
 
@@ -39,21 +39,21 @@ def recover(
         [force]
     iterations : dict
         See `StepResult`.
-    place : (int, float)
+    instant : (int, float)
         Number of the step, and its pseudo-time.
     bodies : DeformedBodies, optional
         Where they are nonlinear.
     """
     mesh, u = problem.model.mesh, problem.displacement(end.u)
     temperature, initial = (
-        problem.factors(own, place[1]) for own in (problem.model.temperatures, problem.model.initial_states)
+        problem.factors(own, instant[1]) for own in (problem.model.temperatures, problem.model.initial_states)
     )
     factors = {"temperature_factors": temperature, "initial_factors": initial}
     iterations = {**iterations, **{key: found for key, found in factors.items() if found}}
     heat = None if end.rise is None else problem.model.reference_temperature + end.rise
     sections = problem.model.pretensions
     if sections:
-        pulls = [multiplier(own.ramp, problem.ramp, place[1]) for own in sections]
+        pulls = [multiplier(own.ramp, problem.ramp, instant[1]) for own in sections]
         found = section_results(sections, u, reaction.reshape(-1, mesh.dim), pulls)
         iterations = {**iterations, "pretension": found}
     if bodies is None:
@@ -66,7 +66,7 @@ def recover(
     stress, by_material = by_largest_von_mises(problem.sides, problem.material_of_cells, at_places, mesh.n_points)
     von_mises, named = recovery.von_mises(stress), problem.model.units
     return StepResult(
-        *place, u.copy(), stress, von_mises, recovery.von_mises_signed(stress, von_mises), reaction.reshape(-1, mesh.dim),
+        *instant, u.copy(), stress, von_mises, recovery.von_mises_signed(stress, von_mises), reaction.reshape(-1, mesh.dim),
         contact, iterations, material_stress=by_material,
         cell_fields={} if bodies is None or problem.bodies is None else problem.bodies.cell_fields(bodies, u),
         temperature=heat, units=named and units_of_results(named, problem.model.kinematics),
@@ -90,17 +90,17 @@ def contact_results(
     """
     displacement = problem.displacement(end.u)
     paired_at = np.zeros_like(displacement) if problem.criteria.keep_pairing else displacement
-    found = {
+    results = {
         name: contact_result(
             name, problem.pairs[name], settled.constraints.parts[name], settled.solution, rows,
             problem.configuration(name, start, load, paired_at, end.u), end.first_contact.get(name), displacement,
         )
         for name, rows in settled.constraints.rows().items()
     }  # fmt: skip
-    found = joined(problem, found)
+    results = joined(problem, results)
     if problem.model.strain == "small":
-        return found
-    return {name: on_deformed_surface(problem.pairs[name], own, displacement) for name, own in found.items()}
+        return results
+    return {name: on_deformed_surface(problem.pairs[name], result, displacement) for name, result in results.items()}
 
 
 def counted(settled: SettledContact | None, linear_iterations: int) -> dict[str, Any]:

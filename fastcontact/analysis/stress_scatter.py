@@ -87,19 +87,19 @@ class StressScatter:
         mesh, field, element = problem.model.mesh, problem.field, elements.get(name)
         xi, weights = integration_rule(element, 2)
         N, dN = np.ascontiguousarray(element.shape(xi)), np.ascontiguousarray(element.gradient(xi))
-        simplex, found = element.n_corners == element.dim + 1, np.zeros(4)
+        simplex, sums = element.n_corners == element.dim + 1, np.zeros(4)
         for first in range(0, len(mesh.cells[name]), BATCH):
             rows = np.arange(first, min(first + BATCH, len(mesh.cells[name])))
             cells, numbers = mesh.cells[name][rows], field.rows[name][rows]
-            own = stress.at(name, xi, cells, field.loops[name][rows], rows)
-            off = N @ smooth[rows] - own
+            rough = stress.at(name, xi, cells, field.loops[name][rows], rows)
+            off = N @ smooth[rows] - rough
             volume = cell_volumes(mesh.points[cells], N, dN, problem.model.kinematics == "axisymmetric") * weights
             compliance, nearly = field.compliance[numbers][:, None], volume * (self._nearly[numbers] & simplex)[:, None]
-            found += [
-                (elastic_energy(off, compliance) * volume).sum(), (elastic_energy(own, compliance) * volume).sum(),
-                (off[..., :3].mean(axis=2) ** 2 * nearly).sum(), (own[..., :3].mean(axis=2) ** 2 * nearly).sum(),
+            sums += [
+                (elastic_energy(off, compliance) * volume).sum(), (elastic_energy(rough, compliance) * volume).sum(),
+                (off[..., :3].mean(axis=2) ** 2 * nearly).sum(), (rough[..., :3].mean(axis=2) ** 2 * nearly).sum(),
             ]  # fmt: skip
-        return found
+        return sums
 
 
 def scatter_warnings(problem: Problem, step: StepResult) -> list[str]:

@@ -49,16 +49,16 @@ def support_forces(model: Model, step: StepResult) -> dict[str, Array]:
     rows += [section.row(n) for section in model.pretensions]  # which may be locked
     forces = multipliers(reaction, rows, held.ravel())
     reaction = reaction - sum((own.T @ force for own, force in zip(rows, forces, strict=True)), np.zeros(n))
-    found: dict[str, Array] = {}
+    by_support: dict[str, Array] = {}
     left = np.where(held, reaction.reshape(held.shape), 0.0)
     for support in model.supports:
         nodes, k = model.mesh.points_of(support.group), support.component
-        found.setdefault(support.group, np.zeros(held.shape[1]))[k] += left[nodes, k].sum()
+        by_support.setdefault(support.group, np.zeros(held.shape[1]))[k] += left[nodes, k].sum()
         left[nodes, k] = 0.0
     for (group, relation), force in zip(model.related_supports, forces, strict=False):
         own = (relation.rows.T @ force).reshape(held.shape).sum(axis=0)
-        found[group] = found.get(group, 0.0) + own
-    return found
+        by_support[group] = by_support.get(group, 0.0) + own
+    return by_support
 
 
 def multipliers(reaction: Array, rows: Sequence[csr_array], held: Mask) -> list[Array]:
@@ -69,8 +69,8 @@ def multipliers(reaction: Array, rows: Sequence[csr_array], held: Mask) -> list[
     if not rows:
         return []
     free = csr_array(csr_array(vstack(rows, format="csr"))[:, np.flatnonzero(~held)])
-    found = lsqr(free.T, reaction[~held], atol=1e-14, btol=1e-14, iter_lim=20 * sum(free.shape))[0]
-    return np.split(found, np.cumsum([own.shape[0] for own in rows])[:-1])
+    multiplier = lsqr(free.T, reaction[~held], atol=1e-14, btol=1e-14, iter_lim=20 * sum(free.shape))[0]
+    return np.split(multiplier, np.cumsum([block.shape[0] for block in rows])[:-1])
 
 
 @typed(ModelError)
@@ -89,11 +89,11 @@ def spring_forces(model: Model, step: StepResult) -> dict[str, Array]:
         If the step is of another model.
     """
     _check(model, step)
-    found: dict[str, Array] = {}
+    forces: dict[str, Array] = {}
     for spring in model.springs:
         name, tension = spring.name.removeprefix("the "), spring.tension(step.displacement)
-        found[name] = np.concatenate([found[name], tension]) if name in found else tension
-    return found
+        forces[name] = np.concatenate([forces[name], tension]) if name in forces else tension
+    return forces
 
 
 def pretension_history(steps: Iterable[StepResult]) -> NDArray[np.void]:

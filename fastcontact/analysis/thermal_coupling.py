@@ -69,7 +69,7 @@ def first_rise(problem: Problem, state: State, instant: float) -> Array | None:
 
 
 def settle_heat(
-    problem: Problem, start: State, load: StepLoad, instant: float, rise: Array, found: Equilibrium, solve: Solve
+    problem: Problem, start: State, load: StepLoad, instant: float, rise: Array, equilibrium: Equilibrium, solve: Solve
 ) -> tuple[Heated, Equilibrium]:
     """Return the temperatures and the equilibrium of a load step.
 
@@ -84,7 +84,7 @@ def settle_heat(
         Of its end.
     rise : ndarray (n_points,)
         Of the temperature, to begin with [temperature].
-    found : (SettledContact or None, ndarray (n_dofs,), Balance)
+    equilibrium : (SettledContact or None, ndarray (n_dofs,), Balance)
         The equilibrium at that temperature.
     solve : callable
         From a load and the contact before to the equilibrium.
@@ -99,17 +99,17 @@ def settle_heat(
     enough = max(problem.criteria.geometry, SETTLED * heat.linear_tolerance)
     change = np.inf
     for exchange in range(1, MOST_EXCHANGES + 1):
-        heated = _conducted(problem, start, load, instant, found)
+        heated = _conducted(problem, start, load, instant, equilibrium)
         change = largest_difference(heated.rise, rise)
         if change <= enough * largest(heated.rise) or not problem.model.expands:
-            return replace(heated, balance={**heated.balance, "exchanges": exchange}), found
+            return replace(heated, balance={**heated.balance, "exchanges": exchange}), equilibrium
         rise = mixing.mixed(rise, heated.rise)
-        found = solve(expanded(problem, load, rise), found[0])
+        equilibrium = solve(expanded(problem, load, rise), equilibrium[0])
     raise ConvergenceError(
         f"heat and contact do not settle: after {MOST_EXCHANGES} times temperatures still change by {change:.3g}, as where "
         "a contact opens by its heat and closes without it; let its conductance fall gradually with the gap, or grow from "
         "zero with the pressure",
-        found[0].iterate.history if found[0] is not None else (),
+        equilibrium[0].iterate.history if equilibrium[0] is not None else (),
     )
 
 
@@ -121,9 +121,9 @@ def expanded(problem: Problem, load: StepLoad, rise: Array | None) -> StepLoad:
     return replace(load, force=load.force + np.pad(forces, (0, len(load.force) - len(forces))))
 
 
-def _conducted(problem: Problem, start: State, load: StepLoad, instant: float, found: Equilibrium) -> Heated:
+def _conducted(problem: Problem, start: State, load: StepLoad, instant: float, equilibrium: Equilibrium) -> Heated:
     """Return the temperatures at the conductances of the contact."""
-    settled, u, _ = found
+    settled, u, _ = equilibrium
     assert problem.heat is not None
     if settled is None or not problem.heat.depends_on_contact:
         steady = problem.heat.temperatures(instant)
@@ -135,14 +135,14 @@ def _conducted(problem: Problem, start: State, load: StepLoad, instant: float, f
         if law is None and not pair.options.friction_heat:
             continue
         at = problem.configuration(name, start, load, problem.displacement(u), u)
-        part, force, gap = _pressed(problem, settled, name, rows, at)
+        constraints, force, gap = _pressed(problem, settled, name, rows, at)
         assert isinstance(pair.primary, Surface)
-        assert part.nodal is not None
-        own = crossing(part, pair.secondary, pair.primary, pair.points.shape)
+        assert constraints.nodal is not None
+        own = crossing(constraints, pair.secondary, pair.primary, pair.points.shape)
         if law is not None:
             h, facing = np.zeros(len(gap)), own.area > 0.0
             h[facing] = law(force[facing] / own.area[facing], gap[facing])
-            matrix, crossings[name] = csr_array(matrix + own.matrix(h)), (own, part.nodal, h)
+            matrix, crossings[name] = csr_array(matrix + own.matrix(h)), (own, constraints.nodal, h)
         if pair.options.friction_heat and isinstance(solution, FrictionalEquilibrium):
             work = np.maximum(-(solution.tangential[rows] * solution.slip[rows]).sum(axis=1), 0.0)
             rubbed += own.shared(pair.options.friction_heat * work / (instant - start.instant))
@@ -157,14 +157,14 @@ def _pressed(
     problem: Problem, settled: SettledContact, name: str, rows: slice, at: Configuration
 ) -> tuple[Constraints, Array, Array]:
     """Return the places where a pair touches, normal forces (m,) there [force] and gaps (m,), zero where it does [length]."""
-    pair, part, solution = problem.pairs[name], settled.constraints.parts[name], settled.solution
+    pair, constraints, solution = problem.pairs[name], settled.constraints.parts[name], settled.solution
     touching = TOUCHING * float(np.ptp(pair.points, axis=0).max())
-    forces = np.maximum(part.normal_forces(solution.multiplier[rows]), 0.0)
+    forces = np.maximum(constraints.normal_forces(solution.multiplier[rows]), 0.0)
     if pair.options.tied:
         return pair.unilateral(Configuration.undeformed(pair.points)), forces, np.zeros(len(forces))
     if pair.options.gap_only:
-        part = pair.unilateral(at)
-        gap = np.maximum(part.gaps(at.displacement), 0.0)
-        return part, np.zeros(len(gap)), np.where(gap <= touching, 0.0, gap)
+        constraints = pair.unilateral(at)
+        gap = np.maximum(constraints.gaps(at.displacement), 0.0)
+        return constraints, np.zeros(len(gap)), np.where(gap <= touching, 0.0, gap)
     gap = np.maximum(solution.gap[rows], 0.0)
-    return part, forces, np.where(solution.active[rows] | (gap <= touching), 0.0, gap)
+    return constraints, forces, np.where(solution.active[rows] | (gap <= touching), 0.0, gap)

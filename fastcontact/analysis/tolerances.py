@@ -12,7 +12,7 @@ FIRST_RESIDUAL, RESIDUAL = 1e-2, 0.03
 # With friction the residual falls at least to this part of the last one, unless that of the friction law did not fall to
 # CONTRACTS of its last one so many times: loose solutions may be what keeps it.
 LEAST_FALL, CONTRACTS, STILL = 0.2, 0.7, 2
-# Newton iterations with friction as long as the residual is larger than the last one: errors turn slips to and fro.
+# Newton iterations with friction as long as the residual is larger than the last one: errors reverse slips.
 INEXACT_NEWTON_STEPS = 3
 # Pairings after which errors of whole solutions are taken for what they are.
 PATIENT_UPDATES = 25

@@ -47,6 +47,6 @@ def _stretch(contact: ContactResult, displacement: Array, before: Array, after: 
         grown = float(np.sqrt(after[contact.active].sum() / before[contact.active].sum()))
         return grown, grown
     moved = displacement[:, 0] if contact.tangent is None else displacement @ contact.tangent
-    widths = (half_width(contact.place, contact.active, contact.across + part * moved) for part in (0.0, 1.0))
+    widths = (half_width(contact.place, contact.active, contact.across + fraction * moved) for fraction in (0.0, 1.0))
     ratios = [now / then if then > 0.0 and np.isfinite(then) else 1.0 for then, now in zip(*widths, strict=True)]
     return ratios[0], ratios[1]

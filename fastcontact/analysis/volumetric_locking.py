@@ -73,11 +73,11 @@ class Comparison:
         """Return the nodal forces (n_points, dim) [force] of displacements (n_points, dim) [length]."""
         mesh, kinematics = self._model.mesh, self._model.kinematics
         given = mesh, kinematics, self._moduli, self._material, displacement
-        own = recovery.stress_at_points(*given, self._treatment)
+        stress = recovery.stress_at_points(*given, self._treatment)
         reference = recovery.stress_at_points(*given, self._treatment | self._suspicious)
-        surplus = {name: np.zeros_like(own[name]) for name in self._cells}
+        surplus = {name: np.zeros_like(stress[name]) for name in self._cells}
         for name in self._cells:
-            surplus[name][..., :3] = (own[name] - reference[name])[..., :3].mean(axis=2, keepdims=True)
+            surplus[name][..., :3] = (stress[name] - reference[name])[..., :3].mean(axis=2, keepdims=True)
         self._add_beyond_nodal_mean(reference, surplus)
         return recovery.internal_force(mesh, kinematics, surplus)
 
@@ -88,10 +88,10 @@ class Comparison:
         for name in names:
             N, dN, weights = elements.get(name).tables
             corners = mesh.points[mesh.cells[name]]
-            part = cell_volumes(corners, N, dN, self._model.kinematics == "axisymmetric") * weights
-            volume[name] = part.sum(axis=1)
+            volumes = cell_volumes(corners, N, dN, self._model.kinematics == "axisymmetric") * weights
+            volume[name] = volumes.sum(axis=1)
             at_points = reference[name][..., :3].mean(axis=2)
-            pressure[name] = (at_points * part).sum(axis=1) / volume[name]
+            pressure[name] = (at_points * volumes).sum(axis=1) / volume[name]
         for number in np.unique(self._owner[self._suspicious]):
             whole, work = np.zeros((2, mesh.n_points))
             rows = {name: np.flatnonzero(self._owner[self._material[name]] == number) for name in names}
@@ -116,10 +116,10 @@ def excess_of_stiffness(problem: Problem, u: Array, comparison: Comparison) -> f
         return force
 
     energy = 0.5 * float(u @ (system.K @ u))
-    own = surplus(u)
-    lower = 0.5 * float(u @ own)
+    own_energy = surplus(u)
+    lower = 0.5 * float(u @ own_energy)
     zero, still = np.zeros(len(u)), np.zeros(len(u))
-    residual = system.reduced(own)
+    residual = system.reduced(own_energy)
     direction, before, kept = zero, 0.0, problem.solver.snapshot()
     for _ in range(ITERATIONS):
         step = problem.solver.load(residual).full_solution(zero)

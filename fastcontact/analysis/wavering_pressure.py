@@ -31,9 +31,9 @@ def wavering(pair: Formulation, contact: ContactResult) -> Iterator[str]:
     inside = contact.active & (beside @ ~contact.active == 0) & (others > 0)
     if inside.sum() < MANY:
         return
-    own = contact.pressure[inside]
-    apart = own - ((beside @ contact.pressure)[inside] - own) / others[inside]
-    size, mean = float(np.median(np.abs(apart))), float(own.mean())
+    pressure = contact.pressure[inside]
+    apart = pressure - ((beside @ contact.pressure)[inside] - pressure) / others[inside]
+    size, mean = float(np.median(np.abs(apart))), float(pressure.mean())
     if not size > WAVERING * mean > 0.0:
         return
     cells = f"quadrangles or hexahedra along '{pair.secondary.group}', or triangles or tetrahedra there about as deep as wide"

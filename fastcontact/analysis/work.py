@@ -121,9 +121,9 @@ class Work:
         """Return the work after a step more, from its elastic energy, plastic work and the works of `contact_work`."""
         friction, touching, imbalance = works
         more = self.friction + friction, self.touching + touching, self.imbalance + imbalance
-        found = Work(energy[0], *more, stored, plastic=energy[1], released=released)
-        terms = (self.largest, *energy, found.friction, abs(found.external))
-        return replace(found, largest=max(terms))
+        work = Work(energy[0], *more, stored, plastic=energy[1], released=released)
+        terms = (self.largest, *energy, work.friction, abs(work.external))
+        return replace(work, largest=max(terms))
 
     def told(self) -> dict[str, float]:
         """Return the reported quantities, see `StepResult.work`."""
@@ -136,7 +136,7 @@ class Work:
 
 
 def contact_work(
-    pair: Formulation, part: Constraints, solution: Solution, rows: slice, at: Configuration, contact: ContactResult,
+    pair: Formulation, constraints: Constraints, solution: Solution, rows: slice, at: Configuration, contact: ContactResult,
     before: ContactForces | None,
 ) -> tuple[ContactForces, tuple[float, float, float]]:  # fmt: skip
     """Return the contact forces of a pair at the end of a step, and friction, touching, imbalance of `Work` in it [energy].
@@ -144,7 +144,7 @@ def contact_work(
     Parameters
     ----------
     pair : Formulation
-    part : Constraints
+    constraints : Constraints
     solution : Solution
         Of all pairs; those of this one are its `rows`.
     rows : slice
@@ -155,16 +155,20 @@ def contact_work(
     before : ContactForces, optional
         At its beginning; None before the first step.
     """
-    normal, tangents = part.contact_forces(solution.multiplier[rows]), np.zeros((len(part), 0))
-    slip, directions = tangents, np.zeros((len(part), 0, contact.coordinates.shape[1]))
-    if isinstance(solution, FrictionalEquilibrium) and part.tangents:
-        tangents, slip, directions = solution.tangential[rows], solution.slip[rows], np.stack(part.directions, axis=1)
+    normal, tangents = constraints.contact_forces(solution.multiplier[rows]), np.zeros((len(constraints), 0))
+    slip, directions = tangents, np.zeros((len(constraints), 0, contact.coordinates.shape[1]))
+    if isinstance(solution, FrictionalEquilibrium) and constraints.tangents:
+        tangents, slip, directions = (
+            solution.tangential[rows],
+            solution.slip[rows],
+            np.stack(constraints.directions, axis=1),
+        )
     force, moved = (np.einsum("mk,mkd->md", values, directions) for values in (tangents, slip))
-    now = _forces(pair, part, normal, tangents, force, contact, _added(pair, at, contact))
+    now = _forces(pair, constraints, normal, tangents, force, contact, _added(pair, at, contact))
     before = before or _nothing(now)
-    areas = _areas(part)
-    pressure, traction = before.at(part.positions)
-    ratio = np.divide(pressure * areas, normal, out=np.zeros(len(part)), where=normal != 0.0)
+    areas = _areas(constraints)
+    pressure, traction = before.at(constraints.positions)
+    ratio = np.divide(pressure * areas, normal, out=np.zeros(len(constraints)), where=normal != 0.0)
     along, earlier = (-0.5 * np.einsum("md,md->m", own, moved) for own in (force, areas[:, None] * traction))
     friction = float(np.where(normal != 0.0, (1.0 + ratio) * along, np.maximum(earlier, 0.0)).sum())
     touching = float(along[pressure == 0.0].sum())
@@ -177,13 +181,17 @@ def contact_work(
     return now, (friction, touching, taken - (now.stored - before.stored) - sliding)
 
 
-def _areas(part: Constraints) -> Array:
+def _areas(constraints: Constraints) -> Array:
     """Return the areas (m,) of constraints, zero without one [area]."""
-    return np.zeros(len(part)) if part.areas is None else np.where(np.isfinite(part.areas), part.areas, 0.0)
+    return (
+        np.zeros(len(constraints))
+        if constraints.areas is None
+        else np.where(np.isfinite(constraints.areas), constraints.areas, 0.0)
+    )
 
 
 def _forces(
-    pair: Formulation, part: Constraints, normal: Array, tangents: Array, force: Array, contact: ContactResult,
+    pair: Formulation, constraints: Constraints, normal: Array, tangents: Array, force: Array, contact: ContactResult,
     added: Array,
 ) -> ContactForces:  # fmt: skip
     """Return the contact forces of normal forces (m,), tangential ones along tangents (m, k) and as vectors (m, dim).
@@ -191,32 +199,38 @@ def _forces(
     `added` (n_nodes,) are clearances [length].
     """
     size, dim = pair.points.size, contact.coordinates.shape[1]
-    rows = csr_array(diags_array(normal) @ part.B)[:, :size]
+    rows = csr_array(diags_array(normal) @ constraints.B)[:, :size]
     rows.eliminate_zeros()
     along = np.zeros(size)
-    for tangent, own in zip(part.tangents, tangents.T, strict=False):
+    for tangent, own in zip(constraints.tangents, tangents.T, strict=False):
         along += (tangent.T @ own)[:size]
     ours = rows.sum(axis=0).reshape(-1, dim)[pair.secondary.points]
     facing = np.where(np.isfinite(contact.normal), contact.normal, 0.0)
-    share = 1.0 / np.where(_areas(part) > 0.0, _areas(part), np.inf)
-    give = np.zeros(len(part)) if part.normal_compliance is None else part.normal_compliance.apply(normal)
-    if part.law is not None:  # what the energy of a spring would take
-        energy = 2.0 * _areas(part) * part.law.energy(normal * share)
+    share = 1.0 / np.where(_areas(constraints) > 0.0, _areas(constraints), np.inf)
+    give = (
+        np.zeros(len(constraints))
+        if constraints.normal_compliance is None
+        else constraints.normal_compliance.apply(normal)
+    )
+    if constraints.law is not None:  # what the energy of a spring would take
+        energy = 2.0 * _areas(constraints) * constraints.law.energy(normal * share)
         give = np.divide(energy, normal, out=np.zeros_like(normal), where=normal != 0.0)
     return ContactForces(
-        part.positions, normal * share, force * share[:, None], give * normal, (rows.data, rows.indices, rows.indptr),
-        along.reshape(-1, dim), np.einsum("nd,nd->n", ours, facing), added, _stored(part, normal, tangents, give),
+        constraints.positions, normal * share, force * share[:, None], give * normal, (rows.data, rows.indices, rows.indptr),
+        along.reshape(-1, dim), np.einsum("nd,nd->n", ours, facing), added, _stored(constraints, normal, tangents, give),
     )  # fmt: skip
 
 
-def _stored(part: Constraints, normal: Array, tangents: Array, give: Array) -> float:
+def _stored(constraints: Constraints, normal: Array, tangents: Array, give: Array) -> float:
     """Return the energy stored in penalties under normal forces (m,) and tangential forces (m, k)."""
     total = float(normal @ give)
-    if part.tangential_softness is not None:
-        total += float(part.tangential_softness @ (tangents**2).sum(axis=1))
-    if part.low_rank_compliance is not None:
+    if constraints.tangential_softness is not None:
+        total += float(constraints.tangential_softness @ (tangents**2).sum(axis=1))
+    if constraints.low_rank_compliance is not None:
         all_forces = np.column_stack([normal, tangents]).T
-        total += float((np.einsum("am,amh->h", all_forces, part.low_rank_compliance[: len(all_forces)]) ** 2).sum())
+        total += float(
+            (np.einsum("am,amh->h", all_forces, constraints.low_rank_compliance[: len(all_forces)]) ** 2).sum()
+        )
     return 0.5 * total
 
 

@@ -34,12 +34,12 @@ def array(name: str, values: ArrayLike) -> Array:
     if is_masked(values):
         raise ModelError(f"{name} {REFUSAL}")
     try:
-        found = np.asarray(values)
+        values_read = np.asarray(values)
     except ValueError:  # rows of several lengths
-        found = np.empty(0, object)
-    if found.dtype.kind not in "biuf":
+        values_read = np.empty(0, object)
+    if values_read.dtype.kind not in "biuf":
         raise ModelError(f"{name} must be a number or an array of real numbers, not {type(values).__name__}")
-    return found.astype(np.float64, copy=False)
+    return values_read.astype(np.float64, copy=False)
 
 
 def positive(name: str, value: object, *, infinite: bool = False) -> float:
@@ -72,8 +72,8 @@ def exactly_one(**given: float | None) -> tuple[str, float]:
     """Return name and value of the one argument that is not None; the value must be positive."""
     present = [name for name, value in given.items() if value is not None]
     if len(present) != 1:
-        found = " and ".join(present) if present else "none"
-        raise ModelError(f"give exactly one of {', '.join(given)}: got {found}")
+        present_names = " and ".join(present) if present else "none"
+        raise ModelError(f"give exactly one of {', '.join(given)}: got {present_names}")
     return present[0], positive(present[0], given[present[0]])
 
 

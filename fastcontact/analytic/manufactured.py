@@ -100,9 +100,9 @@ class HertzBox:
 
     def displacement(self, points: ArrayLike) -> Array:
         """Return the exact displacements (..., dim) [length] at `points` (..., dim) [length], zero at the origin."""
-        place, direction = self._in_plane(points)
-        u = self.hertz.displacement(*place) - self.hertz.displacement(0.0, 0.0)
-        along = np.where(place[0] == 0.0, 0.0, u[..., 0])  # the symmetry is exact
+        position, direction = self._in_plane(points)
+        u = self.hertz.displacement(*position) - self.hertz.displacement(0.0, 0.0)
+        along = np.where(position[0] == 0.0, 0.0, u[..., 0])  # the symmetry is exact
         return np.stack([*(along * cosine for cosine in direction), u[..., 1]], axis=-1)
 
     def stress(self, points: ArrayLike) -> Array:
@@ -110,8 +110,8 @@ class HertzBox:
 
         The order is xx, yy, zz, xy; in axisymmetry rr, yy, hoop, ry; in three dimensions xx, yy, zz, xy, yz, xz.
         """
-        place, direction = self._in_plane(points)
-        stress = self.hertz.stress(*place)
+        position, direction = self._in_plane(points)
+        stress = self.hertz.stress(*position)
         if self.dim == 2:
             return stress
         radial, vertical, hoop, shear = np.moveaxis(stress, -1, 0)

@@ -58,9 +58,9 @@ class FlatPunch:
         ratio = self.radius / np.maximum(np.abs(array("r", r)), self.radius)
         return -2.0 * self.approach / math.pi * np.arcsin(ratio)
 
-    def _frictionless(self, what: str) -> None:
+    def _frictionless(self, quantity: str) -> None:
         if self.bonded:
-            raise ModelError(f"a bonded flat punch has no closed form for its {what}: use bonded=False")
+            raise ModelError(f"a bonded flat punch has no closed form for its {quantity}: use bonded=False")
 
 
 @dataclass(frozen=True)

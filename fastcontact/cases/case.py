@@ -253,7 +253,7 @@ def _checks(
 
 
 def _sensitivities(model: Model, data: dict[str, Any]) -> list[tuple[Asked, list[Asked]]]:
-    found, entries = [], list(tables("sensitivity", data.get("sensitivity", [])))
+    asked_for, entries = [], list(tables("sensitivity", data.get("sensitivity", [])))
     if entries:
         from fastcontact.analysis.sensitivities import check_asked  # half of the solver
     for i, entry in enumerate(entries):
@@ -271,8 +271,8 @@ def _sensitivities(model: Model, data: dict[str, Any]) -> list[tuple[Asked, list
         quantity, *by = (tuple(row) for row in rows)
         with at(where):
             check_asked(model, quantity, by)
-        found.append((quantity, by))
-    return found
+        asked_for.append((quantity, by))
+    return asked_for
 
 
 def _mesh(folder: Path, data: dict[str, Any]) -> Mesh:
@@ -324,12 +324,12 @@ def _theories(
             raise CaseError(unknown("contact pair in 'theory'", pair, pairs))
         if not isinstance(entry, dict):
             raise CaseError(f"'theory.{pair}' must be a table of keys, kind first, not {entry!r:.80}")
-        own = {key: value for key, value in entry.items() if key not in ("mesh_converged", "share")}
-        theories[pair] = {"theory": _theory(f"theory.{pair}", own), "share": _share(f"theory.{pair}", entry)}
+        constants = {key: value for key, value in entry.items() if key not in ("mesh_converged", "share")}
+        theories[pair] = {"theory": _theory(f"theory.{pair}", constants), "share": _share(f"theory.{pair}", entry)}
         if "mesh_converged" in entry:
             theories[pair]["mesh_converged"] = _theory(f"theory.{pair}.mesh_converged", entry["mesh_converged"])
-        if "approach" in own:
-            approach[pair] = float(own["approach"])
+        if "approach" in constants:
+            approach[pair] = float(constants["approach"])
     return theories, approach
 
 

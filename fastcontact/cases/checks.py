@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fastcontact.analysis.contact_answers import contact_moment
+from fastcontact.analysis.contact_resultants import contact_moment
 from fastcontact.cases.keys import NUMBER
 from fastcontact.errors import CaseError, unknown
 from fastcontact.results.step import ContactResult, StepResult
@@ -85,10 +85,10 @@ class Check:
     @property
     def unit(self) -> str:
         """Kind of the number: ``"pressure"``, ``"force"``, ``"moment"`` or ``"length"``."""
-        what = self.quantity.split(".")[1]
-        if what in MOMENTS:
+        field = self.quantity.split(".")[1]
+        if field in MOMENTS:
             return "moment"
-        return "force" if what == "force" else "length" if what in LENGTHS else "pressure"
+        return "force" if field == "force" else "length" if field in LENGTHS else "pressure"
 
     def target(self, theory: Any) -> float:
         """Return the number to compare with; `theory` is that of the pair, or None for a documented value."""
@@ -119,13 +119,13 @@ def read_check(
             raise CaseError(f"{where} needs '{key}'")
     if ("theory" in entry) == ("value" in entry):
         raise CaseError(f"{where} needs either 'theory', the contact pair whose theory it is, or 'value'")
-    owner, _, what = entry["quantity"].partition(".")
+    owner, _, field = entry["quantity"].partition(".")
     if owner not in {**probes, **pairs}:
         raise CaseError(unknown(f"contact pair or probe in {where}.quantity", owner, [*probes, *pairs]))
-    _check_quantity(where, what, OF_PROBES if owner in probes else OF_PAIRS, kinematics)
-    if owner in pairs and what in NEEDED and NEEDED[what][0] not in pairs[owner]:
-        raise CaseError(f"{where}: '{owner}' has no {what}: {NEEDED[what][1]}")
-    of = what.split(".")[0] if owner in pairs else "pressure_max"
+    _check_quantity(where, field, OF_PROBES if owner in probes else OF_PAIRS, kinematics)
+    if owner in pairs and field in NEEDED and NEEDED[field][0] not in pairs[owner]:
+        raise CaseError(f"{where}: '{owner}' has no {field}: {NEEDED[field][1]}")
+    of = field.split(".")[0] if owner in pairs else "pressure_max"
     check = Check(
         name=entry.get("name", entry["quantity"]),
         quantity=entry["quantity"],
@@ -134,7 +134,7 @@ def read_check(
         of=entry.get("of", of),
         value=float(entry["value"]) if "value" in entry else None,
         source=entry.get("source", ""),
-        factor=float(entry.get("factor", _whole(what, theories.get(entry.get("theory", ""), {})))),
+        factor=float(entry.get("factor", _whole(field, theories.get(entry.get("theory", ""), {})))),
     )
     if not 0.0 < check.tolerance < math.inf:
         raise CaseError(
@@ -153,19 +153,19 @@ def read_check(
     return check
 
 
-def _check_quantity(where: str, what: str, allowed: Sequence[str], kinematics: str) -> None:
+def _check_quantity(where: str, field: str, allowed: Sequence[str], kinematics: str) -> None:
     """Raise CaseError for a quantity that is not there: in the plane along z, but stresses and moments; of circles."""
     if kinematics != "3d":
         allowed = [name for name in allowed if name not in ONLY_IN_SPACE]
     if kinematics == "axisymmetric":  # over the circle no moment is left, and no force along the radius
         allowed = [name for name in allowed if name not in ("moment.z", "force.x")]
-    if what not in allowed:
-        raise CaseError(unknown(f"quantity in {where}", what, allowed))
+    if field not in allowed:
+        raise CaseError(unknown(f"quantity in {where}", field, allowed))
 
 
-def _whole(what: str, theory: Mapping[str, Any]) -> float:
+def _whole(field: str, theory: Mapping[str, Any]) -> float:
     """Return the factor that makes the force of a part of a contact that of the whole, 1 for other quantities."""
-    return 1.0 / float(theory.get("share", 1.0)) if what.split(".")[0] == "force" else 1.0
+    return 1.0 / float(theory.get("share", 1.0)) if field.split(".")[0] == "force" else 1.0
 
 
 def check_target(where: str, check: Check, theory: Any) -> None:
@@ -186,16 +186,16 @@ def _is_number(theory: Any, name: str) -> bool:
 
 def measured(check: Check, step: StepResult, probes: Mapping[str, int]) -> float:
     """Return the number of a step that a check is about; NaN where there is none, such as the radius of no contact."""
-    owner, _, what = check.quantity.partition(".")
+    owner, _, field = check.quantity.partition(".")
     if owner in probes:
-        return check.factor * _of_probe(step, probes[owner], what)
-    if what == "heat":
+        return check.factor * _of_probe(step, probes[owner], field)
+    if field == "heat":
         return check.factor * float(step.heat.get("contacts", {}).get(owner, math.nan))
-    return check.factor * _of_pair(step.contact[owner], what)
+    return check.factor * _of_pair(step.contact[owner], field)
 
 
-def _of_pair(contact: ContactResult, what: str) -> float:
-    kind, _, axis = what.partition(".")
+def _of_pair(contact: ContactResult, field: str) -> float:
+    kind, _, axis = field.partition(".")
     if kind == "force":
         return float(contact.force[_AXES[axis]] if axis else np.linalg.norm(contact.force))
     if kind == "moment":
@@ -210,8 +210,8 @@ def _of_pair(contact: ContactResult, what: str) -> float:
     return 0.5 * (inside + outside) if math.isfinite(outside) else inside
 
 
-def _of_probe(step: StepResult, point: int, what: str) -> float:
-    kind, _, component = what.partition(".")
+def _of_probe(step: StepResult, point: int, field: str) -> float:
+    kind, _, component = field.partition(".")
     if kind == "stress":
         return float(step.stress[point][STRESS[component]])
     if kind == "displacement":
@@ -220,21 +220,21 @@ def _of_probe(step: StepResult, point: int, what: str) -> float:
         return float(step.von_mises[point])
     if kind == "temperature":
         return math.nan if step.temperature is None else float(step.temperature[point])
-    found = at_point(step, point)
-    if found is None:
+    at_surface = at_point(step, point)
+    if at_surface is None:
         return float("nan")
-    contact, row = found
+    contact, row = at_surface
     return float(contact.pressure[row]) if kind == "pressure" else float(np.linalg.norm(contact.shear[row]))
 
 
 def at_point(step: StepResult, point: int) -> tuple[ContactResult, int] | None:
     """Return the contact whose secondary side has a point, the last one of several, and its row there."""
-    found = None
+    contact_row = None
     for contact in step.contact.values():
         rows = np.flatnonzero(contact.points == point)
         if len(rows):
-            found = contact, int(rows[0])
-    return found
+            contact_row = contact, int(rows[0])
+    return contact_row
 
 
 def evaluated(check: Check, step: StepResult, probes: Mapping[str, int], theories: Mapping[str, Any]) -> dict[str, Any]:
@@ -243,10 +243,10 @@ def evaluated(check: Check, step: StepResult, probes: Mapping[str, int], theorie
     Where the theory has a mesh-converged solution beside it, also how far from that the value lies, and that from the
     theory.
     """
-    own = theories[check.theory] if check.theory else {}
-    value, target = measured(check, step, probes), check.target(own.get("theory"))
-    found = own.get("mesh_converged")
-    converged = check.target(found) if found is not None and hasattr(found, check.of) else None
+    theory = theories[check.theory] if check.theory else {}
+    value, target = measured(check, step, probes), check.target(theory.get("theory"))
+    limit = theory.get("mesh_converged")
+    converged = check.target(limit) if limit is not None and hasattr(limit, check.of) else None
     return {
         "name": check.name,
         "quantity": check.quantity,

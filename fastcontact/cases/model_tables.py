@@ -88,7 +88,7 @@ def _check_material(where: str, entry: dict[str, Any]) -> None:
     law = _material_law(entry)
     for key in entry:
         if key not in ("groups", "law") and key not in inspect.signature(law).parameters:
-            raise CaseError(f"the key '{where}.{key}' is none of a material that is {_LAWS[law]}")
+            raise CaseError(f"the key '{where}.{key}' does not belong to a material that is {_LAWS[law]}")
 
 
 # Nonlinear laws by their names in case files.
@@ -179,7 +179,7 @@ def _toml_types(annotation: Any) -> tuple[type, ...]:
     """Return the types of values in a case file that an annotated argument takes; a table stands for a function."""
     kind, members = typing.get_origin(annotation) or annotation, typing.get_args(annotation)
     if kind in (typing.Union, types.UnionType):
-        return tuple(dict.fromkeys(found for member in members for found in _toml_types(member)))
+        return tuple(dict.fromkeys(type_of_member for member in members for type_of_member in _toml_types(member)))
     if kind in (bool, int, str):
         return (kind,)
     return _TOML.get(kind, ())
@@ -274,26 +274,26 @@ def _from_files(where: str, entry: dict[str, Any], mesh: Mesh, folder: Path) -> 
             raise CaseError(f"'{name}' needs 'field', its name in the file")
         return read_field(mesh, groups=entry.get("groups"), **_found(folder, value))
 
-    found = dict(entry)
+    values = dict(entry)
     for key in CONSTANTS:
         value = entry.get(key)
         if isinstance(value, list):
-            found[key] = [read(f"{where}.{key}[{i}]", member) for i, member in enumerate(value)]
+            values[key] = [read(f"{where}.{key}[{i}]", member) for i, member in enumerate(value)]
         elif value is not None:
-            found[key] = read(f"{where}.{key}", value)
-    return found
+            values[key] = read(f"{where}.{key}", value)
+    return values
 
 
 def _placed(where: str, entry: dict[str, Any]) -> dict[str, Any]:
     """Return an entry with functions in place of the tables of values that depend on the position."""
-    found = dict(entry)
+    values = dict(entry)
     for key in VALUES:
         value = entry.get(key)
         if isinstance(value, list):
-            found[key] = [_function(f"{where}.{key}[{i}]", member) for i, member in enumerate(value)]
+            values[key] = [_function(f"{where}.{key}[{i}]", member) for i, member in enumerate(value)]
         elif key in entry:
-            found[key] = _function(f"{where}.{key}", value)
-    return found
+            values[key] = _function(f"{where}.{key}", value)
+    return values
 
 
 def _found(folder: Path, entry: dict[str, Any]) -> dict[str, Any]:

@@ -19,10 +19,10 @@ def shipped_cases() -> dict[str, Path]:
 
 def shipped_case(name: str) -> Path:
     """Return the case file of a ready case; raises CaseError if there is none, with the nearest names."""
-    found = shipped_cases()
-    if name not in found:
-        raise CaseError(unknown("ready case", name, found))
-    return found[name]
+    cases = shipped_cases()
+    if name not in cases:
+        raise CaseError(unknown("ready case", name, cases))
+    return cases[name]
 
 
 def case_path(given: str | Path) -> Path:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fastcontact._version import __version__
-from fastcontact.analysis.contact_answers import contact_answers
+from fastcontact.analysis.contact_resultants import contact_resultants
 from fastcontact.cases.case import Asked, Case
 from fastcontact.cases.checks import at_point, evaluated
 from fastcontact.errors import ModelError
@@ -27,8 +27,8 @@ COMPARED = ("force", "pressure_max", "radius")
 def versions() -> dict[str, str]:
     """Return the versions of fastcontact, Python and the libraries it uses."""
     libraries = ("numpy", "scipy", "numba", "pyamg", "meshio", "h5py")
-    found = {"fastcontact": __version__, "python": platform.python_version()}
-    return {**found, **{name: metadata.version(name) for name in libraries}}
+    versions_used = {"fastcontact": __version__, "python": platform.python_version()}
+    return {**versions_used, **{name: metadata.version(name) for name in libraries}}
 
 
 def summarise(
@@ -37,11 +37,11 @@ def summarise(
     steps: Sequence[Mapping[str, Any]],
     timings: Mapping[str, float],
     warnings: Sequence[str],
-    found: Modes | None = None,
+    modes: Modes | None = None,
 ) -> dict[str, Any]:
     """Return the summary of a run, given its last step and `of_step` of all: numbers, strings, lists and dictionaries.
 
-    `found` are its modes, where they were asked for.
+    `modes` are its modes, where they were asked for.
     """
     mesh = case.mesh
     top = int(np.argmax(last.von_mises))
@@ -54,7 +54,7 @@ def summarise(
         "n_dofs": case.model.n_dofs,
         "steps": list(steps),
         "contact": {
-            name: {**_contact(contact, penalties.get(name)), **_answers(case, last, name, steps)}
+            name: {**_contact(contact, penalties.get(name)), **_resultants(case, last, name, steps)}
             for name, contact in last.contact.items()
         },
         "probes": {name: _probe(last, point) for name, point in case.probes.items()},
@@ -68,7 +68,7 @@ def summarise(
         },
         "sensitivities": [_sensitivity(case, last, *asked) for asked in case.sensitivities],
         "regularised": last.iterations.get("regularised"),
-        **({} if found is None else {"modes": _modes(found)}),
+        **({} if modes is None else {"modes": _modes(modes)}),
         "checks": [evaluated(check, last, case.probes, case.theories) for check in case.checks],
         "timings": dict(timings),
         "versions": versions(),
@@ -81,33 +81,33 @@ def _sensitivity(case: Case, last: StepResult, quantity: Asked, by: Sequence[Ask
     from fastcontact.analysis.sensitivities import sensitivities
 
     try:
-        found = sensitivities(
+        result = sensitivities(
             case.model, last, quantity, by, ramp=case.ramp, criteria=case.criteria, linear_solver=case.linear_solver
         )
     except ModelError as error:
         return {"quantity": list(quantity), "refused": str(error)}
-    derivatives = [{"by": list(parameter), "value": value} for parameter, value in found.derivatives.items()]
-    return {"quantity": list(quantity), "value": found.value, "margin": found.margin, "derivatives": derivatives}
+    derivatives = [{"by": list(parameter), "value": value} for parameter, value in result.derivatives.items()]
+    return {"quantity": list(quantity), "value": result.value, "margin": result.margin, "derivatives": derivatives}
 
 
-def _modes(found: Modes) -> dict[str, Any]:
-    return {"frequencies": found.frequencies.tolist(), "effective_mass": found.effective_mass.tolist()}
+def _modes(modes: Modes) -> dict[str, Any]:
+    return {"frequencies": modes.frequencies.tolist(), "effective_mass": modes.effective_mass.tolist()}
 
 
 def of_step(step: StepResult) -> dict[str, Any]:
     """Return the entry of a step in the summary: its load factor and the counts of its solution."""
     counts = ("geometry_updates", "active_set_iterations", "linear_iterations")
-    found = {"load_factor": step.load_factor, **{name: step.iterations[name] for name in counts}}
+    summary = {"load_factor": step.load_factor, **{name: step.iterations[name] for name in counts}}
     if "substeps" in step.iterations:
-        found["substeps"] = step.iterations["substeps"]
+        summary["substeps"] = step.iterations["substeps"]
     worked = {name: contact.dissipation for name, contact in step.contact.items() if contact.dissipation}
     if worked:
-        found["dissipation"] = worked
+        summary["dissipation"] = worked
     if step.work:
-        found["work"] = step.work
+        summary["work"] = step.work
     if step.pretension:
-        found["pretension"] = step.pretension
-    return found
+        summary["pretension"] = step.pretension
+    return summary
 
 
 def _contact(contact: ContactResult, penalty: float | None) -> dict[str, Any]:
@@ -128,16 +128,16 @@ def _contact(contact: ContactResult, penalty: float | None) -> dict[str, Any]:
     }
 
 
-def _answers(case: Case, last: StepResult, name: str, steps: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return what `contact_answers` tell of the last step, with the work of friction of all `steps`."""
-    (found,) = contact_answers(case.model, [last], name)
+def _resultants(case: Case, last: StepResult, name: str, steps: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return what `contact_resultants` tell of the last step, with the work of friction of all `steps`."""
+    (resultants,) = contact_resultants(case.model, [last], name)
     return {
-        "normal_force": found.normal_force,
-        "moment": found.moment.tolist(),
-        "area": found.area,
-        "centre": [_finite(value) for value in found.centre],
-        "mean_gap": _finite(found.mean_gap),
-        "pressure_mean": found.pressure_mean,
+        "normal_force": resultants.normal_force,
+        "moment": resultants.moment.tolist(),
+        "area": resultants.area,
+        "centre": [_finite(value) for value in resultants.centre],
+        "mean_gap": _finite(resultants.mean_gap),
+        "pressure_mean": resultants.pressure_mean,
         "friction_work": sum(step.get("dissipation", {}).get(name, 0.0) for step in steps),
     }
 
@@ -168,8 +168,8 @@ def _probe(step: StepResult, point: int) -> dict[str, Any]:
 
 def _by_material(step: StepResult, point: int) -> dict[str, list[float]]:
     """Return the stress of each side at a point where materials meet, by number of the material; else empty."""
-    found = step.material_stress.at(point) if step.material_stress is not None else {}
-    return {str(number): stress.tolist() for number, stress in found.items()}
+    values = step.material_stress.at(point) if step.material_stress is not None else {}
+    return {str(number): stress.tolist() for number, stress in values.items()}
 
 
 def _against_theory(
@@ -196,49 +196,49 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
     """Return the summary as lines for a person: contact, maximum of von Mises, theory, checks."""
     unit = summary["units"]
     steps = summary["steps"]
-    found = [
+    rows = [
         f"{summary['title']}",
         f"  {summary['mesh']['n_points']} points, {summary['n_dofs']} degrees of freedom, {count(len(steps), 'load step')}, "
         f"{sum(s['active_set_iterations'] for s in steps)} active-set iterations, "
         f"{sum(s['geometry_updates'] for s in steps)} geometry updates",
     ]
     if parts := [len(s["substeps"]) for s in steps if "substeps" in s]:
-        found.append(f"  {count(len(parts), 'load step')} did not converge as a whole and went in {sum(parts)} parts")
+        rows.append(f"  {count(len(parts), 'load step')} did not converge as a whole and went in {sum(parts)} parts")
     for name, contact in summary["contact"].items():
-        found += _contact_lines(name, contact, unit)
+        rows += _contact_lines(name, contact, unit)
     for name, section in steps[-1].get("pretension", {}).items():
-        found.append(
+        rows.append(
             f"  pretension '{name}': force {valued(section['force'], unit, 'force', 6)}, shortened by "
             + valued(section["shortening"], unit, "length", 6)
         )
     top = summary["von_mises_max"]
     where = ", ".join(f"{x:.4g}" for x in top["at"])
     largest = valued(top["value"], unit, "pressure", 6)
-    found.append(f"  largest von Mises stress {largest} at {with_unit(f'({where})', unit, 'length')}")
+    rows.append(f"  largest von Mises stress {largest} at {with_unit(f'({where})', unit, 'length')}")
     for name, (low, high) in summary.get("cell_fields", {}).items():
-        found.append(f"  {name.replace('_', ' ')} of cells from {low:.4g} to {high:.4g}")
+        rows.append(f"  {name.replace('_', ' ')} of cells from {low:.4g} to {high:.4g}")
     if heat := summary.get("heat"):
         powers = ", ".join(f"{name} {heat[name]:.4g}" for name in ("supports", "loads", "films", "friction"))
         crossing = "".join(f"; across '{name}' {power:.6g}" for name, power in heat["contacts"].items())
         low, high = heat["temperature"]
-        found.append(f"  temperatures from {low:.6g} to {high:.6g}; heat into the bodies by {powers}{crossing}")
+        rows.append(f"  temperatures from {low:.6g} to {high:.6g}; heat into the bodies by {powers}{crossing}")
     if summary["regularised"]:
-        found.append(_regularised_line(summary["regularised"], unit))
+        rows.append(_regularised_line(summary["regularised"], unit))
     for name, theory in summary["theory"].items():
-        found += _theory_lines(name, theory)
+        rows += _theory_lines(name, theory)
     for found_here in summary["sensitivities"]:
-        found += _sensitivity_lines(found_here)
+        rows += _sensitivity_lines(found_here)
     if "modes" in summary:
         shown = ", ".join(f"{frequency:.6g}" for frequency in summary["modes"]["frequencies"])
-        found.append(f"  frequencies about the last step: {shown}")
+        rows.append(f"  frequencies about the last step: {shown}")
     for check in summary["checks"]:
-        found += [_check_line(check, unit), *_why(check)]
-    return found
+        rows += [_check_line(check, unit), *_why(check)]
+    return rows
 
 
-def count(number: int, what: str) -> str:
+def count(number: int, noun: str) -> str:
     """Return a number of things in words: "1 load step", "2 load steps"."""
-    return f"{number} {what}" + "s" * (number != 1)
+    return f"{number} {noun}" + "s" * (number != 1)
 
 
 def _contact_lines(name: str, contact: Mapping[str, Any], unit: Mapping[str, str]) -> list[str]:
@@ -246,26 +246,26 @@ def _contact_lines(name: str, contact: Mapping[str, Any], unit: Mapping[str, str
     force = valued(contact["force"], unit, "force", 6)
     if contact["force"] < CANCELLED * contact["normal_force"]:
         force += f", normal {valued(contact['normal_force'], unit, 'force', 6)} all round"
-    found = [
+    rows = [
         f"  contact '{name}' ({contact['formulation'].replace('_', '-')}): force {force}, largest pressure "
         f"{valued(contact['pressure_max'], unit, 'pressure', 6)}, {_edge(inside, outside, unit)}"
     ]
     if any(contact["obstacle_displacement"] or ()):
         moved = ", ".join(f"{value:.6g}" for value in contact["obstacle_displacement"])
-        found.append(f"  obstacle '{name}' stands {with_unit(f'({moved})', unit, 'length')} from its place at rest")
+        rows.append(f"  obstacle '{name}' stands {with_unit(f'({moved})', unit, 'length')} from its place at rest")
     if "torque" in contact:
-        found.append(
+        rows.append(
             f"  obstacle '{name}' has turned by {contact['obstacle_angle']:.6g} radian, with a torque of "
             + valued(contact["torque"], unit, "moment", 6)
         )
     if "wear_max" in contact:
-        found.append(f"  contact '{name}' is worn by up to {valued(contact['wear_max'], unit, 'length')}")
+        rows.append(f"  contact '{name}' is worn by up to {valued(contact['wear_max'], unit, 'length')}")
     if contact["penalty"] is not None:
-        found.append(
+        rows.append(
             f"  contact '{name}' penetrates by up to {valued(contact['penetration'], unit, 'length')}, with a penalty of "
             + (valued(soft, unit, "penalty") if isinstance(soft := contact["penalty"], float) else "its table")
         )
-    return found
+    return rows
 
 
 def _edge(inside: float | None, outside: float | None, unit: Mapping[str, str]) -> str:
@@ -305,16 +305,16 @@ def _sensitivity_lines(told: Mapping[str, Any]) -> list[str]:
     quantity = " ".join(map(str, told["quantity"]))
     if "refused" in told:
         return [f"  no sensitivities of {quantity}: {told['refused']}"]
-    changes = ", ".join(f"{' '.join(map(str, own['by']))} {own['value']:.6g}" for own in told["derivatives"])
+    changes = ", ".join(f"{' '.join(map(str, d['by']))} {d['value']:.6g}" for d in told["derivatives"])
     return [f"  sensitivities of {quantity}, now {told['value']:.6g}: by {changes}"]
 
 
 def _check_line(check: Mapping[str, Any], unit: Mapping[str, str]) -> str:
     verdict = "within" if check["passed"] else "NOT within"
     owner = "the theory's" if check["of"] else "the documented"
-    found = valued(check["value"], unit, check["unit"], 6)
+    measured = valued(check["value"], unit, check["unit"], 6)
     text = (
-        f"  check {check['name']}: {found} is {abs(check['deviation']):.3%} from {owner} "
+        f"  check {check['name']}: {measured} is {abs(check['deviation']):.3%} from {owner} "
         f"{check['target']:.6g}, {verdict} {check['tolerance']:.3g}"
     )
     if check["distance_to_mesh_converged"] is not None:

@@ -60,11 +60,11 @@ class Parser(argparse.ArgumentParser):
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Refuse a flag that this command does not know, and offer the nearest; argparse would ask the parser above."""
-        found, rest = super().parse_known_args(args, namespace)
+        options, rest = super().parse_known_args(args, namespace)
         for flag in (text.partition("=")[0] for text in rest if _FLAG.match(text)):
             known = [*_FLAG.findall(self.format_usage()), "--help"]
             self.error(unknown("option", flag, known))
-        return found, rest
+        return options, rest
 
 
 class PrintVersion(argparse.Action):

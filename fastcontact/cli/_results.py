@@ -84,17 +84,17 @@ def pressure_curves(
     """
     theory: Any = theories.get("theory")
     theory = theory if pressure_curve(theory) is not None else getattr(theory, "hertz", None)
-    own = pressure_curve(theory)
-    if own is None:
+    curve = pressure_curve(theory)
+    if curve is None:
         return {}
-    found: dict[str, Any] = {}
+    curves: dict[str, Any] = {}
     if approach is None and not hasattr(theory, "at_force"):
-        found[own.name] = theory
+        curves[curve.name] = theory
     elif approach is not None and load == 1.0:
-        found[f"{own.name}, equal approach"] = theory
+        curves[f"{curve.name}, equal approach"] = theory
     elif approach is not None and load > 0 and hasattr(theory, "at_approach"):
-        found[f"{own.name}, equal approach"] = theory.at_approach(approach * load)
-    return {**found, **at_equal_force(f"{own.name}, equal force", theory, contact, theories["share"])}
+        curves[f"{curve.name}, equal approach"] = theory.at_approach(approach * load)
+    return {**curves, **at_equal_force(f"{curve.name}, equal force", theory, contact, theories["share"])}
 
 
 def drawn(theory: Any) -> PressureCurve:

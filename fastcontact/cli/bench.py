@@ -63,8 +63,8 @@ def run(options: argparse.Namespace) -> int:
         for size in sizes:
             if show:
                 say(f"{name} {size} ...", error=True)
-            found = timing.measured(subject, size, 1 if options.smallest else 3)
-            results.setdefault(name, []).append(found)
+            measured = timing.measured(subject, size, 1 if options.smallest else 3)
+            results.setdefault(name, []).append(measured)
     if results and not options.quiet:
         say("\n".join(table.lines(results, before)))
     if options.json:
@@ -81,10 +81,10 @@ def _table(subject: Any, name: str, options: argparse.Namespace, show: bool) -> 
         if show:
             say(f"{name} {text} ...", error=True)
 
-    found: list[dict[str, Any]] = subject.entries(options.smallest, tell, options.sizes)
+    rows: list[dict[str, Any]] = subject.entries(options.smallest, tell, options.sizes)
     if not options.quiet:
-        say("\n".join(subject.lines(found)))
-    return found
+        say("\n".join(subject.lines(rows)))
+    return rows
 
 
 def _contact(options: argparse.Namespace) -> int:
@@ -92,11 +92,11 @@ def _contact(options: argparse.Namespace) -> int:
         raise FastcontactError("--problem and --dofs go together, with the benchmark 'contact' alone")
     given = {"solver": options.linear, "tolerance": options.tolerance}
     chosen = {key: value for key, value in given.items() if value is not None}
-    found = suite("subjects").load("contact").detailed(options.problem, options.dofs, **chosen)
+    result = suite("subjects").load("contact").detailed(options.problem, options.dofs, **chosen)
     if not options.quiet:
-        say(json.dumps(found, indent=1))
+        say(json.dumps(result, indent=1))
     if options.json:
-        write_json(options.json, found, indent=1)
+        write_json(options.json, result, indent=1)
     return 0
 
 

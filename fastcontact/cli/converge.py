@@ -75,7 +75,7 @@ def _adaptive(options: argparse.Namespace) -> int:
 
 
 def _only(text: str | None, what: str) -> str | None:
-    found = _study.names(text) or []
-    if len(found) > 1:
-        raise CaseError(f"adaptive meshes take one {what}, not {len(found)}: {text}")
-    return found[0] if found else None
+    names = _study.names(text) or []
+    if len(names) > 1:
+        raise CaseError(f"adaptive meshes take one {what}, not {len(names)}: {text}")
+    return names[0] if names else None

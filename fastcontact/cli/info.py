@@ -64,10 +64,10 @@ def _contacts(options: argparse.Namespace) -> int:
     case = _is_case(Path(options.file))
     check_outputs(files_of_case(options.file) if case else [options.file], [], [options.png])
     mesh = read_case(options.file).mesh if case else _mesh_of(options.file)
-    found = find_contacts(mesh, distance=options.distance, angle=options.angle)
-    say(str(found))
+    contacts = find_contacts(mesh, distance=options.distance, angle=options.angle)
+    say(str(contacts))
     if options.png:
-        save(plot.contacts(found), options.png)
+        save(plot.contacts(contacts), options.png)
         say(f"wrote {options.png}")
     return 0
 
@@ -99,45 +99,45 @@ def _is_deck(path: Path) -> bool:
 
 
 def _deck_lines(deck: Any) -> list[str]:
-    found = [
+    rows = [
         f"{deck.path}: {deck.title}",
         repr(deck.model),
         f"load factors: {', '.join(f'{t:g}' for t in deck.ramp.instants)}",
     ]
-    return found + [f"  note: {text}" for text in deck.notes]
+    return rows + [f"  note: {text}" for text in deck.notes]
 
 
 def _mesh_lines(mesh: Any) -> list[str]:
     cells = ", ".join(f"{len(block)} {name}" for name, block in mesh.cells.items())
-    found = [f"{mesh.n_points} points in {mesh.dim}D; cells: {cells}"]
-    found += [f"  cells  {name:<16} {len(members):>8}" for name, members in mesh.cell_groups.items()]
-    found += [f"  points {name:<16} {len(members):>8}" for name, members in mesh.point_groups.items()]
-    return found
+    rows = [f"{mesh.n_points} points in {mesh.dim}D; cells: {cells}"]
+    rows += [f"  cells  {name:<16} {len(members):>8}" for name, members in mesh.cell_groups.items()]
+    rows += [f"  points {name:<16} {len(members):>8}" for name, members in mesh.point_groups.items()]
+    return rows
 
 
 def _result_lines(results: Any) -> list[str]:
-    found = [f"{len(results)} steps, {results.kinematics}; versions: "]
-    found[0] += ", ".join(f"{name} {version}" for name, version in results.versions.items())
+    rows = [f"{len(results)} steps, {results.kinematics}; versions: "]
+    rows[0] += ", ".join(f"{name} {version}" for name, version in results.versions.items())
     if results.error:
-        found.append(f"  stopped: {results.error}")
+        rows.append(f"  stopped: {results.error}")
     elif not results.complete:
-        found.append("  incomplete: the run was killed, or goes on")
+        rows.append("  incomplete: the run was killed, or goes on")
     for step in results:
         closed = ", ".join(f"{name}: {int(c.active.sum())} nodes closed" for name, c in step.contact.items())
         counts = step.iterations
-        found.append(
+        rows.append(
             f"  step {step.index:>3}  load factor {step.load_factor:<8.5g} geometry updates "
             f"{counts.get('geometry_updates', 0):>3}  active-set iterations "
             f"{counts.get('active_set_iterations', 0):>3}  linear {counts.get('linear_iterations', 0):>4}  {closed}"
         )
         if "substeps" in counts:
             ends = ", ".join(f"{end:.6g}" for end in counts["substeps"])
-            found.append(f"    did not converge whole, went in parts up to {ends}")
-        found += [f"    warning: {text}" for text in step.warnings]
+            rows.append(f"    did not converge whole, went in parts up to {ends}")
+        rows += [f"    warning: {text}" for text in step.warnings]
     meet = results[-1].material_stress if len(results) else None
     if meet is not None:
-        found.append(
+        rows.append(
             f"  materials meet at {len(set(meet.points.tolist()))} nodes: stress there is that of the side with the largest "
             "von Mises stress, material_stress has each side's"
         )
-    return found
+    return rows

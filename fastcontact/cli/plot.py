@@ -19,18 +19,18 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
     _results.arguments(parser)
     parser.add_argument("--png", metavar="FILE", help="picture to write")
-    what = parser.add_mutually_exclusive_group()
-    what.add_argument("--history", action="store_true", help="force and contact radius over the load instead")
-    what.add_argument("--axis", action="store_true", help="stresses along the axis under the contact, against theory")
-    what.add_argument(
+    kinds = parser.add_mutually_exclusive_group()
+    kinds.add_argument("--history", action="store_true", help="force and contact radius over the load instead")
+    kinds.add_argument("--axis", action="store_true", help="stresses along the axis under the contact, against theory")
+    kinds.add_argument(
         "--zones", action="store_true", help="where the contact is open, closed and slides, over the load"
     )
-    what.add_argument(
+    kinds.add_argument(
         "--map", action="store_true", help="pressure and shear (or --field contact_slip) over the contact (3D)"
     )
-    what.add_argument("--section", metavar="PLANE", help="a section, such as y=0 or x=12.5 (3D)")
-    what.add_argument("--animate", metavar="FILE", help="a moving picture over the load: .gif, with ffmpeg .mp4")
-    what.add_argument("--view", action="store_true", help="an interactive window (PyVista) instead of a picture")
+    kinds.add_argument("--section", metavar="PLANE", help="a section, such as y=0 or x=12.5 (3D)")
+    kinds.add_argument("--animate", metavar="FILE", help="a moving picture over the load: .gif, with ffmpeg .mp4")
+    kinds.add_argument("--view", action="store_true", help="an interactive window (PyVista) instead of a picture")
     parser.add_argument(
         "--field", metavar="NAME", default="von_mises",
         help="what colours the mesh: von_mises (default), stress.xx, stress.principal_min, displacement.y, contact_slip ...",

@@ -70,13 +70,13 @@ def _write_agr(path: str, case: dict[str, Any], contact: Any, step: Any, theorie
     from fastcontact.results.xmgrace import Curve, write_agr
 
     order = np.argsort(contact.place, kind="stable")
-    place = contact.place[order]
+    position = contact.place[order]
     style = "line+symbols" if contact.coordinates.shape[1] == 2 else "symbols"
-    curves = [Curve(place, contact.pressure[order], "computed", style=style)]
+    curves = [Curve(position, contact.pressure[order], "computed", style=style)]
     for label, theory in theories.items():
         curve = drawn(theory)
-        end = min(curve.radius, float(np.abs(place).max()))
-        x = np.unique(np.concatenate([place[[0, -1]], np.linspace(max(-end, min(place[0], 0.0)), end, 200)]))
+        end = min(curve.radius, float(np.abs(position).max()))
+        x = np.unique(np.concatenate([position[[0, -1]], np.linspace(max(-end, min(position[0], 0.0)), end, 200)]))
         curves.append(Curve(x, curve.pressure(np.abs(x)), label))
     start = "axis" if contact.measured_from_axis else "middle of the contact"
     write_agr(

@@ -68,9 +68,9 @@ def run(options: argparse.Namespace) -> int:
         caught += early
         done, last, steps = _solved(options, case, output)
     texts = list(dict.fromkeys([*done.warnings, *caught]))
-    found = _modes(options, case, last)
+    computed = _modes(options, case, last)
     timings = {"read": read - started, "solve": time.perf_counter() - read, "cpu": time.process_time()}
-    numbers = summary.summarise(case, last, steps, timings, texts, found)
+    numbers = summary.summarise(case, last, steps, timings, texts, computed)
     if options.json:
         write_json(options.json, numbers)
     if options.plot:
@@ -96,12 +96,12 @@ def _modes(options: argparse.Namespace, case: Case, last: StepResult) -> Any:
     from fastcontact.analysis.modes import modes
     from fastcontact.results.writer import ResultWriter
 
-    found = modes(case.model, last, **{"linear_solver": options.linear or case.linear_solver, **(case.modes or {})})
+    computed = modes(case.model, last, **{"linear_solver": options.linear or case.linear_solver, **(case.modes or {})})
     if options.modes:
         with ResultWriter(options.modes, case.model, case_text=case.text) as writer:
-            for mode in found:
+            for mode in computed:
                 writer.write(mode)
-    return found
+    return computed
 
 
 class _Done(NamedTuple):

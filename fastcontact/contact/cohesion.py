@@ -2,7 +2,7 @@
 
 Traction is ``(1 - damage) stiffness`` times the opening and the sliding of the sides (Camanho and Davila,
 NASA/TM-2002-211737, with the mixed-mode limits of Turon, Camanho, Costa and Davila, 2006). Damage grows so that the traction
-falls linearly with the largest separation; unloading follows the secant. What is pressed together gives way by the full
+falls linearly with the largest separation; unloading follows the secant. What is pressed together has the full
 stiffness.
 """
 

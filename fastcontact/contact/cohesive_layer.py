@@ -1,4 +1,4 @@
-"""A cohesive layer between the sides of a contact pair: equations that give way by lines of its law.
+"""A cohesive layer between the sides of a contact pair: equations whose compliance follows its law.
 
 In each pairing the traction is a line: through zero where the layer has not been stretched as far before, and level where it
 falls. Matrices so stay positive definite, and pairings approach every state that is stable under prescribed displacements.
@@ -52,9 +52,9 @@ class Layer:
         normal, *along = multiplier.reshape(-1, len(self.damage))
         return normal, np.stack(along, axis=1) if along else np.zeros((len(normal), 0))
 
-    def after(self, part: Constraints, u: Array) -> Bond:
+    def after(self, constraints: Constraints, u: Array) -> Bond:
         """Return the layer at the end of a step with displacements u (n_dofs,) [length]."""
-        end = (part.gap0 + part.B @ u).reshape(self.rest.shape) + self.rest
+        end = (constraints.gap0 + constraints.B @ u).reshape(self.rest.shape) + self.rest
         opening, *slides = np.where(
             self.damage < 1.0, end, self.separation
         )  # what is broken has no rows along the sides
@@ -70,27 +70,27 @@ class Layer:
         )
 
 
-def bonded(law: CohesiveLaw, part: Constraints, at: Configuration, lying: Array) -> Constraints:
-    """Return constraints `part`, with tangents, as a cohesive layer: equations that give way by lines of its law.
+def bonded(law: CohesiveLaw, constraints: Constraints, at: Configuration, lying: Array) -> Constraints:
+    """Return constraints `constraints`, with tangents, as a cohesive layer: equations whose compliance follows its law.
 
     `lying` (m,) are the gaps of the bodies as they lie [length]: cohesive layers have no traction there, adhesion acts across
-    them. What is broken may close again, and gives way by the full stiffness then.
+    them. What is broken may close again, with the full stiffness then.
     """
-    assert part.areas is not None
-    m, u, start = len(part), at.displacement.ravel(), at.start.ravel()
+    assert constraints.areas is not None
+    m, u, start = len(constraints), at.displacement.ravel(), at.start.ravel()
     none = np.zeros(m)
     before = at.bond
     if before is None:
         begun = law.damage(lying, none, none) if law.reversible else none
-        before = Bond(part.positions, np.zeros_like(part.positions), begun)
+        before = Bond(constraints.positions, np.zeros_like(constraints.positions), begun)
     lying = none if law.reversible else lying
-    sliding, damage = before.at(part.positions)
-    before = Bond(part.positions, sliding, damage, before.released)
-    drifts = np.zeros((len(part.tangents), m)) if part.drift is None else part.drift
-    known = zip(part.tangents, part.directions, drifts, strict=True)
-    along = [drift + np.einsum("md,md->m", t, sliding) - T @ start for T, t, drift in known]
-    slides = [rest + T @ u for T, rest in zip(part.tangents, along, strict=True)]
-    opening = part.gaps(at.displacement) - lying
+    sliding, damage = before.at(constraints.positions)
+    before = Bond(constraints.positions, sliding, damage, before.released)
+    slips0 = np.zeros((len(constraints.tangents), m)) if constraints.slip0 is None else constraints.slip0
+    known = zip(constraints.tangents, constraints.directions, slips0, strict=True)
+    along = [slip0 + np.einsum("md,md->m", t, sliding) - T @ start for T, t, slip0 in known]
+    slides = [rest + T @ u for T, rest in zip(constraints.tangents, along, strict=True)]
+    opening = constraints.gaps(at.displacement) - lying
     damage = law.damage(opening, np.sqrt(sum((s**2 for s in slides), none)), damage)
     if at.bond is not None and np.array_equal(
         u, start
@@ -101,16 +101,16 @@ def bonded(law: CohesiveLaw, part: Constraints, at: Configuration, lying: Array)
     secant[0, opening < 0.0] = 1.0
     falls = whole & (damage > (0.0 if law.reversible else before.damage)) & (secant > LEVEL)
     slope = np.where(falls, LEVEL, secant)
-    layer = Layer(law, part.directions, part.areas, before, damage, now, now * (1.0 - secant / slope))
+    layer = Layer(law, constraints.directions, constraints.areas, before, damage, now, now * (1.0 - secant / slope))
     return replace(
-        part,
-        B=csr_array(vstack([part.B, *part.tangents], format="csr")),
-        gap0=np.concatenate([part.gap0 - np.where(whole, lying, 0.0), *along]) - layer.rest.ravel(),
+        constraints,
+        B=csr_array(vstack([constraints.B, *constraints.tangents], format="csr")),
+        gap0=np.concatenate([constraints.gap0 - np.where(whole, lying, 0.0), *along]) - layer.rest.ravel(),
         equality=np.tile(whole, len(now)),
-        softness=1.0 / (slope * law.stiffness * part.areas).ravel(),
-        positions=np.tile(part.positions, (len(now), 1)),
-        areas=np.tile(part.areas, len(now)),
-        nodes=None if part.nodes is None else np.tile(part.nodes, len(now)),
-        compliance=None, tangents=(), directions=(), drift=None, friction=None, tied=layer,
+        softness=1.0 / (slope * law.stiffness * constraints.areas).ravel(),
+        positions=np.tile(constraints.positions, (len(now), 1)),
+        areas=np.tile(constraints.areas, len(now)),
+        nodes=None if constraints.nodes is None else np.tile(constraints.nodes, len(now)),
+        compliance=None, tangents=(), directions=(), slip0=None, friction=None, tied=layer,
         branches=(falls + 2 * (opening < 0.0) + 4 * ~whole).ravel().astype(np.int8),
     ).without(np.concatenate([none > 0.0, *[~whole] * len(along)]))  # fmt: skip

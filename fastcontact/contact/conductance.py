@@ -27,7 +27,7 @@ TABLES = ("pressure", "gap")
 class Conductance:
     """The heat that crosses a contact by area and difference of temperatures.
 
-    ContactError if it is none.
+    ContactError if it is not one.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class Conductance:
     def __call__(self, pressure: Array, gap: Array) -> Array:
         """Return conductances (m,) at pressures (m,) [pressure] and gaps (m,), zero where the sides touch [length].
 
-        ContactError if a function returns what is none.
+        ContactError if a function returns anything else.
         """
         touching = gap == 0.0
         if self._number is not None:
@@ -142,7 +142,7 @@ class Crossing:
         return np.asarray(0.5 * (self.secondary.T @ power + self.primary.T @ power))
 
 
-def crossing(part: Constraints, secondary: Surface, primary: Surface, shape: tuple[int, ...]) -> Crossing:
+def crossing(constraints: Constraints, secondary: Surface, primary: Surface, shape: tuple[int, ...]) -> Crossing:
     """Return where heat crosses between two sides by constraints, whose rows weight motions along one normal each.
 
     `shape` is that of the points of the mesh, (n_points, dim).
@@ -151,12 +151,12 @@ def crossing(part: Constraints, secondary: Surface, primary: Surface, shape: tup
     mine = np.zeros(n, bool)
     mine[secondary.points] = True
     mine[primary.points] = False
-    by_axis = [csr_array(part.B[:, : n * dim][:, axis::dim]) for axis in range(dim)]
+    by_axis = [csr_array(constraints.B[:, : n * dim][:, axis::dim]) for axis in range(dim)]
     normal = np.stack([rows @ mine for rows in by_axis], axis=1)
     length = np.einsum("md,md->m", normal, normal)
     scale = normal / np.where(length > 0.0, length, np.inf)[:, None]
     rows = sum(diags_array(scale[:, axis]) @ by_axis[axis] for axis in range(dim))
-    assert part.areas is not None
-    facing = np.isfinite(part.areas) & (length > 0.0)
-    own = csr_array(rows @ diags_array(mine.astype(float)))
-    return Crossing(own, csr_array(own - rows), np.where(facing, part.areas, 0.0))
+    assert constraints.areas is not None
+    facing = np.isfinite(constraints.areas) & (length > 0.0)
+    rows_of_side = csr_array(rows @ diags_array(mine.astype(float)))
+    return Crossing(rows_of_side, csr_array(rows_of_side - rows), np.where(facing, constraints.areas, 0.0))

@@ -8,7 +8,7 @@ import numpy as np
 
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.cohesion import Bond
-from fastcontact.contact.obstacles.rigid_side import Stance
+from fastcontact.contact.obstacles.rigid_side import Pose
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,14 +64,14 @@ class Configuration:
     friction_factor: float = 1.0
 
     @property
-    def stance(self) -> Stance:
+    def pose(self) -> Pose:
         """Current position of a rigid obstacle."""
-        return Stance(self.obstacle, self.angle)
+        return Pose(self.obstacle, self.angle)
 
     @property
-    def stance_start(self) -> Stance:
+    def pose_start(self) -> Pose:
         """Where a rigid obstacle stood as the load step began."""
-        return Stance(self.obstacle_start, self.angle_start)
+        return Pose(self.obstacle_start, self.angle_start)
 
     @classmethod
     def displaced(cls, displacement: Array) -> Configuration:

@@ -133,7 +133,7 @@ class Constraints:
         Tangential motion relative to the primary side, a matrix for each tangent [-]; empty without friction.
     directions : tuple of ndarray (m, dim)
         The tangents themselves [-].
-    drift : ndarray (len(tangents), m), optional
+    slip0 : ndarray (len(tangents), m), optional
         Slip of the step that the motion of a rigid primary side makes by itself [length]; None stands for zero.
     friction : ndarray (m,), optional
         Coefficient of friction of each constraint [-]; None stands for zero.
@@ -172,7 +172,7 @@ class Constraints:
     tangents: tuple[csr_array, ...] = ()
     directions: tuple[Array, ...] = ()
     friction: Array | None = None
-    drift: Array | None = None
+    slip0: Array | None = None
     equality: Mask | None = None
     softness: Array | None = None
     low_rank_compliance: Array | None = None
@@ -226,8 +226,8 @@ class Constraints:
 
     def gaps_at_rest(self) -> Array:
         """Return gaps and slips (1 + k, m) at u = 0 [length]."""
-        drift = np.zeros((len(self.tangents), len(self))) if self.drift is None else self.drift
-        return np.vstack([self.gap0, drift if self.elastic_slip is None else drift + self.elastic_slip])
+        slip0 = np.zeros((len(self.tangents), len(self))) if self.slip0 is None else self.slip0
+        return np.vstack([self.gap0, slip0 if self.elastic_slip is None else slip0 + self.elastic_slip])
 
     def force(self, multiplier: Array, tangential: Array | None = None) -> Array:
         """Return the nodal contact forces (n_dofs,) of normal forces (m,) and tangential ones (m, k) [force]."""
@@ -271,8 +271,8 @@ class StackedConstraints(Constraints):
 
     def state(self, active: Mask) -> AnyArray:
         """Return the set `active` (m,) with the `branches` of all pairs: what is smooth as long as they are the same."""
-        found = (part.branches for part in self.parts.values() if part.branches is not None)
-        return np.concatenate([active.astype(np.int8), *found])
+        branches = (part.branches for part in self.parts.values() if part.branches is not None)
+        return np.concatenate([active.astype(np.int8), *branches])
 
     def rows(self) -> dict[str, slice]:
         """Return the rows of each pair, by its name."""
@@ -282,35 +282,35 @@ class StackedConstraints(Constraints):
 
 def stacked(parts: Mapping[str, Constraints]) -> StackedConstraints:
     """Return the constraints of pairs, by their names, as one."""
-    one = list(parts.values())
-    if len(one) == 1:
-        own = {entry.name: getattr(one[0], entry.name) for entry in fields(Constraints)}
-        return StackedConstraints(**own, parts=parts)
+    pairs = list(parts.values())
+    if len(pairs) == 1:
+        values = {entry.name: getattr(pairs[0], entry.name) for entry in fields(Constraints)}
+        return StackedConstraints(**values, parts=parts)
     return StackedConstraints(
-        csr_array(vstack([part.B for part in one], format="csr")),
-        np.concatenate([part.gap0 for part in one]),
-        np.vstack([part.positions for part in one]),
-        _BlockDiagonal(one) if any(part.compliance is not None for part in one) else None,
-        _stacked_tangents(one),
-        _stacked_directions(one),
-        np.concatenate([np.zeros(len(part)) if part.friction is None else part.friction for part in one]),
-        _stacked_slips([part.drift for part in one], one),
-        _stacked_vectors([part.equality for part in one], one, bool),
-        _stacked_vectors([part.softness for part in one], one, float),
-        _stacked_low_rank(one),
-        _stacked_vectors([part.tangential_softness for part in one], one, float),
-        _stacked_slips([part.elastic_slip for part in one], one),
-        nodes=_stacked_nodes(one),
+        csr_array(vstack([part.B for part in pairs], format="csr")),
+        np.concatenate([part.gap0 for part in pairs]),
+        np.vstack([part.positions for part in pairs]),
+        _BlockDiagonal(pairs) if any(part.compliance is not None for part in pairs) else None,
+        _stacked_tangents(pairs),
+        _stacked_directions(pairs),
+        np.concatenate([np.zeros(len(part)) if part.friction is None else part.friction for part in pairs]),
+        _stacked_slips([part.slip0 for part in pairs], pairs),
+        _stacked_vectors([part.equality for part in pairs], pairs, bool),
+        _stacked_vectors([part.softness for part in pairs], pairs, float),
+        _stacked_low_rank(pairs),
+        _stacked_vectors([part.tangential_softness for part in pairs], pairs, float),
+        _stacked_slips([part.elastic_slip for part in pairs], pairs),
+        nodes=_stacked_nodes(pairs),
         parts=parts,
     )
 
 
-def _stacked_vectors(found: Sequence[AnyArray | None], parts: list[Constraints], kind: type) -> Any:
+def _stacked_vectors(vectors: Sequence[AnyArray | None], parts: list[Constraints], kind: type) -> Any:
     """Return vectors (m,) of all parts as one, zero where a part has none; None where no part has one."""
-    if all(vector is None for vector in found):
+    if all(vector is None for vector in vectors):
         return None
     zero: list[AnyArray] = [np.zeros(len(part), kind) for part in parts]
-    return np.concatenate([own if vector is None else vector for own, vector in zip(zero, found, strict=True)])
+    return np.concatenate([zeros if vector is None else vector for zeros, vector in zip(zero, vectors, strict=True)])
 
 
 def _stacked_nodes(parts: list[Constraints]) -> Indices | None:
@@ -319,13 +319,13 @@ def _stacked_nodes(parts: list[Constraints]) -> Indices | None:
     return np.concatenate(nodes) if len(nodes) == len(parts) else None
 
 
-def _stacked_slips(found: Sequence[Array | None], parts: list[Constraints]) -> Array | None:
+def _stacked_slips(slips: Sequence[Array | None], parts: list[Constraints]) -> Array | None:
     """Return slips (k, m) of all parts as one, zero where a part has none; None where no part has any."""
     count = max(len(part.tangents) for part in parts)
-    if all(slip is None for slip in found):
+    if all(slip is None for slip in slips):
         return None
     zero = [np.zeros((count, len(part))) for part in parts]
-    return np.hstack([own if slip is None else slip for own, slip in zip(zero, found, strict=True)])
+    return np.hstack([zeros if slip is None else slip for zeros, slip in zip(zero, slips, strict=True)])
 
 
 def _stacked_tangents(parts: list[Constraints]) -> tuple[csr_array, ...]:
@@ -351,12 +351,12 @@ def _stacked_low_rank(parts: list[Constraints]) -> Array | None:
     if all(part.low_rank_compliance is None for part in parts):
         return None
     count = 1 + max(len(part.tangents) for part in parts)
-    own = [
+    low_rank = [
         np.zeros((count, len(part), 0)) if part.low_rank_compliance is None else part.low_rank_compliance
         for part in parts
     ]
-    total, first, last = np.zeros((count, sum(z.shape[1] for z in own), sum(z.shape[2] for z in own))), 0, 0
-    for z in own:
+    total, first, last = np.zeros((count, sum(z.shape[1] for z in low_rank), sum(z.shape[2] for z in low_rank))), 0, 0
+    for z in low_rank:
         total[:, first : first + z.shape[1], last : last + z.shape[2]] = z
         first, last = first + z.shape[1], last + z.shape[2]
     return total
@@ -369,8 +369,8 @@ class _Softened:
         self._inner, self._softness = inner, softness
 
     def block(self, rows: Indices) -> Array:
-        own = self._softness[rows]
-        return own if self._inner is None else np.diag(own) + self._inner.block(rows)
+        softness = self._softness[rows]
+        return softness if self._inner is None else np.diag(softness) + self._inner.block(rows)
 
     def among(self, rows: Indices) -> Array | FieldCompliance:
         inner = None if self._inner is None else self._inner.among(rows)
@@ -379,8 +379,8 @@ class _Softened:
         return self.block(rows)
 
     def apply(self, multiplier: Array) -> Array:
-        own = self._softness * multiplier
-        return own if self._inner is None else own + self._inner.apply(multiplier)
+        compliance = self._softness * multiplier
+        return compliance if self._inner is None else compliance + self._inner.apply(multiplier)
 
 
 class _BlockDiagonal:
@@ -399,14 +399,14 @@ class _BlockDiagonal:
         return values
 
     def among(self, rows: Indices) -> Array | FieldCompliance:
-        found = []
+        blocks = []
         for part, first, end in zip(self._parts, self._start[:-1], self._start[1:], strict=True):
             mine = rows[(rows >= first) & (rows < end)] - first
-            own = FieldCompliance.none(len(mine)) if part is None or not len(mine) else part.among(mine)
-            if not isinstance(own, FieldCompliance):
+            compliance = FieldCompliance.none(len(mine)) if part is None or not len(mine) else part.among(mine)
+            if not isinstance(compliance, FieldCompliance):
                 return self.block(rows)
-            found.append(own)
-        return FieldCompliance.stacked(found, lambda: self.block(rows))
+            blocks.append(compliance)
+        return FieldCompliance.stacked(blocks, lambda: self.block(rows))
 
     def apply(self, multiplier: Array) -> Array:
         values = np.zeros(len(multiplier))

@@ -136,7 +136,7 @@ def symmetry_planes(surface: Surface, coordinates: Array, motions: HeldMotions |
         return []
     points = coordinates[surface.points]
     held = np.diagonal(motions.at(surface.points), axis1=1, axis2=2) >= HELD
-    tolerance, found = 1e-6 * float(np.ptp(points, axis=0).max()), []
+    tolerance, planes = 1e-6 * float(np.ptp(points, axis=0).max()), []
     across = np.abs(nodal_normals(surface, coordinates)) < ACROSS
     for axis in range(points.shape[1]):
         x = points[:, axis]
@@ -146,8 +146,8 @@ def symmetry_planes(surface: Surface, coordinates: Array, motions: HeldMotions |
             on_end = np.abs(x - end) <= tolerance
             nodes = np.flatnonzero(on_end & held[:, axis] & ~held.all(axis=1) & across[:, axis])
             if len(nodes) and len(nodes) == np.count_nonzero(on_end & ~held.all(axis=1)):
-                found.append((axis, nodes))
-    return found
+                planes.append((axis, nodes))
+    return planes
 
 
 def _weights(force: Array, gap: Array) -> Array:

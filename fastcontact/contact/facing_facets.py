@@ -57,24 +57,24 @@ class OuterFacets:
     @cached_property
     def samples(self) -> tuple[Indices, Array, Array]:
         """Points inside the facets: the facet (m,) of each, where it is (m, dim) [length], the outward normal (m, dim)."""
-        owner, place, normal = [], [], []
+        owner, point, normal = [], [], []
         for (name, facets), first in zip(self.blocks.items(), self.first):
             shape, gradient, _ = elements.get(name).tables
             corners = self.mesh.points[facets]
-            place.append((shape @ corners).reshape(-1, self.mesh.dim))
+            point.append((shape @ corners).reshape(-1, self.mesh.dim))
             normal.append(_normals(gradient, corners).reshape(-1, self.mesh.dim))
             owner.append(np.repeat(first + np.arange(len(facets)), len(shape)))
         normals = np.concatenate(normal)
-        return np.concatenate(owner), np.concatenate(place), normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        return np.concatenate(owner), np.concatenate(point), normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
     @cached_property
     def area(self) -> Array:
         """Areas (n,), in 2D lengths [length^(dim - 1)]."""
-        found = [np.empty(0)]
+        areas = [np.empty(0)]
         for name, facets in self.blocks.items():
             _, gradient, weights = elements.get(name).tables
-            found.append(np.linalg.norm(_normals(gradient, self.mesh.points[facets]), axis=2) @ weights)
-        return np.concatenate(found)
+            areas.append(np.linalg.norm(_normals(gradient, self.mesh.points[facets]), axis=2) @ weights)
+        return np.concatenate(areas)
 
     @cached_property
     def size(self) -> Array:
@@ -117,12 +117,12 @@ class OuterFacets:
 
     def facets(self, numbers: Indices) -> dict[str, Numbers]:
         """Return the connectivity of some facets by element."""
-        found = {}
+        blocks = {}
         for (name, block), first in zip(self.blocks.items(), self.first):
             inside = numbers[(numbers >= first) & (numbers < first + len(block))] - first
             if len(inside):
-                found[name] = block[inside]
-        return found
+                blocks[name] = block[inside]
+        return blocks
 
 
 def _normals(gradient: Array, corners: Array) -> Array:
@@ -171,29 +171,31 @@ def facing(outside: OuterFacets, distance: float | None, angle: float) -> Facing
 
 def _search(outside: OuterFacets, distance: float | None, angle: float, among: Mask) -> Facing:
     """Return what points in the facets `among` (n,) all face."""
-    found = [_faced_by(outside, body, distance, angle, among) for body in np.unique(outside.body)]
-    return Facing(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+    facing_of_bodies = [_faced_by(outside, body, distance, angle, among) for body in np.unique(outside.body)]
+    return Facing(*(np.concatenate(parts) for parts in zip(*facing_of_bodies, strict=True)))
 
 
 def _faced_by(
     outside: OuterFacets, body: int, distance: float | None, angle: float, among: Mask
 ) -> tuple[Indices, Indices, Array]:
     """Return what points in those facets of one body face that are `among` (n,): see `Facing`."""
-    owner, place, normal = outside.samples
+    owner, point, normal = outside.samples
     (low, high), size = outside.boxes, outside.size
-    own = outside.body == body
+    of_body = outside.body == body
     reach = float(size.max()) if distance is None else distance
-    rest = ~own & ((high >= low[own].min(axis=0) - reach) & (low <= high[own].max(axis=0) + reach)).all(axis=1)
-    ours = np.flatnonzero((own & among)[owner])
+    rest = ~of_body & ((high >= low[of_body].min(axis=0) - reach) & (low <= high[of_body].max(axis=0) + reach)).all(
+        axis=1
+    )
+    ours = np.flatnonzero((of_body & among)[owner])
     if rest.any():
-        at = place[ours]
+        at = point[ours]
         ours = ours[((at >= low[rest].min(axis=0) - reach) & (at <= high[rest].max(axis=0) + reach)).all(axis=1)]
     if not rest.any() or not len(ours):
         return np.empty(0, np.intp), np.empty(0, np.intp), np.empty(0)
     kinds = [block[rest[first : first + len(block)]] for block, first in zip(outside.blocks.values(), outside.first)]
-    closest = closest_of_kinds(place[ours], [outside.mesh.points[block] for block in kinds if len(block)])
+    closest = closest_of_kinds(point[ours], [outside.mesh.points[block] for block in kinds if len(block)])
     facet, other = owner[ours], np.flatnonzero(rest)[closest.facet]
-    apart = place[ours] - closest.position
+    apart = point[ours] - closest.position
     gap = np.einsum("nd,nd->n", apart, closest.normal)
     beside = np.linalg.norm(apart - gap[:, None] * closest.normal, axis=1)
     larger = np.maximum(size[facet], size[other])

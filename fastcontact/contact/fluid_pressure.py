@@ -39,32 +39,34 @@ class Wetted:
     pressure: Array
 
 
-def wetted(part: Constraints, at: Configuration, side: Surface, source: Mask, points: Array) -> Constraints:
-    """Return constraints `part` under the fluid pressure of a configuration.
+def wetted(constraints: Constraints, at: Configuration, side: Surface, source: Mask, points: Array) -> Constraints:
+    """Return constraints `constraints` under the fluid pressure of a configuration.
 
     The fluid comes from the nodes `source` (n_nodes,) of the secondary side; `points` (n_points, dim) are reference
     coordinates [length]. Contact pressures are those of the last pairing; before the first one what is closed is tight.
     """
     if not at.fluid_pressure > 0.0:
-        return part
-    assert part.areas is not None
-    assert part.nodal is not None
+        return constraints
+    assert constraints.areas is not None
+    assert constraints.nodal is not None
     size = float(np.linalg.norm(np.ptp(points[side.points], axis=0)))
-    gaps = part.gaps(at.displacement)
-    nodal, node = part.nodal.weighted_gaps(np.where(part.usable, gaps, np.inf))
+    gaps = constraints.gaps(at.displacement)
+    nodal, node = constraints.nodal.weighted_gaps(np.where(constraints.usable, gaps, np.inf))
     loose = np.zeros(len(nodal), bool) if at.pressure is None else at.pressure <= (1.0 + ALIKE) * at.fluid_pressure
     nodes = reached(side, source, (nodal > CLOSED * size) | (loose & (nodal > -CLOSED * size)))
-    rows = nodes[node] & part.usable
+    rows = nodes[node] & constraints.usable
     far = FAR * size
-    none = np.zeros(len(part))
+    none = np.zeros(len(constraints))
     return replace(
-        part,
-        gap0=np.where(rows, part.gap0 - gaps - far, part.gap0),
+        constraints,
+        gap0=np.where(rows, constraints.gap0 - gaps - far, constraints.gap0),
         softness=np.where(
-            rows, far / (at.fluid_pressure * part.areas), none if part.softness is None else part.softness
+            rows,
+            far / (at.fluid_pressure * constraints.areas),
+            none if constraints.softness is None else constraints.softness,
         ),
-        equality=rows if part.equality is None else part.equality | rows,
-        friction=None if part.friction is None else np.where(rows, 0.0, part.friction),
+        equality=rows if constraints.equality is None else constraints.equality | rows,
+        friction=None if constraints.friction is None else np.where(rows, 0.0, constraints.friction),
         wetted=Wetted(rows, np.where(nodes, at.fluid_pressure, 0.0)),
     )
 
@@ -76,5 +78,5 @@ def reached(side: Surface, source: Mask, passable: Mask) -> Mask:
     facet = np.repeat(np.arange(count), np.concatenate([np.full(len(b.local), b.local.shape[1]) for b in side.blocks]))
     kept = passable[nodes]
     graph = csr_array((np.ones(kept.sum()), (nodes[kept], n + facet[kept])), shape=(n + count, n + count))
-    part = connected_components(graph, directed=False)[1][:n]
-    return passable & np.isin(part, part[source & passable])
+    component = connected_components(graph, directed=False)[1][:n]
+    return passable & np.isin(component, component[source & passable])

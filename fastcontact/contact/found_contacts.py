@@ -80,8 +80,8 @@ class FoundContacts(Sequence[FoundContact]):
     def __len__(self) -> int:
         return len(self.pairs)
 
-    def __getitem__(self, place: Any) -> Any:
-        return self.pairs[place]
+    def __getitem__(self, index: Any) -> Any:
+        return self.pairs[index]
 
     def __iter__(self) -> Iterator[FoundContact]:
         return iter(self.pairs)
@@ -177,13 +177,13 @@ def find_contacts(
     names = list(groups) if groups is not None else _names(mesh, body)
     pairs: list[FoundContact] = []
     sides: dict[str, Mapping[str, ArrayLike]] = {}
-    for found in _pairs(outside, search, stiff):
-        title = f"{names[found.bodies[0]]} on {names[found.bodies[1]]}" + (f" {found.number}" if found.number else "")
+    for pair in _pairs(outside, search, stiff):
+        title = f"{names[pair.bodies[0]]} on {names[pair.bodies[1]]}" + (f" {pair.number}" if pair.number else "")
         groups_of = f"{title} (secondary)", f"{title} (primary)"
-        sides.update(zip(groups_of, map(outside.facets, found.sides)))
-        both = names[found.bodies[0]], names[found.bodies[1]]
-        many = len(found.sides[0]), len(found.sides[1])
-        pairs.append(FoundContact(title, both, *groups_of, many, found.spacing, found.gap, found.reason))
+        sides.update(zip(groups_of, map(outside.facets, pair.sides)))
+        both = names[pair.bodies[0]], names[pair.bodies[1]]
+        many = len(pair.sides[0]), len(pair.sides[1])
+        pairs.append(FoundContact(title, both, *groups_of, many, pair.spacing, pair.gap, pair.reason))
     return FoundContacts(mesh.with_facets(sides), tuple(pairs))
 
 
@@ -208,22 +208,22 @@ def nothing_found(mesh: Mesh, distance: float | None, angle: float, groups: Sequ
 
 def _bodies_of_cells(mesh: Mesh, groups: Sequence[str] | None) -> Indices:
     """Return the body (n_cells,) of each cell, -1 for facets, and for cells that are in none of the groups."""
-    found = np.full(mesh.n_cells, -1, np.intp)
+    body_of_cell = np.full(mesh.n_cells, -1, np.intp)
     if groups is None:
         body = _whole_bodies(mesh)
         for name, block in mesh.solids.items():
-            found[mesh.offsets[name] : mesh.offsets[name] + len(block)] = body[block[:, 0]]
-        return found
+            body_of_cell[mesh.offsets[name] : mesh.offsets[name] + len(block)] = body[block[:, 0]]
+        return body_of_cell
     for number, group in enumerate(groups):
         if not mesh.cells_of(group, dim=mesh.dim):
             raise ContactError(f"group '{group}' holds no solid cells, so it is no body")
         rows = mesh.split(mesh.cell_groups[group])
         cells = np.concatenate([mesh.offsets[name] + rows[name] for name in rows if name in mesh.solids])
-        if (found[cells] >= 0).any():
-            other = groups[found[cells].max()]
+        if (body_of_cell[cells] >= 0).any():
+            other = groups[body_of_cell[cells].max()]
             raise ContactError(f"groups '{other}' and '{group}' share solid cells: bodies must be apart")
-        found[cells] = number
-    return found
+        body_of_cell[cells] = number
+    return body_of_cell
 
 
 def _whole_bodies(mesh: Mesh) -> Numbers:

@@ -42,9 +42,9 @@ class HeldMotions:
         projectors = np.zeros((len(nodes), dim, dim))
         projectors[:, np.arange(dim), np.arange(dim)] = supported[nodes]
         if len(owners):
-            place = np.searchsorted(nodes, owners)
-            np.add.at(projectors, place, np.einsum("md,me->mde", normals, normals))
-            turned = np.unique(place)
+            index = np.searchsorted(nodes, owners)
+            np.add.at(projectors, index, np.einsum("md,me->mde", normals, normals))
+            turned = np.unique(index)
             projectors[turned] = spanned(projectors[turned], 1e-6)
         return cls(nodes, projectors)
 
@@ -52,8 +52,8 @@ class HeldMotions:
         """Return the projectors (..., dim, dim) of nodes (...), zero where nothing is held."""
         if not len(self.nodes):
             return np.zeros((*nodes.shape, *self.projectors.shape[1:]))
-        place = np.minimum(np.searchsorted(self.nodes, nodes), len(self.nodes) - 1)
-        return np.asarray(np.where((self.nodes[place] == nodes)[..., None, None], self.projectors[place], 0.0))
+        index = np.minimum(np.searchsorted(self.nodes, nodes), len(self.nodes) - 1)
+        return np.asarray(np.where((self.nodes[index] == nodes)[..., None, None], self.projectors[index], 0.0))
 
 
 def _rows_of_single_nodes(relations: csr_array, dim: int) -> tuple[Indices, Array]:
@@ -93,23 +93,23 @@ def alike(projectors: Array, places: Array) -> list[tuple[Array, Mask]]:
     Nodes held in a single direction come first, together where directions are nearly the same or others lie in between; nodes
     held in more join them. Other nodes have the mean of the directions nearest to their `places` (n, dim) [length].
     """
-    rest, found = projectors.copy(), []
+    rest, directions = projectors.copy(), []
     while len(seeds := np.flatnonzero(rank := np.trace(rest, axis1=1, axis2=2).round())):
         least = rank[seeds].min()
         seeds = seeds[rank[seeds] == least]
         seeds = seeds if least == 1 else seeds[:1]  # of several directions any are taken
-        own = np.linalg.eigh(rest[seeds])[1][:, :, -1]
-        away = np.where(np.abs(own @ own.T) >= TOGETHER, np.maximum(cdist(places[seeds], places[seeds]), 1e-300), 0.0)
+        axis = np.linalg.eigh(rest[seeds])[1][:, :, -1]
+        away = np.where(np.abs(axis @ axis.T) >= TOGETHER, np.maximum(cdist(places[seeds], places[seeds]), 1e-300), 0.0)
         order, before = breadth_first_order(minimum_spanning_tree(csr_array(away)), 0, directed=False)
         for child in order[1:]:  # one sign for all, passed on from the nearest
-            own[child] *= np.sign(own[child] @ own[before[child]])
-        along = _from_nearest(own[order], places[seeds[order]], places)
-        along[seeds[order]] = own[order]
+            axis[child] *= np.sign(axis[child] @ axis[before[child]])
+        along = _from_nearest(axis[order], places[seeds[order]], places)
+        along[seeds[order]] = axis[order]
         held = np.einsum("nd,nde,ne->n", along, rest, along) >= TOGETHER**2
         along[held] = _unit(np.einsum("nde,ne->nd", rest[held], along[held]))
-        found.append((along, held))
+        directions.append((along, held))
         rest[held] = without(rest[held], along[held], 0.0)
-    return found
+    return directions
 
 
 def _from_nearest(directions: Array, origin: Array, places: Array) -> Array:

@@ -66,9 +66,9 @@ def mass_matrix(surface: Surface, points: Array, axisymmetric: bool) -> csr_arra
         rows.append(np.broadcast_to(block.local[:, :, None], local.shape).ravel())
         columns.append(np.broadcast_to(block.local[:, None, :], local.shape).ravel())
         values.append(local.ravel())
-    place = np.concatenate(rows), np.concatenate(columns)
+    positions = np.concatenate(rows), np.concatenate(columns)
     size = len(surface.points)
-    return coo_array((np.concatenate(values), place), shape=(size, size)).tocsr()
+    return coo_array((np.concatenate(values), positions), shape=(size, size)).tocsr()
 
 
 def nodal_areas(surface: Surface, points: Array, axisymmetric: bool) -> Array:

@@ -71,8 +71,8 @@ def along_normals(points, corners, normals, counts, neighbour, facet, xi, overha
     for i in range(points.shape[0]):
         f, s, before = facet[i], xi[i], -1
         for _ in range(MOST_FACETS):
-            s, found = _newton(points[i, 0], points[i, 1], corners, normals, f, counts[f], s, values, slopes)
-            if not found or abs(s) > FAR:
+            s, converged = _newton(points[i, 0], points[i, 1], corners, normals, f, counts[f], s, values, slopes)
+            if not converged or abs(s) > FAR:
                 break
             if abs(s) <= 1.0:
                 facet[i], xi[i], overhang[i] = f, s, 0.0

@@ -28,7 +28,7 @@ class Projection:
     P : csr_array (m, k)
         Functions of the multiplier field at the integration points.
     areas : ndarray (m,)
-        W; a point without area, at the axis, does not give way: C vanishes there. It may carry a force of its own.
+        W; a point without area, at the axis, is rigid: C vanishes there. It may carry a force of its own.
     rho : float
         Augmentation [pressure / length].
     mass : SuperLU, optional

@@ -15,13 +15,13 @@ from fastcontact.mesh import elements
 
 
 def at_nodes(
-    found: Pairing, candidates: Candidates, primary: Surface, deformed: Array, normals: str | Sequence[float]
+    pairing: Pairing, candidates: Candidates, primary: Surface, deformed: Array, normals: str | Sequence[float]
 ) -> Pairing:
-    """Return the pairing `found` of candidates with facets, moved to the nearest nodes of these surfaces.
+    """Return the pairing `pairing` of candidates with facets, moved to the nearest nodes of these surfaces.
 
     Parameters
     ----------
-    found : Pairing
+    pairing : Pairing
         Which candidates face anything, and the normals where those are not the primary's own.
     candidates : Candidates
     primary : Surface
@@ -34,9 +34,9 @@ def at_nodes(
 
     nearest = cKDTree(deformed[primary.points]).query(candidates.positions(deformed))[1]
     facet, xi = _on_facets(primary)
-    own = normals in ("facet", "averaged")
-    normal = nodal_normals(primary, deformed)[nearest] if own else found.normal
-    return replace(found, facet=facet[nearest], xi=xi[nearest], normal=normal)
+    of_facets = normals in ("facet", "averaged")
+    normal = nodal_normals(primary, deformed)[nearest] if of_facets else pairing.normal
+    return replace(pairing, facet=facet[nearest], xi=xi[nearest], normal=normal)
 
 
 def _on_facets(side: Surface) -> tuple[Indices, Array]:

@@ -21,10 +21,10 @@ def opposite(secondary: Surface, primary: Surface, points: Array) -> bool:
 
 def _opposite(side: Surface, other: Surface, points: Array) -> bool:
     """Return whether the nodes of `side` that are nearly closest to `other` project on its nodes."""
-    found = closest_of_kinds(points[side.points], other.corners(points))
-    facing = points[places(other, found.facet, found.xi).nodes]
+    closest = closest_of_kinds(points[side.points], other.corners(points))
+    facing = points[places(other, closest.facet, closest.xi).nodes]
     size = np.linalg.norm(np.ptp(facing, axis=1), axis=1)
-    away = np.linalg.norm(facing - found.position[:, None], axis=2).min(axis=1)
-    within = found.overhang <= BESIDE
-    near = within & (found.distance <= found.distance[within].min(initial=np.inf) + NEAR * size)
+    away = np.linalg.norm(facing - closest.position[:, None], axis=2).min(axis=1)
+    within = closest.overhang <= BESIDE
+    near = within & (closest.distance <= closest.distance[within].min(initial=np.inf) + NEAR * size)
     return bool(near.any() and (away[near] <= OPPOSITE * size[near]).all())

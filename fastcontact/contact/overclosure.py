@@ -14,7 +14,7 @@ from fastcontact.errors import ContactError
 class OverclosureLaw:
     """A piecewise linear pressure, zero up to the first overclosure, and going on beyond the last with its slope.
 
-    ContactError if the table is none.
+    ContactError if it is not such a table.
 
     Parameters
     ----------
@@ -39,8 +39,8 @@ class OverclosureLaw:
 
     def line(self, overclosure: Array) -> tuple[Array, Array]:
         """Return slopes (m,) [pressure / length] at overclosures (m,) [length], and where their lines have no pressure."""
-        part = np.clip(np.searchsorted(self.table[:, 0], overclosure, side="right") - 1, 0, len(self._slopes) - 1)
-        return self._slopes[part], self.table[part, 0] - self.table[part, 1] / self._slopes[part]
+        interval = np.clip(np.searchsorted(self.table[:, 0], overclosure, side="right") - 1, 0, len(self._slopes) - 1)
+        return self._slopes[interval], self.table[interval, 0] - self.table[interval, 1] / self._slopes[interval]
 
     def energy(self, pressure: Array) -> Array:
         """Return the energy by area (m,) [pressure length] at pressures (m,) [pressure]."""
@@ -48,6 +48,6 @@ class OverclosureLaw:
         before = np.concatenate(
             [[0.0], np.cumsum(0.5 * (self.table[1:, 1] + self.table[:-1, 1]) * np.diff(self.table[:, 0]))]
         )
-        part = np.clip(np.searchsorted(self.table[:, 1], p, side="right") - 1, 0, len(self._slopes) - 1)
-        start = self.table[part, 1]
-        return np.asarray(before[part] + 0.5 * (p**2 - start**2) / self._slopes[part])
+        interval = np.clip(np.searchsorted(self.table[:, 1], p, side="right") - 1, 0, len(self._slopes) - 1)
+        start = self.table[interval, 1]
+        return np.asarray(before[interval] + 0.5 * (p**2 - start**2) / self._slopes[interval])

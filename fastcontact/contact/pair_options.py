@@ -53,9 +53,9 @@ class PairOptions:
     friction_heat : float
         What part of the work of friction becomes heat [-].
     cohesion : CohesiveLaw, optional
-        Of tension between the sides; None: there is none.
+        Of tension between the sides; None without.
     source : ndarray of bool (n_points,), optional
-        Nodes that fluid comes from; None: there is none.
+        Nodes that fluid comes from; None without.
     same_place : ndarray of int (n_points,), optional
         For each node, the one whose multiplier it has, too, where the model repeats itself; None where it does not.
     """
@@ -106,8 +106,8 @@ class PairOptions:
         inside = mask[side.facets[:, order]]
         # Two neighbouring shape functions are equal at 0 on linear lines, at -2/3 and 2/3 on quadratic ones.
         equal = np.linspace(-2 / 3, 2 / 3, 2) if len(order) == 3 else np.zeros(1)
-        facet, place = np.nonzero(inside[:, 1:] != inside[:, :-1])
-        return facet, equal[place]
+        facet, edge = np.nonzero(inside[:, 1:] != inside[:, :-1])
+        return facet, equal[edge]
 
     def excluded_nodes(self, side: Surface) -> Mask:
         """Return which nodes (m,) of a side carry no contact."""
@@ -133,10 +133,10 @@ class PairOptions:
         normal = normals(directions)
         free = along - (normal @ along)[:, None] * normal
         length = np.linalg.norm(free, axis=1, keepdims=True)
-        own = self._slippery(candidates)[:, None] & (length > ACROSS * np.linalg.norm(along))
-        first = np.where(own, free / np.where(own, length, 1.0), directions[0])
-        turned = (first, *(np.where(own, np.cross(normal, first), other) for other in directions[1:]))
-        return turned, (np.where(own, 0.0, first), *turned[1:])
+        slippery = self._slippery(candidates)[:, None] & (length > ACROSS * np.linalg.norm(along))
+        first = np.where(slippery, free / np.where(slippery, length, 1.0), directions[0])
+        turned = (first, *(np.where(slippery, np.cross(normal, first), other) for other in directions[1:]))
+        return turned, (np.where(slippery, 0.0, first), *turned[1:])
 
     def added_gap(
         self, candidates: Candidates, pairing: Pairing, primary: object, reference: Array, factor: float
@@ -147,8 +147,8 @@ class PairOptions:
         if not len(rows):
             return added
         if self.clearance is not None:
-            own = np.einsum("nk,nkd->nd", candidates.shape[rows], reference[candidates.nodes[rows]])
-            added[rows] += self.clearance(own)
+            position = np.einsum("nk,nkd->nd", candidates.shape[rows], reference[candidates.nodes[rows]])
+            added[rows] += self.clearance(position)
         if self.clearance_primary is not None and isinstance(primary, Surface):
             at = places(primary, pairing.facet[rows], pairing.xi[rows])
             added[rows] += self.clearance_primary(np.einsum("nk,nkd->nd", at.shape, reference[at.nodes]))

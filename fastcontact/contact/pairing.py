@@ -13,7 +13,7 @@ from scipy.sparse import csr_array
 
 from fastcontact.arrays import AnyArray, Array, Indices, Mask, Numbers
 from fastcontact.contact.line_projection import along_line_normals, smooth_ends
-from fastcontact.contact.obstacles.rigid_side import RigidSide, Stance
+from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.projection import (
     Places,
     along_normals,
@@ -59,12 +59,14 @@ class Candidates:
     def inside(cls, side: Surface, xi: Sequence[Array]) -> Candidates:
         """Return points at the same reference coordinates (n, dim - 1) in all facets of a block, `xi` for each block."""
         nodes, shapes, facets, first = [], [], [], 0
-        for block, own in zip(side.blocks, xi, strict=True):
-            nodes.append(np.repeat(block.facets, len(own), axis=0))
-            shapes.append(np.tile(elements.get(block.element).shape(own), (len(block.facets), 1)))
-            facets.append(np.repeat(first + np.arange(len(block.facets)), len(own)))
+        for block, xi_of_block in zip(side.blocks, xi, strict=True):
+            nodes.append(np.repeat(block.facets, len(xi_of_block), axis=0))
+            shapes.append(np.tile(elements.get(block.element).shape(xi_of_block), (len(block.facets), 1)))
+            facets.append(np.repeat(first + np.arange(len(block.facets)), len(xi_of_block)))
             first += len(block.facets)
-        places = [np.tile(own, (len(block.facets), 1)) for block, own in zip(side.blocks, xi, strict=True)]
+        places = [
+            np.tile(xi_of_block, (len(block.facets), 1)) for block, xi_of_block in zip(side.blocks, xi, strict=True)
+        ]
         return cls(filled_up(nodes), filled_up(shapes), np.concatenate(facets), np.concatenate(places))
 
     @classmethod
@@ -72,10 +74,10 @@ class Candidates:
         """Return the nodes of a side, each on one of its facets."""
         facet, xi, first = np.zeros(len(side.points), np.intp), np.zeros((len(side.points), 1)), 0
         for block in side.blocks:
-            own = elements.get(block.element).nodes
-            xi = np.broadcast_to(xi, (len(xi), own.shape[1])).copy()
+            xi_of_nodes = elements.get(block.element).nodes
+            xi = np.broadcast_to(xi, (len(xi), xi_of_nodes.shape[1])).copy()
             facet[block.local] = first + np.arange(len(block.local))[:, None]
-            xi[block.local] = own
+            xi[block.local] = xi_of_nodes
             first += len(block.local)
         return cls(side.points[:, None], np.ones((len(side.points), 1)), facet, xi)
 
@@ -120,10 +122,10 @@ class Pairing:
 
     def places(self, primary: Surface, rows: Indices) -> Places:
         """Return the points of `primary` that candidates `rows` (n,) face, facets going on straight beyond their ends."""
-        found = places(primary, self.facet[rows], self.xi[rows])
+        points = places(primary, self.facet[rows], self.xi[rows])
         if self.beyond is None:
-            return found
-        return replace(found, shape=found.shape + np.einsum("nkj,nj->nk", found.gradient, self.beyond[rows]))
+            return points
+        return replace(points, shape=points.shape + np.einsum("nkj,nj->nk", points.gradient, self.beyond[rows]))
 
 
 def pair(
@@ -132,7 +134,7 @@ def pair(
     coordinates: Array,
     projection_tolerance: float,
     normals: str | Sequence[float] = "facet",
-    obstacle: Stance | None = None,
+    obstacle: Pose | None = None,
     rounded: bool = False,
 ) -> Pairing:
     """Project candidate positions (n, dim) on the closest facet of `primary` at nodal `coordinates` [length].
@@ -150,25 +152,25 @@ def pair(
         If a projection does not converge; see `search.closest`.
     """
     if isinstance(primary, RigidSide):
-        at = Stance(np.zeros(candidates.shape[1])) if obstacle is None else obstacle
+        at = Pose(np.zeros(candidates.shape[1])) if obstacle is None else obstacle
         _, normal, paired, offset = primary.facing(candidates, at)
         nowhere = np.zeros(len(candidates), np.intp)
         return Pairing(nowhere, np.zeros((len(candidates), candidates.shape[1] - 1)), normal, paired, offset)
-    found = closest_of_kinds(candidates, primary.corners(coordinates))
+    closest = closest_of_kinds(candidates, primary.corners(coordinates))
     if normals == "facet" and not rounded:
-        inner = _at_smooth_ends(primary, coordinates, found)
-        paired = found.overhang <= np.where(inner, max(projection_tolerance, FOLDED), projection_tolerance)
-        outside = paired & ~inner & (found.overhang > ROUNDING)
+        inner = _at_smooth_ends(primary, coordinates, closest)
+        paired = closest.overhang <= np.where(inner, max(projection_tolerance, FOLDED), projection_tolerance)
+        outside = paired & ~inner & (closest.overhang > ROUNDING)
         return _straight_on(
-            Pairing(found.facet, found.xi, found.normal, paired), candidates, primary, coordinates, outside
+            Pairing(closest.facet, closest.xi, closest.normal, paired), candidates, primary, coordinates, outside
         )
     at_nodes = at_nodes_of_facets(smooth_normals(primary, coordinates))
     if not isinstance(normals, str):
         at_nodes = np.broadcast_to(np.array(normals), at_nodes.shape).copy()
     if coordinates.shape[1] == 3:
-        facet, xi, overhang, normal = along_normals(candidates, primary, coordinates, at_nodes, found)
+        facet, xi, overhang, normal = along_normals(candidates, primary, coordinates, at_nodes, closest)
     else:
-        facet, xi, overhang = along_line_normals(candidates, primary, coordinates, at_nodes, found)
+        facet, xi, overhang = along_line_normals(candidates, primary, coordinates, at_nodes, closest)
         normal = interpolated(at_nodes[facet], places(primary, facet, xi))
     if normals == "facet":
         normal = _round_edges(primary, coordinates, facet, xi, normal)
@@ -185,12 +187,12 @@ def _round_edges(primary: Surface, coordinates: Array, facet: Indices, xi: Array
     equilibrium puts the node: with the normal of one or the other it flips between them. Here the direction follows from
     where it stands on the rounded edge.
     """
-    own = at_nodes_of_facets([facet_normals(block, coordinates) for block in primary.blocks])[facet]
-    own = interpolated(own, places(primary, facet, xi))
+    normals = at_nodes_of_facets([facet_normals(block, coordinates) for block in primary.blocks])[facet]
+    normals = interpolated(normals, places(primary, facet, xi))
     on_triangle = np.column_stack([xi, 1.0 - xi.sum(axis=1)]).min(axis=1)
     inside = np.where(primary.triangular[facet], on_triangle, 0.5 * (1.0 - np.abs(xi).max(axis=1)))
     share = np.clip(1.0 - inside / ROUNDED, 0.0, 1.0)[:, None]
-    normal = share * mean + (1.0 - share) * own
+    normal = share * mean + (1.0 - share) * normals
     return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
 
 
@@ -208,17 +210,17 @@ def _straight_on(pairing: Pairing, candidates: Array, primary: Surface, coordina
     return replace(pairing, beyond=beyond)
 
 
-def _at_smooth_ends(primary: Surface, coordinates: Array, found: Closest) -> Mask:
+def _at_smooth_ends(primary: Surface, coordinates: Array, closest: Closest) -> Mask:
     """Return which candidates (n,) overhang an end at which another line continues smoothly.
 
     On lines that fold inward, points at a distance lie beyond the ends of both facets at a node, but not beyond the end
     of the surface. At a corner they lie beside it.
     """
-    out = found.overhang > 0.0
-    if found.position.shape[1] == 3 or not out.any():
+    out = closest.overhang > 0.0
+    if closest.position.shape[1] == 3 or not out.any():
         return np.zeros(len(out), bool)
     smooth = smooth_ends(primary, at_nodes_of_facets(smooth_normals(primary, coordinates)))
-    return np.asarray(out & smooth[found.facet, (found.xi[:, 0] > 0.0).astype(np.intp)])
+    return np.asarray(out & smooth[closest.facet, (closest.xi[:, 0] > 0.0).astype(np.intp)])
 
 
 def filled_up(parts: Sequence[AnyArray]) -> AnyArray:
@@ -291,6 +293,6 @@ def rows_along(
     values = weights[:, :, None] * direction[rows][:, None, :]
     columns = nodes[:, :, None] * dim + np.arange(dim)
     start = np.concatenate([[0], np.cumsum(pairing.paired) * (nodes.shape[1] * dim)])
-    found = csr_array((values.ravel(), columns.ravel(), start), shape=(len(candidates.nodes), n_dofs))
-    found.sum_duplicates()
-    return found
+    matrix = csr_array((values.ravel(), columns.ravel(), start), shape=(len(candidates.nodes), n_dofs))
+    matrix.sum_duplicates()
+    return matrix

@@ -33,20 +33,20 @@ def checked_normals(normals: Normals, points: Array, primary: Surface | RigidSid
     if isinstance(normals, str):
         if normals not in KINDS:
             raise ContactError(unknown("kind of normals", normals, [*KINDS, "a vector"]))
-        found: str | tuple[float, ...] = normals
+        checked: str | tuple[float, ...] = normals
     else:
         vector = np.asarray(normals, float)
         length = np.linalg.norm(vector)
         if vector.shape != (dim,) or not (np.isfinite(length) and length > 0):
             raise ContactError(f"normals = {normals!r} must be one of {', '.join(KINDS)}, or a vector of {dim} numbers")
-        found = tuple((vector / length).tolist())
+        checked = tuple((vector / length).tolist())
         if isinstance(primary, Surface) and (nodal_normals(primary, points) @ vector).mean() <= FACING * length:
             raise ContactError(
                 f"normals = {normals!r} must point out of the body of '{primary.group}', the primary side: turn the vector"
             )
-    if isinstance(primary, RigidSide) and found not in ("facet", "averaged"):
+    if isinstance(primary, RigidSide) and checked not in ("facet", "averaged"):
         raise ContactError(f"normals = {normals!r} are for contact between bodies: a rigid obstacle has its own")
-    return found
+    return checked
 
 
 def opposed(pairing: Pairing, normals: Array) -> Pairing:

@@ -52,7 +52,7 @@ def places(side: Surface, facet: Indices, xi: Array) -> Places:
         return _of_block(side.blocks[0], facet, xi)
     width = max(block.facets.shape[1] for block in side.blocks)
     n = len(facet)
-    found = Places(
+    projected = Places(
         np.empty((n, width), np.int32),
         np.empty((n, width), np.intp),
         np.zeros((n, width)),
@@ -61,12 +61,12 @@ def places(side: Surface, facet: Indices, xi: Array) -> Places:
     first = 0
     for block in side.blocks:
         mine = np.flatnonzero((facet >= first) & (facet < first + len(block.facets)))
-        own, k = _of_block(block, facet[mine] - first, xi[mine]), block.facets.shape[1]
+        shape, k = _of_block(block, facet[mine] - first, xi[mine]), block.facets.shape[1]
         columns = np.minimum(np.arange(width), k - 1)
-        found.nodes[mine], found.local[mine] = own.nodes[:, columns], own.local[:, columns]
-        found.shape[mine, :k], found.gradient[mine, :k] = own.shape, own.gradient
+        projected.nodes[mine], projected.local[mine] = shape.nodes[:, columns], shape.local[:, columns]
+        projected.shape[mine, :k], projected.gradient[mine, :k] = shape.shape, shape.gradient
         first += len(block.facets)
-    return found
+    return projected
 
 
 def _of_block(block: FacetBlock, rows: Indices, xi: Array) -> Places:
@@ -79,15 +79,15 @@ def nodal_normals(side: Surface, coordinates: Array) -> Array:
 
     The angles make it depend on the surface alone, not on how it is cut into facets (Thuermer and Wuethrich, 1998).
     """
-    own = [facet_normals(block, coordinates) for block in side.blocks]
-    return _nodal_means(side, own, [_angles(block, coordinates) for block in side.blocks])
+    normals = [facet_normals(block, coordinates) for block in side.blocks]
+    return _nodal_means(side, normals, [_angles(block, coordinates) for block in side.blocks])
 
 
-def _nodal_means(side: Surface, own: Sequence[Array], angles: Sequence[Array]) -> Array:
+def _nodal_means(side: Surface, values: Sequence[Array], angles: Sequence[Array]) -> Array:
     """Return the means (m, dim) of `nodal_normals` from the normals and angles of the facets of each block."""
-    n, dim = len(side.points), own[0].shape[2]
+    n, dim = len(side.points), values[0].shape[2]
     at = np.concatenate([block.local.ravel() for block in side.blocks])
-    weighted = [(angle[:, :, None] * normals).reshape(-1, dim) for normals, angle in zip(own, angles, strict=True)]
+    weighted = [(angle[:, :, None] * normals).reshape(-1, dim) for normals, angle in zip(values, angles, strict=True)]
     total = np.column_stack([np.bincount(at, part, n) for part in np.concatenate(weighted).T])
     return total / np.linalg.norm(total, axis=1, keepdims=True)
 
@@ -98,19 +98,19 @@ def smooth_normals(side: Surface, coordinates: Array) -> list[Array]:
     The nodal means of `nodal_normals`; at corners the mean of those facets alone that meet the facet smoothly, so that a
     punch is flat up to its corner, also where its flanks belong to the surface.
     """
-    own = [facet_normals(block, coordinates) for block in side.blocks]
+    facet_normals_of_blocks = [facet_normals(block, coordinates) for block in side.blocks]
     angles = [_angles(block, coordinates) for block in side.blocks]
-    means = _nodal_means(side, own, angles)
+    means = _nodal_means(side, facet_normals_of_blocks, angles)
     smooth = [means[block.local] for block in side.blocks]
     # A node is at a corner where a facet leans from the mean by more than half the angle between two that form one.
     flat, corner = np.cos(np.radians(0.5 * CORNER)), np.zeros(len(side.points), bool)
-    for block, normals, mean in zip(side.blocks, own, smooth, strict=True):
+    for block, normals, mean in zip(side.blocks, facet_normals_of_blocks, smooth, strict=True):
         corner[block.local[np.einsum("fad,fad->fa", normals, mean) < flat]] = True
     if not corner.any():
         return smooth
     node = np.concatenate([block.local.ravel() for block in side.blocks])
     weight = np.concatenate([angle.ravel() for angle in angles])
-    normal = np.concatenate([normals.reshape(-1, coordinates.shape[1]) for normals in own])
+    normal = np.concatenate([normals.reshape(-1, coordinates.shape[1]) for normals in facet_normals_of_blocks])
     joined = np.concatenate([normals.reshape(-1, coordinates.shape[1]) for normals in smooth])
     places_of, start = np.argsort(node, kind="stable"), np.concatenate([[0], np.cumsum(np.bincount(node))])
     for at in np.flatnonzero(corner):
@@ -118,8 +118,10 @@ def smooth_normals(side: Surface, coordinates: Array) -> list[Array]:
         beside = normal[here] @ normal[here].T > np.cos(np.radians(CORNER))
         total = (beside * weight[here]) @ normal[here]
         joined[here] = total / np.linalg.norm(total, axis=1, keepdims=True)
-    ends = np.cumsum([normals.shape[0] * normals.shape[1] for normals in own])[:-1]
-    return [part.reshape(like.shape) for part, like in zip(np.split(joined, ends), own, strict=True)]
+    ends = np.cumsum([normals.shape[0] * normals.shape[1] for normals in facet_normals_of_blocks])[:-1]
+    return [
+        part.reshape(like.shape) for part, like in zip(np.split(joined, ends), facet_normals_of_blocks, strict=True)
+    ]
 
 
 def at_nodes_of_facets(parts: Sequence[Array]) -> Array:
@@ -189,10 +191,10 @@ def along_normals(
     normal : ndarray (n, 3)
         Interpolated unit normals there.
     """
-    found = start.facet.copy(), start.xi.copy(), start.overhang.copy(), np.empty(points.shape)
+    facet = start.facet.copy(), start.xi.copy(), start.overhang.copy(), np.empty(points.shape)
     # Seen from the midst of the surface: far from the origin, rounding would be coarser than a converged step.
-    own = coordinates[side.points]
-    midst = 0.5 * (own.min(axis=0) + own.max(axis=0))
+    x = coordinates[side.points]
+    midst = 0.5 * (x.min(axis=0) + x.max(axis=0))
     heights = np.einsum("nd,nd->n", points - start.position, start.normal)
     seen, kinds = points - midst, [coordinates[block.facets] - midst for block in side.blocks]
     sizes = np.cumsum([0] + [len(kind) for kind in kinds])
@@ -203,11 +205,11 @@ def along_normals(
     terms, directions = _polynomials(kinds), _polynomials(at_nodes)
     shared(
         lambda part: projection_kernels.along_normals(
-            *part, seen, heights, terms, directions, side.triangular, side.neighbours, found
+            *part, seen, heights, terms, directions, side.triangular, side.neighbours, facet
         ),
         portions(len(points), EFFORT),
     )
-    return found
+    return facet
 
 
 def _polynomials(kinds: Sequence[Array]) -> Array:

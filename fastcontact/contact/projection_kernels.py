@@ -50,8 +50,8 @@ def angles(nodes, beside, begin, end, out):
         for a in range(nodes.shape[1]):
             out[f, a] = 1.0
         for a in range(beside.shape[0]):
-            own = _row(nodes, f, a)
-            p, q = minus(_row(nodes, f, beside[a, 0]), own), minus(_row(nodes, f, beside[a, 1]), own)
+            row = _row(nodes, f, a)
+            p, q = minus(_row(nodes, f, beside[a, 0]), row), minus(_row(nodes, f, beside[a, 1]), row)
             sine = cross(p, q)
             out[f, a] = np.arctan2(np.sqrt(dot(sine, sine)), dot(p, q))
 
@@ -159,9 +159,9 @@ def _beside(point, terms, directions, triangular, neighbours, f, height):
     for k in range(start[f], start[f + 1]):
         g = numbers[k]
         middle = 1.0 / 3.0 if triangular[g] else 0.0
-        s, t, found = _newton(point, terms, directions, g, middle, middle, height)
-        out = beyond(triangular[g], s, t) if found else np.inf
-        if found and max(out, INSIDE) < max(least, INSIDE) - TIE:
+        s, t, converged = _newton(point, terms, directions, g, middle, middle, height)
+        out = beyond(triangular[g], s, t) if converged else np.inf
+        if converged and max(out, INSIDE) < max(least, INSIDE) - TIE:
             best, best_s, best_t, least = g, s, t, out
     return best, best_s, best_t, least
 

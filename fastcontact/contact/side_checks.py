@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fastcontact.arrays import Array, Mask, Numbers
-from fastcontact.contact.obstacles.rigid_side import RigidSide, Stance
+from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements
@@ -51,7 +51,7 @@ def check_sides(mesh: Mesh, name: str, secondary: Surface, primary: Surface, exc
 def check_obstacle(mesh: Mesh, name: str, secondary: Surface, obstacle: RigidSide) -> None:
     """Raise ContactError for an obstacle of contact `name` that no facet of the secondary side faces."""
     centres, outward, _ = _facet_frames(mesh, secondary)
-    _, normal, paired, _ = obstacle.facing(centres, Stance(np.zeros(mesh.dim)))
+    _, normal, paired, _ = obstacle.facing(centres, Pose(np.zeros(mesh.dim)))
     along = np.einsum("id,id->i", outward, normal)[paired]
     if len(along) and (along >= 0).all():
         raise ContactError(
@@ -65,11 +65,11 @@ def shared_facets(mesh: Mesh, group: str, other: str) -> Numbers:
     ours, theirs = mesh.cells_of(group, dim=mesh.dim - 1), mesh.cells_of(other, dim=mesh.dim - 1)
     nodes = [np.empty(0, np.int32)]
     for name in ours.keys() & theirs.keys():
-        found, count = np.unique(
+        facets, count = np.unique(
             np.concatenate([np.unique(np.sort(side[name], axis=1), axis=0) for side in (ours, theirs)]),
             axis=0, return_counts=True,
         )  # fmt: skip
-        nodes.append(found[count > 1].ravel())
+        nodes.append(facets[count > 1].ravel())
     return np.unique(np.concatenate(nodes))
 
 

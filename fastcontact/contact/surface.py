@@ -101,16 +101,16 @@ class Surface:
         rows = [np.repeat(block.local, block.local.shape[1], axis=1).ravel() for block in self.blocks]
         columns = [np.tile(block.local, block.local.shape[1]).ravel() for block in self.blocks]
         row, column, m = np.concatenate(rows), np.concatenate(columns), len(self.points)
-        found = csr_array(coo_array((np.ones(len(row)), (row, column)), shape=(m, m)))
-        found.data[:] = 1.0
-        return found
+        adjacency = csr_array(coo_array((np.ones(len(row)), (row, column)), shape=(m, m)))
+        adjacency.data[:] = 1.0
+        return adjacency
 
     @cached_property
     def near(self) -> csr_array:
         """One (m, m) where two nodes lie in one facet or in two facets that share a node."""
-        found = csr_array(self.beside @ self.beside)
-        found.data[:] = 1.0
-        return found
+        adjacency = csr_array(self.beside @ self.beside)
+        adjacency.data[:] = 1.0
+        return adjacency
 
     @cached_property
     def triangular(self) -> Mask:
@@ -124,11 +124,11 @@ class Surface:
         sizes = np.concatenate([np.full(len(block.local), block.local.shape[1]) for block in self.blocks])
         start = np.concatenate([[0], np.cumsum(sizes)])
         incidence = csr_array((np.ones(len(nodes)), nodes, start), shape=(self.n_facets, len(self.points)))
-        found = csr_array(incidence @ incidence.T)
-        found.setdiag(0.0)
-        found.eliminate_zeros()
-        found.sort_indices()
-        return found.indptr.astype(np.intp), found.indices.astype(np.intp)
+        adjacency = csr_array(incidence @ incidence.T)
+        adjacency.setdiag(0.0)
+        adjacency.eliminate_zeros()
+        adjacency.sort_indices()
+        return adjacency.indptr.astype(np.intp), adjacency.indices.astype(np.intp)
 
     def corners(self, coordinates: Array) -> list[Array]:
         """Return the nodes (n_facets, n_nodes, dim) of each block at nodal `coordinates` (n_points, dim)."""
@@ -145,13 +145,13 @@ def surface(mesh: Mesh, group: str) -> Surface:
     ContactError
         If the group holds no facets, or a facet inside a solid or without one.
     """
-    found = mesh.cells_of(group, dim=mesh.dim - 1)
-    if not found:
+    cells = mesh.cells_of(group, dim=mesh.dim - 1)
+    if not cells:
         raise ContactError(
             f"group '{group}' holds no facets (cells of dimension {mesh.dim - 1}): name a boundary group"
         )
     outer = outer_facets(mesh)
-    facets = {name: _outward(mesh, group, name, block, outer) for name, block in found.items()}
+    facets = {name: _outward(mesh, group, name, block, outer) for name, block in cells.items()}
     points, abscissa = _ordered(mesh, group, facets)
     position = np.full(mesh.n_points, -1, np.intp)
     position[points] = np.arange(len(points))

@@ -93,8 +93,8 @@ class Smoothing:
         a = self.secondary.curvature[ours]
         b = _in_plane_of(frames[0][ours], frames[1][theirs], self.primary.curvature[theirs])
         common = -np.einsum("nij,nij->n", a, b)
-        own = np.stack([np.einsum("nij,nij->n", tensor, tensor) for tensor in (a, b)], axis=1)
-        return np.clip(np.divide(common[:, None], own, out=np.zeros_like(own), where=own > 0.0), 0.0, 1.0)
+        squares = np.stack([np.einsum("nij,nij->n", tensor, tensor) for tensor in (a, b)], axis=1)
+        return np.clip(np.divide(common[:, None], squares, out=np.zeros_like(squares), where=squares > 0.0), 0.0, 1.0)
 
     def overlap(self, ours: tuple[Indices, Array], theirs: tuple[Indices, Array], frames: Sequence[Array]) -> Array:
         """Return by how much (n,) the smooth surfaces are closer to each other than the facets, where these face [length].
@@ -111,14 +111,14 @@ def frames(side: Surface, points: Array, coordinates: Array) -> Array:
     At rest, at `points` (n_points, dim), the first one goes towards the first corner; they take part in the mean deformation
     of a facet to `coordinates` (n_points, dim), so that no corner matters more than others.
     """
-    found = []
+    frames_of_blocks = []
     for block in side.blocks:
         rest, now = (x[block.facets[:, : elements.get(block.element).n_corners]] for x in (points, coordinates))
         axes = _axes(block, points, _normals(block, points))[:, :-1]
         local = (rest - rest.mean(axis=1, keepdims=True)) @ axes.transpose(0, 2, 1)
         apart = now - now.mean(axis=1, keepdims=True)
-        found.append(np.linalg.solve(local.transpose(0, 2, 1) @ local, local.transpose(0, 2, 1) @ apart))
-    return np.concatenate(found)
+        frames_of_blocks.append(np.linalg.solve(local.transpose(0, 2, 1) @ local, local.transpose(0, 2, 1) @ apart))
+    return np.concatenate(frames_of_blocks)
 
 
 def _normals(block: FacetBlock, coordinates: Array) -> Array:

@@ -64,24 +64,24 @@ class TiedPair:
         return parts[0], np.column_stack(parts[1:])
 
 
-def tied(part: Constraints) -> TiedPair:
-    """Return the tying equations of the constraints `part`, which have tangents."""
-    moments = moments_of(part)
+def tied(constraints: Constraints) -> TiedPair:
+    """Return the tying equations of the constraints `constraints`, which have tangents."""
+    moments = moments_of(constraints)
     size = np.maximum(np.asarray(abs(moments).sum(axis=1)).ravel(), 1e-300)
-    positions = abs(moments) @ part.positions / size[:, None]
-    rows = tuple(_cleaned(csr_array(moments @ along)) for along in (part.B, *part.tangents))
-    assert part.nodal is not None
-    return TiedPair(moments, rows, part.directions, positions, part.nodal, part.nodes)
+    positions = abs(moments) @ constraints.positions / size[:, None]
+    rows = tuple(_cleaned(csr_array(moments @ along)) for along in (constraints.B, *constraints.tangents))
+    assert constraints.nodal is not None
+    return TiedPair(moments, rows, constraints.directions, positions, constraints.nodal, constraints.nodes)
 
 
-def moments_of(part: Constraints) -> csr_array:
+def moments_of(constraints: Constraints) -> csr_array:
     """Return the matrix (q, m) whose rows are the functions that the multipliers are combinations of."""
-    if not isinstance(part.compliance, Projection):
-        return csr_array(eye_array(len(part.gap0), format="csr"))
-    P, areas = part.compliance.P, part.compliance.areas
+    if not isinstance(constraints.compliance, Projection):
+        return csr_array(eye_array(len(constraints.gap0), format="csr"))
+    P, areas = constraints.compliance.P, constraints.compliance.areas
     weighted = csr_array(P.T @ diags_array(areas))
     scale = np.asarray(abs(weighted).sum(axis=1)).ravel()
-    alone = np.flatnonzero((areas == 0.0) & part.usable)  # at the axis
+    alone = np.flatnonzero((areas == 0.0) & constraints.usable)  # at the axis
     single = csr_array((np.ones(len(alone)), (np.arange(len(alone)), alone)), shape=(len(alone), len(areas)))
     return csr_array(vstack([diags_array(1.0 / np.maximum(scale, 1e-300)) @ weighted, single]))
 

@@ -21,12 +21,12 @@ from fastcontact.contact.surface import Surface
 ROUND_OFF = 1e-9
 
 
-def with_arms(part: Constraints, pairing: Pairing, primary: Surface, points: Array) -> Constraints:
+def with_arms(constraints: Constraints, pairing: Pairing, primary: Surface, points: Array) -> Constraints:
     """Return constraints whose tangential rows are zero in small rotations of both sides, also across a gap.
 
     Parameters
     ----------
-    part : Constraints
+    constraints : Constraints
         Of m places, with tangents.
     pairing : Pairing
         What the places face.
@@ -34,22 +34,22 @@ def with_arms(part: Constraints, pairing: Pairing, primary: Surface, points: Arr
     points : ndarray (n_points, dim)
         Reference coordinates [length].
     """
-    size = float(np.ptp(part.positions, axis=0).max(initial=0.0))
-    normal, facing = normals(part.directions), pairing.places(primary, np.arange(len(part)))
+    size = float(np.ptp(constraints.positions, axis=0).max(initial=0.0))
+    normal, facing = normals(constraints.directions), pairing.places(primary, np.arange(len(constraints)))
     axes = np.einsum("mkj,mkd->mdj", facing.gradient, points[facing.nodes])
     along = np.einsum("mkj,mjd->mkd", facing.gradient, np.linalg.pinv(axes))
     rotations = _rotations(points)
     rows = []
-    for own, direction in zip(part.tangents, part.directions, strict=True):
+    for tangent, direction in zip(constraints.tangents, constraints.directions, strict=True):
         slope = np.einsum("mkd,md->mk", along, direction)
         lever = _rows(slope[:, :, None] * normal[:, None, :], facing.nodes, points.size)
-        arm, left = np.asarray(lever @ rotations), np.asarray(own @ rotations)
+        arm, left = np.asarray(lever @ rotations), np.asarray(tangent @ rotations)
         square = np.maximum((arm**2).sum(axis=1), 1e-300)
         length = (arm * left).sum(axis=1) / square
-        moved = np.abs(np.stack([own @ np.tile(e, len(points)) for e in np.eye(points.shape[1])])).max(axis=0)
+        moved = np.abs(np.stack([tangent @ np.tile(e, len(points)) for e in np.eye(points.shape[1])])).max(axis=0)
         length[(np.abs(length) <= ROUND_OFF * size) | (moved > ROUND_OFF)] = 0.0
-        rows.append(csr_array(own - diags_array(length) @ lever) if length.any() else own)
-    return replace(part, tangents=tuple(rows))
+        rows.append(csr_array(tangent - diags_array(length) @ lever) if length.any() else tangent)
+    return replace(constraints, tangents=tuple(rows))
 
 
 def _rotations(points: Array) -> Array:
@@ -64,6 +64,6 @@ def _rows(values: Array, nodes: Numbers, n_dofs: int) -> csr_array:
     """Return a matrix (m, n_dofs) of the `values` (m, k, dim) at the components of `nodes` (m, k)."""
     m, k, dim = values.shape
     columns = nodes[:, :, None].astype(np.intp) * dim + np.arange(dim)
-    found = csr_array((values.ravel(), columns.ravel(), k * dim * np.arange(m + 1)), shape=(m, n_dofs))
-    found.sum_duplicates()
-    return found
+    rows = csr_array((values.ravel(), columns.ravel(), k * dim * np.arange(m + 1)), shape=(m, n_dofs))
+    rows.sum_duplicates()
+    return rows

@@ -48,16 +48,16 @@ class UnrolledLine:
 
         last = len(self.nodes) - 1
         nearest = cKDTree(self.nodes).query(positions)[1]
-        best, found = np.full(len(positions), np.inf), np.zeros(len(positions))
+        best, arc_length = np.full(len(positions), np.inf), np.zeros(len(positions))
         for piece in (np.clip(nearest - 1, 0, last - 1), np.clip(nearest, 0, last - 1)):
             begin, along = self.nodes[piece], self.nodes[piece + 1] - self.nodes[piece]
             size = np.einsum("nd,nd->n", along, along)
-            part = np.clip(np.einsum("nd,nd->n", positions - begin, along) / size, 0.0, 1.0)
-            away = np.linalg.norm(begin + part[:, None] * along - positions, axis=1)
+            fraction = np.clip(np.einsum("nd,nd->n", positions - begin, along) / size, 0.0, 1.0)
+            away = np.linalg.norm(begin + fraction[:, None] * along - positions, axis=1)
             nearer = away < best
             best[nearer] = away[nearer]
-            found[nearer] = (self.abscissa[piece] + part * np.sqrt(size))[nearer]
-        return found
+            arc_length[nearer] = (self.abscissa[piece] + fraction * np.sqrt(size))[nearer]
+        return arc_length
 
 
 def unrolled(surface: Surface, coordinates: Array, middle: Array | None) -> UnrolledLine | None:
@@ -79,7 +79,7 @@ def unrolled(surface: Surface, coordinates: Array, middle: Array | None) -> Unro
 
 
 def _loop(surface: Surface) -> list[int] | None:
-    """Return the nodes of a surface, as rows of its points, in order around one closed line; None if it is none."""
+    """Return the nodes of a surface, as rows of its points, in order around one closed line; None if it is open."""
     following: dict[int, int] = {}
     for block in surface.blocks:
         middles = block.local[:, 2:]

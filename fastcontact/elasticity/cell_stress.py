@@ -127,8 +127,10 @@ class CellStress:
         if xi is elements.get(name).quadrature[0]:
             one = np.empty((len(cells), 1, out.shape[2]))
             for q in range(len(xi)):
-                own = np.ascontiguousarray(material[:, q])
-                loops.stress(self._mesh.points, cells, N[q : q + 1], dN[q : q + 1], moduli, own, *shared, one)
+                moduli_at_point = np.ascontiguousarray(material[:, q])
+                loops.stress(
+                    self._mesh.points, cells, N[q : q + 1], dN[q : q + 1], moduli, moduli_at_point, *shared, one
+                )
                 out[:, q] = one[:, 0]
             return
         unit, first = np.eye(self._moduli.shape[1])[None], np.zeros(len(cells), np.int32)
@@ -190,12 +192,12 @@ class CellStress:
         if split is None:
             return
         bulk = split.bulk[of_cells(material)]
-        own = bulk[:, 0] != 0.0
-        at_points = offset.initial("strain", name, rows[own], elements.get(name).tables[0])
+        of_bulk = bulk[:, 0] != 0.0
+        at_points = offset.initial("strain", name, rows[of_bulk], elements.get(name).tables[0])
         assert at_points is not None
         dilatations = at_points[:, :, :3].sum(axis=2)
-        parts = dilatation.projected(name, self._mesh.points[cells[own]], dilatations, xi, self._axisymmetric)
-        out[own, :, :3] -= (bulk[own][:, :, None] * parts).sum(axis=1)[:, :, None]
+        parts = dilatation.projected(name, self._mesh.points[cells[of_bulk]], dilatations, xi, self._axisymmetric)
+        out[of_bulk, :, :3] -= (bulk[of_bulk][:, :, None] * parts).sum(axis=1)[:, :, None]
 
     def _subtract_thermal(
         self,
@@ -217,8 +219,8 @@ class CellStress:
         projected = np.zeros(len(cells), bool) if split is None else split.bulk[material, 0] != 0.0
         out -= np.where(projected[:, None], 0.0, rise)[:, :, None] * per_degree
         if split is not None and projected.any():
-            own, numbers = cells[projected], material[projected]
-            heat = thermal.rise[own] @ element.tables[0].T
-            parts = dilatation.projected(name, self._mesh.points[own], heat, xi, self._axisymmetric)
+            members, numbers = cells[projected], material[projected]
+            heat = thermal.rise[members] @ element.tables[0].T
+            parts = dilatation.projected(name, self._mesh.points[members], heat, xi, self._axisymmetric)
             pressure = (split.bulk[numbers] * 3.0 * thermal.expansion[numbers, None])[:, :, None] * parts
             out[projected, :, :3] -= pressure.sum(axis=1)[:, :, None]

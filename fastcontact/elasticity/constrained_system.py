@@ -19,7 +19,7 @@ from fastcontact._jit import parallel
 from fastcontact._jit.norms_kernels import largest
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.elasticity import system_kernels
-from fastcontact.elasticity.relations import Elimination, Relation, eliminate, stacked_rows
+from fastcontact.elasticity.multipoint_constraints import Elimination, MultiPointConstraint, eliminate, stacked_rows
 from fastcontact.errors import ModelError
 from fastcontact.linear.multigrid.matrix import block_matrix
 
@@ -64,7 +64,7 @@ class System:
         Stiffness [force / length]; what supports take out of it is taken out of this array.
     supported : ndarray of bool (n,)
         Displacement components that are prescribed.
-    relations : sequence of Relation
+    relations : sequence of MultiPointConstraint
     without_stiffness : ndarray of bool (n,), optional
         Components that are free although they have no stiffness, such as those of rigid obstacles: none by default.
 
@@ -85,7 +85,11 @@ class System:
     """
 
     def __init__(
-        self, K: bsr_array, supported: Mask, relations: Sequence[Relation] = (), without_stiffness: Mask | None = None
+        self,
+        K: bsr_array,
+        supported: Mask,
+        relations: Sequence[MultiPointConstraint] = (),
+        without_stiffness: Mask | None = None,
     ) -> None:
         R = stacked_rows(relations, K.shape[0])
         related = np.zeros(K.shape[0], bool)
@@ -202,10 +206,10 @@ class ConstrainedMotion:
     Parameters
     ----------
     fixed : ndarray of bool (n,)
-    relations : sequence of Relation
+    relations : sequence of MultiPointConstraint
     """
 
-    def __init__(self, fixed: Mask, relations: Sequence[Relation]) -> None:
+    def __init__(self, fixed: Mask, relations: Sequence[MultiPointConstraint]) -> None:
         self.fixed, self.relations = fixed, list(relations)
         self.free: Mask = ~fixed
         if not relations:

@@ -88,11 +88,11 @@ def projected(name: str, corners: Array, values: Array, xi: Array, axisymmetric:
     volume = cell_volumes(corners, N, dN, axisymmetric) * weights
     at = basis(name, elements.get(name).quadrature[0])
     mass = np.einsum("cq,qm,qn->cmn", volume, at, at)
-    found = (
+    projection = (
         np.linalg.solve(mass, np.einsum("cq,qm,cq->cm", volume, at, values)[:, :, None])[:, :, 0] @ basis(name, xi).T
     )
-    mean = np.broadcast_to(((volume * values).sum(axis=1) / volume.sum(axis=1))[:, None], found.shape)
-    return np.stack([mean, found - mean], axis=1)
+    mean = np.broadcast_to(((volume * values).sum(axis=1) / volume.sum(axis=1))[:, None], projection.shape)
+    return np.stack([mean, projection - mean], axis=1)
 
 
 def basis(name: str, xi: Array) -> Array:

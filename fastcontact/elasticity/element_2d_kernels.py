@@ -35,11 +35,11 @@ def _map(points, cell, N, dN, q, gradient):
 @kernel
 def owned(cells, c, owner, part, mine):
     """Fill `mine` (n_nodes,) with which nodes of a cell have the owner `part`; return whether any has."""
-    found = False
+    is_owned = False
     for a in range(cells.shape[1]):
         mine[a] = owner[cells[c, a]] == part
-        found = found or mine[a]
-    return found
+        is_owned = is_owned or mine[a]
+    return is_owned
 
 
 @kernel

@@ -8,7 +8,7 @@ cell; ``pairs`` (dim, dim), the component of stress of two directions; ``moduli`
 or of their quadrature points. dim is 2 or 3, with 4 or 13 modes.
 
 With the strains M of unit modes and B of unit displacements of the nodes, own = sum w M^T D M = L L^T and mixed = sum w M^T D
-B: modes give way by a = -own^-1 mixed u, and take (L^-1 mixed)^T (L^-1 mixed) from the stiffness.
+B: static condensation eliminates the modes by a = -own^-1 mixed u, and take (L^-1 mixed)^T (L^-1 mixed) from the stiffness.
 """
 
 import numpy as np
@@ -104,7 +104,7 @@ def _integrate(x, dN, xi, weights, middle, pairs, moduli, numbers, own, mixed):
 def subtract_stiffness(
     points, cells, dN, xi, weights, middle, pairs, moduli, bends, material, slots, owner, part, data
 ):
-    """Subtract what modes give way from `data` (n_blocks, dim, dim), in the rows of a part's nodes.
+    """Subtract the condensed modes from `data` (n_blocks, dim, dim), in the rows of a part's nodes.
 
     `slots`, `owner` and `part` as for the element loops of the whole stiffness; Jacobians have been found positive.
     """

@@ -34,15 +34,15 @@ class Densities:
 
         `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] shape values of the points.
         """
-        found = np.full((len(rows), len(N)), np.nan)
-        own = self.number[name][rows]
+        density = np.full((len(rows), len(N)), np.nan)
+        number = self.number[name][rows]
         for index, material in enumerate(self.materials):
-            cells = np.flatnonzero(own == index)
+            cells = np.flatnonzero(number == index)
             if isinstance(material.density, Varying):
-                found[cells] = material.density.at(name, rows[cells], N).reshape(len(cells), len(N))
+                density[cells] = material.density.at(name, rows[cells], N).reshape(len(cells), len(N))
             elif material.density is not None:
-                found[cells] = material.density
-        return found
+                density[cells] = material.density
+        return density
 
 
 class InertiaLoad(VolumeLoad):
@@ -64,9 +64,9 @@ class InertiaLoad(VolumeLoad):
         for element, rows in self.rows(mesh):
             cells = mesh.cells[element][rows]
             x, N, volume = cell_points(mesh, element, cells, kinematics)
-            own = np.full(volume.shape, np.nan) if density is None else density.at(element, rows, N)
-            missing += int(np.isnan(own).any(axis=1).sum())
-            add_density(forces, cells, N, self.acceleration(x, kinematics) * (volume * own)[:, :, None])
+            densities = np.full(volume.shape, np.nan) if density is None else density.at(element, rows, N)
+            missing += int(np.isnan(densities).any(axis=1).sum())
+            add_density(forces, cells, N, self.acceleration(x, kinematics) * (volume * densities)[:, :, None])
         if missing:
             raise ModelError(
                 f"{self.name} needs densities, but the materials of {missing} solid cells have none: give them density=..., "
@@ -95,10 +95,10 @@ class Gravity(InertiaLoad):
 
     def acceleration(self, x: Array, kinematics: str) -> Array:
         """Return the same vector (..., dim) [length / time^2] at all positions `x` (..., dim) [length]."""
-        found = np.zeros(x.shape)
+        acceleration = np.zeros(x.shape)
         for axis, value in self.components.items():
-            found[..., axis] = value
-        return found
+            acceleration[..., axis] = value
+        return acceleration
 
 
 @dataclass(frozen=True)

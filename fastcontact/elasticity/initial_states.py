@@ -63,12 +63,12 @@ class InitialState:
         """
         size = 6 if self.kinematics == "3d" else 4
         inside = np.isin(rows, self.cells.rows.get(name, ()))
-        own = rows[inside]
-        local = np.zeros((len(own) * len(N), 6))
+        members = rows[inside]
+        local = np.zeros((len(members) * len(N), 6))
         for component, value in self.components.items():
-            local[:, component] = value.at(name, own, N) if isinstance(value, Varying) else value
+            local[:, component] = value.at(name, members, N) if isinstance(value, Varying) else value
         if self.axes is not None:
-            places = positions(self.cells.mesh, self.cells.mesh.cells[name][own], N)
+            places = positions(self.cells.mesh, self.cells.mesh.cells[name][members], N)
             turn = rotations(frames(self.axes, places, self.kinematics))
             if self.kind == "strain":  # the work of a stress is that of its turned one
                 turn = np.asarray(np.linalg.inv(turn).transpose(0, 2, 1))
@@ -76,9 +76,9 @@ class InitialState:
         out = np.abs(local[:, size:]).max(initial=0.0)
         if out > ROUND_OFF * np.abs(local).max(initial=0.0) or self._across(local):
             raise ModelError(f"{self.name} has components along z that {self.kinematics} does not have: turn its axes")
-        found = np.zeros((len(rows), len(N), size))
-        found[inside] = local[:, :size].reshape(len(own), len(N), size)
-        return found
+        values = np.zeros((len(rows), len(N), size))
+        values[inside] = local[:, :size].reshape(len(members), len(N), size)
+        return values
 
     def _across(self, values: Array) -> bool:
         """Return whether a stress (n, 6) [pressure] acts across the plane of plane stress."""
@@ -113,9 +113,9 @@ def initial_state(
         components[number] = value
     if not components:
         raise ModelError(f"{label} names no component: give for example xx=...")
-    found = InitialState(kind, groups, cells, components, checked_axes(axes), kinematics, ramp or ALWAYS)
-    found.check()
-    return found
+    state = InitialState(kind, groups, cells, components, checked_axes(axes), kinematics, ramp or ALWAYS)
+    state.check()
+    return state
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,5 +144,5 @@ class StressOffset:
 
         `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] shape values of the points.
         """
-        found = [factor * state.values(name, rows, N) for factor, state in self.states if state.kind == kind]
-        return np.asarray(np.sum(found, axis=0)) if found else None
+        values = [factor * state.values(name, rows, N) for factor, state in self.states if state.kind == kind]
+        return np.asarray(np.sum(values, axis=0)) if values else None

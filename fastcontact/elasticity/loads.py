@@ -282,8 +282,8 @@ def outward(mesh: Mesh, group: str, element: str, block: Numbers) -> Numbers:
     """
     outer = outer_facets(mesh).get(element, np.empty((0, block.shape[1]), np.int32))
     keys = np.sort(np.vstack([outer, block]), axis=1)
-    _, first, place = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-    match = first[place.ravel()[len(outer) :]]
+    _, first, index = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    match = first[index.ravel()[len(outer) :]]
     missing = np.flatnonzero(match >= len(outer))
     if len(missing):
         where = mesh.points[block[missing[0]]].mean(axis=0)
@@ -302,18 +302,18 @@ def evaluated(value: Value, points: Array, name: str) -> Array:
     if not callable(value):
         return np.full(points.shape[:-1], float(value))
     flat = np.ascontiguousarray(points.reshape(-1, points.shape[-1]))
-    found = np.asarray(values_at(value, flat, name, ModelError))
-    if found.shape != (len(flat),) or found.dtype.kind not in "fiu":
+    array = np.asarray(values_at(value, flat, name, ModelError))
+    if array.shape != (len(flat),) or array.dtype.kind not in "fiu":
         raise ModelError(
-            f"{name} is a function that returned {found.dtype} numbers of shape {found.shape} for {len(flat)} points: "
+            f"{name} is a function that returned {array.dtype} numbers of shape {array.shape} for {len(flat)} points: "
             f"it must return one real number a point, shape ({len(flat)},)"
         )
-    bad = np.flatnonzero(~np.isfinite(found))
+    bad = np.flatnonzero(~np.isfinite(array))
     if len(bad):
-        raise ModelError(f"{name} is {found[bad[0]]} at {flat[bad[0]]}: it must be finite everywhere")
-    if np.abs(found).max(initial=0.0) > LARGEST:
+        raise ModelError(f"{name} is {array[bad[0]]} at {flat[bad[0]]}: it must be finite everywhere")
+    if np.abs(array).max(initial=0.0) > LARGEST:
         raise ModelError(f"{name} is out of range: its size must be at most {LARGEST:g} everywhere, in any unit")
-    return found.astype(np.float64).reshape(points.shape[:-1])
+    return array.astype(np.float64).reshape(points.shape[:-1])
 
 
 def check_number(name: str, value: Any) -> None:
@@ -331,17 +331,17 @@ def check_value(name: str, value: Any) -> None:
         check_number(name, value)
 
 
-def axes_of(what: str, components: Mapping[str, Any], dim: int) -> dict[int, Any]:
+def axes_of(caption: str, components: Mapping[str, Any], dim: int) -> dict[int, Any]:
     """Return components given by the names of their axes, those that are not None, by number.
 
     ModelError if there is none, or an axis is not one of the space.
     """
     given = {name: value for name, value in components.items() if value is not None}
     if not given:
-        raise ModelError(f"{what} has no component: give for example y=-1.0")
+        raise ModelError(f"{caption} has no component: give for example y=-1.0")
     for name in given:
         if name not in "xyz"[:dim]:
-            raise ModelError(f"{what}: {unknown('component', name, 'xyz'[:dim])}")
+            raise ModelError(f"{caption}: {unknown('component', name, 'xyz'[:dim])}")
     return {"xyz".index(name): value for name, value in given.items()}
 
 

@@ -35,20 +35,20 @@ def mass(mesh: Mesh, kinematics: str, density: DensityField) -> bsr_array:
         element = elements.get(name)
         xi, weights = integration_rule(element)
         N, corners = element.shape(xi), mesh.points[mesh.cells[name][rows]]
-        own = density.at(name, rows, N)
-        missing += int(np.isnan(own).any(axis=1).sum())
+        rho = density.at(name, rows, N)
+        missing += int(np.isnan(rho).any(axis=1).sum())
         volume = cell_volumes(corners, N, element.gradient(xi), kinematics == "axisymmetric") * weights
-        return np.einsum("cq,qa,qb->cab", own * volume, N, N, optimize=True)[..., None]
+        return np.einsum("cq,qa,qb->cab", rho * volume, N, N, optimize=True)[..., None]
 
-    found = _assembled(mesh, sparsity(mesh), local)
+    matrix = _assembled(mesh, sparsity(mesh), local)
     if missing:
         raise ModelError(
             f"modes need densities, but the materials of {missing} solid cells have none: give them density=..., 0.0 for a "
             "body without mass"
         )
-    if not found.data.any():
+    if not matrix.data.any():
         raise ModelError("all densities are zero, and what has no mass has no modes: give the materials density=...")
-    return found
+    return matrix
 
 
 def stress_stiffness(mesh: Mesh, stresses: CellStress, material: Mapping[str, Any], axisymmetric: bool) -> bsr_array:
@@ -94,10 +94,10 @@ def _assembled(mesh: Mesh, pattern: Sparsity, local: Callable[[str, Indices], Ar
         size = max(1, AT_ONCE // cells.shape[1] ** 2)
         for first in range(0, len(cells), size):
             rows = np.arange(first, min(first + size, len(cells)))
-            found, slots = local(name, rows), pattern.slots[name][rows].ravel()
+            blocks, slots = local(name, rows), pattern.slots[name][rows].ravel()
             for k in range(mesh.dim):
-                own = found[..., min(k, found.shape[3] - 1)].ravel()
-                diagonals[k] += np.bincount(slots, own, len(pattern.indices))
+                values = blocks[..., min(k, blocks.shape[3] - 1)].ravel()
+                diagonals[k] += np.bincount(slots, values, len(pattern.indices))
     data = np.zeros((len(pattern.indices), mesh.dim, mesh.dim))
     data[:, range(mesh.dim), range(mesh.dim)] = diagonals.T
     n = mesh.n_points * mesh.dim

@@ -40,12 +40,12 @@ class CylindricalAxes:
     def __post_init__(self) -> None:
         for name in ("origin", "direction"):
             check_type(f"{name} of CylindricalAxes", getattr(self, name), Any, ModelError)
-            found = _vectors(getattr(self, name), f"the {name} of cylindrical axes")
-            if found.shape != (3,):
+            vector = _vectors(getattr(self, name), f"the {name} of cylindrical axes")
+            if vector.shape != (3,):
                 raise ModelError(
                     f"the {name} of cylindrical axes must have three components, not {getattr(self, name)}"
                 )
-            object.__setattr__(self, name, tuple(found.tolist()))
+            object.__setattr__(self, name, tuple(vector.tolist()))
         if not any(self.direction):
             raise ModelError("the direction of cylindrical axes has no length")
 
@@ -79,30 +79,30 @@ def checked_axes(axes: Any) -> Axes:
     """
     if axes is None or callable(axes):
         return axes  # type: ignore[no-any-return]
-    found = _vectors(axes, "the axes of a material")
-    if found.shape == (2,):
-        found = np.array([[*found, 0.0], [-found[1], found[0], 0.0]])
-    if found.shape not in ((2, 3), (3, 3)):
+    vectors = _vectors(axes, "the axes of a material")
+    if vectors.shape == (2,):
+        vectors = np.array([[*vectors, 0.0], [-vectors[1], vectors[0], 0.0]])
+    if vectors.shape not in ((2, 3), (3, 3)):
         raise ModelError(
             f"the axes of a material must be one vector (x, y) for the plane, two or three vectors (x, y, z), or a function; "
-            f"not numbers of shape {found.shape}"
+            f"not numbers of shape {vectors.shape}"
         )
-    lengths = np.linalg.norm(found, axis=1, keepdims=True)
+    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
     if not lengths.min() > 0.0:
-        raise ModelError(f"the axes of a material {found.tolist()} have one without length")
-    found = found / lengths
-    off = np.abs(found @ found.T - np.eye(len(found))).max()
+        raise ModelError(f"the axes of a material {vectors.tolist()} have one without length")
+    vectors = vectors / lengths
+    off = np.abs(vectors @ vectors.T - np.eye(len(vectors))).max()
     if off > 1e-6:
         raise ModelError(
-            f"the axes of a material {found.tolist()} are not at right angles: the cosine between two is {off:.3g}"
+            f"the axes of a material {vectors.tolist()} are not at right angles: the cosine between two is {off:.3g}"
         )
-    first = found[0]
-    second = found[1] - (found[1] @ first) * first
+    first = vectors[0]
+    second = vectors[1] - (vectors[1] @ first) * first
     second /= np.linalg.norm(second)
     third = np.cross(first, second)
-    if len(found) == 3 and found[2] @ third < 0.0:
+    if len(vectors) == 3 and vectors[2] @ third < 0.0:
         raise ModelError(
-            f"the axes of a material {found.tolist()} are left-handed: turn the sign of the third, or leave it out"
+            f"the axes of a material {vectors.tolist()} are left-handed: turn the sign of the third, or leave it out"
         )
     return tuple(tuple(row) for row in np.array([first, second, third]).tolist())
 
@@ -123,41 +123,41 @@ def frames(axes: Axes, points: Array, kinematics: str) -> Array:
         )
     returned = values_at(axes, points, "the axes of a material", ModelError)
     try:
-        found = np.asarray(returned, complex if np.iscomplexobj(returned) else float)
+        frame = np.asarray(returned, complex if np.iscomplexobj(returned) else float)
     except (TypeError, ValueError):
         raise ModelError(f"the function of a material's axes returned {returned!r:.80}, which are no numbers") from None
-    if found.shape != (len(points), 3, 3):
+    if frame.shape != (len(points), 3, 3):
         raise ModelError(
-            f"the function of a material's axes returned numbers of shape {found.shape} for {len(points)} points: it must "
+            f"the function of a material's axes returned numbers of shape {frame.shape} for {len(points)} points: it must "
             f"return three vectors in rows for each, shape ({len(points)}, 3, 3)"
         )
-    off = np.abs(found @ found.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2), initial=0.0)
-    bad = np.flatnonzero(~(off <= 1e-6) | np.iscomplexobj(found))
+    off = np.abs(frame @ frame.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2), initial=0.0)
+    bad = np.flatnonzero(~(off <= 1e-6) | np.iscomplexobj(frame))
     if len(bad):
         raise ModelError(
-            f"the function of a material's axes returned {found[bad[0]].tolist()} at {points[bad[0]]}: these are not unit "
+            f"the function of a material's axes returned {frame[bad[0]].tolist()} at {points[bad[0]]}: these are not unit "
             "vectors at right angles"
         )
-    return found
+    return frame
 
 
 def rotations(frame: Array) -> Array:
     """Return the matrices (n, 6, 6) [-] from stresses in axes `frame` (n, 3, 3) to those in the axes of the mesh."""
-    found = np.empty((len(frame), 6, 6))
+    rotation = np.empty((len(frame), 6, 6))
     for row, (i, j) in enumerate(PAIRS):
         for column, (a, b) in enumerate(PAIRS):
-            found[:, row, column] = frame[:, a, i] * frame[:, b, j]
+            rotation[:, row, column] = frame[:, a, i] * frame[:, b, j]
             if a != b:
-                found[:, row, column] += frame[:, b, i] * frame[:, a, j]
-    return found
+                rotation[:, row, column] += frame[:, b, i] * frame[:, a, j]
+    return rotation
 
 
 def _vectors(values: Any, name: str) -> Array:
     """Return finite numbers as an array; ModelError names what they are otherwise."""
     try:
-        found = np.asarray(values)
+        vectors = np.asarray(values)
     except ValueError:  # rows of several lengths
-        found = np.empty(0, object)
-    if found.dtype.kind not in "iuf" or not np.isfinite(found).all():
+        vectors = np.empty(0, object)
+    if vectors.dtype.kind not in "iuf" or not np.isfinite(vectors).all():
         raise ModelError(f"{name} = {values!r} must be finite numbers")
-    return found.astype(float)
+    return vectors.astype(float)

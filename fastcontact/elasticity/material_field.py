@@ -97,10 +97,10 @@ class MaterialField:
         have no incompatible modes.
         """
         modes = np.array([material.incompatible_modes for material in self.materials], bool)[self.owner]
-        found = self.averaged.astype(np.uint8)
+        treatment = self.averaged.astype(np.uint8)
         if self.kinematics != "axisymmetric":
-            found[modes] += MODES
-        return found
+            treatment[modes] += MODES
+        return treatment
 
     @cached_property
     def contrast(self) -> float:
@@ -117,26 +117,26 @@ class MaterialField:
     @cached_property
     def compliance(self) -> Array:
         """Compliances (n_moduli, n_components, n_components) [1 / pressure], see `Material.compliance_at`."""
-        found = np.zeros_like(self.moduli)
+        compliance = np.zeros_like(self.moduli)
         for number, material in enumerate(self.materials):
             if not material.varies:  # else there is no cell of this number
-                found[number] = material.compliance_at(self._anywhere, self.kinematics)[0]
+                compliance[number] = material.compliance_at(self._anywhere, self.kinematics)[0]
         for own in self.places:
             law = self.materials[own.material]
-            found[own.rows] = law.compliance_at(own.points, self.kinematics, own.constants)
-        return found
+            compliance[own.rows] = law.compliance_at(own.points, self.kinematics, own.constants)
+        return compliance
 
     @cached_property
     def expansion(self) -> Array:
         """Thermal strains (n_moduli, n_components) [1 / temperature]; NaN of materials that have no expansion."""
-        found = np.zeros(self.moduli.shape[:2])
+        expansion = np.zeros(self.moduli.shape[:2])
         for number, material in enumerate(self.materials):
             if not material.varies:
-                found[number] = material.expansion_at(self._anywhere, self.kinematics)[0]
+                expansion[number] = material.expansion_at(self._anywhere, self.kinematics)[0]
         for own in self.places:
             law = self.materials[own.material]
-            found[own.rows] = law.expansion_at(own.points, self.kinematics, own.constants)
-        return found
+            expansion[own.rows] = law.expansion_at(own.points, self.kinematics, own.constants)
+        return expansion
 
     @property
     def _anywhere(self) -> Array:
@@ -222,8 +222,8 @@ def material_field(
             N = elements.get(name).tables[0]
             if name not in inside:
                 inside[name] = np.repeat(rows[name][:, None], len(N), axis=1)
-            found = added(index, positions(mesh, block[cells], N), material.constants_at(name, cells, N))
-            inside[name][cells] = found.reshape(len(cells), len(N))
+            index_at = added(index, positions(mesh, block[cells], N), material.constants_at(name, cells, N))
+            inside[name][cells] = index_at.reshape(len(cells), len(N))
     return MaterialField(
         materials, kinematics, np.concatenate(moduli), places, np.concatenate(owner), dict(number), rows, inside
     )

@@ -51,13 +51,13 @@ def material_sides(mesh: Mesh, material: Mapping[str, Numbers]) -> MaterialSides
     rows = np.unique(np.concatenate(keys))
     points, numbers = (rows // count).astype(np.int32), (rows % count).astype(np.int32)
     further = numbers != least[points]
-    place = points.copy()
-    place[further] = n + np.arange(np.count_nonzero(further), dtype=np.int32)
+    side = points.copy()
+    side[further] = n + np.arange(np.count_nonzero(further), dtype=np.int32)
     cells = {}
     for name, block in mesh.solids.items():
         here = shared[block]
         cells[name] = block.copy()
         wanted = (block.astype(np.int64) * count + material[name][:, None])[here]
-        cells[name][here] = place[np.searchsorted(rows, wanted)]
+        cells[name][here] = side[np.searchsorted(rows, wanted)]
     node = np.concatenate([np.arange(n, dtype=np.int32), points[further]])
-    return MaterialSides(cells, node, points, numbers, place)
+    return MaterialSides(cells, node, points, numbers, side)

@@ -106,8 +106,8 @@ class Material:
 
         Cells with a mean dilatation have the constants of their middle.
         """
-        own = [v for name in (*MODULI, "expansion") for v in varying(getattr(self, name, None))]
-        return (callable(self.axes) or any(v.inside for v in own)) and not self.averaged
+        varying_constants = [v for name in (*MODULI, "expansion") for v in varying(getattr(self, name, None))]
+        return (callable(self.axes) or any(v.inside for v in varying_constants)) and not self.averaged
 
     def bound(self: AnyMaterial, cells: Cells) -> AnyMaterial:
         """Return the material that knows its cells, which constants that vary need; ModelError where these cannot be."""
@@ -121,12 +121,12 @@ class Material:
                 getattr(self, name), lambda v: Varying(v.given, cells, label) if isinstance(v, Varying) else v
             )
 
-        found = copy.copy(self)
+        bound_material = copy.copy(self)
         for name in names:
-            object.__setattr__(found, name, known(name))
+            object.__setattr__(bound_material, name, known(name))
         for sample in cells.samples():
-            found._check_at(names, *sample)
-        return found
+            bound_material._check_at(names, *sample)
+        return bound_material
 
     @typed(ModelError)
     def constants_at(self, name: str, rows: Indices, N: Array) -> SimpleNamespace:
@@ -150,24 +150,24 @@ class Material:
 
     def _cells(self) -> Cells:
         """Return the cells that have the material; ModelError if they are not known."""
-        own = [v for name in CONSTANTS for v in varying(getattr(self, name, None))]
-        if not own or own[0].cells is None:
+        varying_constants = [v for name in CONSTANTS for v in varying(getattr(self, name, None))]
+        if not varying_constants or varying_constants[0].cells is None:
             raise ModelError("constants of the material depend on the position: ask the one in `materials` of a model")
-        return own[0].cells
+        return varying_constants[0].cells
 
     def _check_at(self, names: Sequence[str], element: str, rows: Indices, N: Array) -> None:
         """Raise ModelError, with the place, where the constants `names` are such that the material cannot be."""
-        found, count = self.constants_at(element, rows, N), len(rows) * len(N)
-        wrong = np.array(np.broadcast_to(~np.asarray(self.admissible(found), bool), count))
-        if found.density is not None:
-            wrong |= np.asarray(found.density) < 0.0
-        for own in found.conductivity if isinstance(found.conductivity, tuple) else (found.conductivity,):
-            wrong |= own is not None and ~(np.asarray(own, float) > 0.0)
+        constants, count = self.constants_at(element, rows, N), len(rows) * len(N)
+        wrong = np.array(np.broadcast_to(~np.asarray(self.admissible(constants), bool), count))
+        if constants.density is not None:
+            wrong |= np.asarray(constants.density) < 0.0
+        for k in constants.conductivity if isinstance(constants.conductivity, tuple) else (constants.conductivity,):
+            wrong |= k is not None and ~(np.asarray(k, float) > 0.0)
         if not wrong.any():
             return
         row = int(wrong.argmax())
         one = {
-            name: mapped(getattr(found, name), lambda v: float(np.broadcast_to(np.asarray(v), count)[row]))
+            name: mapped(getattr(constants, name), lambda v: float(np.broadcast_to(np.asarray(v), count)[row]))
             for name in names
         }
         mesh, cell = self._cells().mesh, int(rows[row // len(N)])
@@ -274,11 +274,11 @@ class Material:
         return compliance
 
 
-def check_positive(name: str, value: Any, what: str = "a positive number") -> None:
+def check_positive(name: str, value: Any, caption: str = "a positive number") -> None:
     """Raise ModelError if a constant of a material, `name` in the message, is not a positive number."""
     number: Any = float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
     if not 0.0 < number < math.inf:
-        raise ModelError(f"{name} = {value!r} must be {what}")
+        raise ModelError(f"{name} = {value!r} must be {caption}")
     if not 1.0 / LARGEST <= number <= LARGEST:
         raise ModelError(f"{name} is out of range: it must lie between {1.0 / LARGEST:g} and {LARGEST:g}, in any unit")
 
@@ -394,8 +394,8 @@ class LinearElastic(Material):
         """E / (1 - nu^2) [pressure]; the least where they vary."""
         if not self.graded:
             return self.E / (1 - self.nu**2)
-        found = [self.constants_at(*sample) for sample in self._cells().samples()]
-        return float(min(np.min(c.E / (1 - c.nu**2)) for c in found))
+        samples = [self.constants_at(*sample) for sample in self._cells().samples()]
+        return float(min(np.min(c.E / (1 - c.nu**2)) for c in samples))
 
     @property
     def largest_nu(self) -> float:

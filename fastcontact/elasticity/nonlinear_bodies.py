@@ -81,9 +81,9 @@ class NonlinearBodies:
     def _rows(self) -> Array:
         """Return the constants (n_moduli, n_constants) of all laws."""
         hooke = SAINT_VENANT if self.finite else LINEAR
-        own = [law.constants if isinstance(law, NonlinearElastic) else [hooke] for law in self._materials]
-        rows = np.zeros((len(own), max(4, *map(len, own))))
-        for row, constants in zip(rows, own, strict=True):
+        constants_of_laws = [law.constants if isinstance(law, NonlinearElastic) else [hooke] for law in self._materials]
+        rows = np.zeros((len(constants_of_laws), max(4, *map(len, constants_of_laws))))
+        for row, constants in zip(rows, constants_of_laws, strict=True):
             row[: len(constants)] = constants
         return np.ascontiguousarray(rows[self._owner])
 
@@ -132,7 +132,7 @@ class NonlinearBodies:
             if (bulk[:, 1] > 0.0).any():  # what is left is no linear function's
                 polynomials = polynomials[:, :1].copy() if elements.get(name).dilatation == 0 else polynomials
             owner, parts = pattern.owners(mesh, name)
-            new, own = np.empty_like(before[name]), np.empty((*before[name].shape[:2], 6 if dim == 3 else 4))
+            new, cauchy = np.empty_like(before[name]), np.empty((*before[name].shape[:2], 6 if dim == 3 else 4))
             energies, numbers, slots, old = (
                 np.zeros((len(cells), 2)),
                 self._cells[name],
@@ -144,7 +144,7 @@ class NonlinearBodies:
                 rows = slice(*parts[number])  # noqa: B023
                 status, cell = body_kernels.linearise(
                     mesh.points, cells[rows], N, dN, weights, polynomials, *flags, displacement, self._constants, moduli,  # noqa: B023
-                    bulk, numbers[rows], old[rows], slots[rows], owner, number, data, force, new[rows], own[rows],  # noqa: B023
+                    bulk, numbers[rows], old[rows], slots[rows], owner, number, data, force, new[rows], cauchy[rows],  # noqa: B023
                     energies[rows],  # noqa: B023
                 )  # fmt: skip
                 return status, int(cell) + rows.start
@@ -152,7 +152,7 @@ class NonlinearBodies:
             for status, cell in parallel.shared(part, range(len(parts))):
                 if status:
                     raise ConvergenceError(self._failure(status, name, cell, displacement))
-            history[name], stress[name] = new, own
+            history[name], stress[name] = new, cauchy
             energy += energies.sum(axis=0)
         size = mesh.n_points * dim
         K = bsr_array((data, pattern.indices, pattern.indptr), shape=(size, size))
@@ -161,12 +161,10 @@ class NonlinearBodies:
     def _failure(self, status: int, name: str, cell: int, displacement: Array) -> str:
         where = self.mesh.points[self.mesh.cells[name][cell]].mean(axis=0)
         measure = np.linalg.det(self._deformation(name, displacement, slice(cell, cell + 1))[0]).min()
-        what = f"turns inside out (J = {measure:.3g})"
+        failure = f"turns inside out (J = {measure:.3g})"
         if status != body_kernels.INVERTED:
-            what = "finds no strain across its plane stress"
-        return (
-            f"cell {cell} of {name} near {where} {what}: smaller load steps, or a mesh that is coarser there, may help"
-        )
+            failure = "finds no strain across its plane stress"
+        return f"cell {cell} of {name} near {where} {failure}: smaller load steps, or a mesh that is coarser there, may help"
 
     def cell_fields(self, bodies: DeformedBodies, displacement: Array) -> dict[str, Array]:
         """Return the fields of `field_names` (n_solids,): of cells, the extremes of their points but for the volume."""
@@ -176,7 +174,7 @@ class NonlinearBodies:
             else {name: self._yielding(name, bodies) for name in self._cells}
         )
         names = field_names(self._materials, "finite" if self.finite else "small")
-        return {name: np.concatenate([own[i] for own in fields.values()]) for i, name in enumerate(names)}
+        return {name: np.concatenate([field[i] for field in fields.values()]) for i, name in enumerate(names)}
 
     def _yielding(self, name: str, bodies: DeformedBodies) -> tuple[Array, Array]:
         """Return the largest equivalent plastic strain and yield ratio (n_cells,) of cells."""

@@ -105,7 +105,7 @@ class ElasticPlastic(NonlinearElastic):
         object.__setattr__(self, "hardening", self._table())
 
     def _table(self) -> tuple[tuple[float, float], ...]:
-        """Return the hardening table from zero on; ModelError if it is none."""
+        """Return the hardening table from zero on; ModelError if it is not one."""
         try:
             rows = np.array([[float(value) for value in row] for row in self.hardening]).reshape(-1, 2)
         except (TypeError, ValueError):

@@ -48,19 +48,19 @@ def smoothed_stress(
     """
     components = field.moduli.shape[1]
     stress = CellStress(mesh, kinematics, field.moduli, displacement, field.treatment, offset)
-    found = {name: np.empty((*block.shape, components)) for name, block in mesh.solids.items()}
+    by_kind = {name: np.empty((*block.shape, components)) for name, block in mesh.solids.items()}
     material = field.distinct
     for number in np.unique(np.concatenate([*material.values()])):
         average = recovery.NodalAverage(mesh.n_points, components)
-        rows = {name: np.flatnonzero(material[name] == number) for name in found}
+        rows = {name: np.flatnonzero(material[name] == number) for name in by_kind}
         for name, chosen in rows.items():
             xi, outward = sampling(name)
             cells = mesh.cells[name][chosen]
             average.add(cells, outward, stress.at(name, xi, cells, field.loops[name][chosen], chosen))
         nodal = average.result()
         for name, chosen in rows.items():
-            found[name][chosen] = nodal[mesh.cells[name][chosen]]
-    return found
+            by_kind[name][chosen] = nodal[mesh.cells[name][chosen]]
+    return by_kind
 
 
 def sampling(name: str) -> tuple[Array, Array]:

@@ -16,7 +16,7 @@ from scipy.sparse import bsr_array, csr_array, diags_array, vstack
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 
-# Springs between nodes that are so many times stiffer than the bodies there: told, and refused.
+# Ratio of the stiffness of a spring between nodes to that of the bodies there: warned about, and refused.
 STIFF, STIFFEST = 1e5, 1e12
 DIGITS = 16  # of the numbers that are computed with
 
@@ -80,7 +80,9 @@ def between(
     and have no line between them.
     """
     if first == second:
-        raise ModelError(f"{name}: both ends are point {first}; without a second node a spring hangs on the ground")
+        raise ModelError(
+            f"{name}: both ends are point {first}; without a second node a spring is attached to the ground"
+        )
     dim = points.shape[1]
     if along and direction is None:
         direction = _line(name, points, first, second)
@@ -211,8 +213,8 @@ def _stiffer(spring: Springs, diagonal: Array, dim: int) -> tuple[float, float]:
     """Return the largest ratio of a spring's stiffness to that of the softer body at its ends, and that stiffness."""
     rows = spring.rows.tocoo()
     row, node = rows.coords[0], rows.coords[1] // dim
-    ends, place = np.unique(np.stack([row, node]), axis=1, return_inverse=True)
-    body = np.bincount(place.ravel(), weights=rows.data**2 * diagonal[rows.coords[1]])
+    ends, index = np.unique(np.stack([row, node]), axis=1, return_inverse=True)
+    body = np.bincount(index.ravel(), weights=rows.data**2 * diagonal[rows.coords[1]])
     # Not springs that add to the diagonal alone, nor points that no body holds.
     coupling = (np.diff(spring.rows.indptr)[ends[0]] > 1) & (body > 0.0)
     if not coupling.any():

@@ -129,8 +129,8 @@ def stiffness(
         add = _Addition(mesh, name, kinematics == "axisymmetric", material[name], pattern, data)
         bends = incompatible_modes.asked(name, averaged)
         add_part = partial(add.part, moduli=moduli, special=special, split=split, bends=bends)
-        found = parallel.shared(add_part, range(add.n_parts))
-        bad = min((number for number in found if number >= 0), default=-1)
+        parts_done = parallel.shared(add_part, range(add.n_parts))
+        bad = min((number for number in parts_done if number >= 0), default=-1)
         if bad >= 0:
             where = mesh.points[block[bad]].mean(axis=0)
             raise MeshError(

@@ -32,13 +32,13 @@ def count_neighbours(start, nodes, first, cells, low, high, count):
     """Fill `count` (n_points,), from `low` to ``high - 1``, with the number of nodes that share a cell with each node."""
     seen = np.full(first.shape[0] - 1, -1, np.int32)
     for p in range(low, high):
-        found = 0
+        n_found = 0
         for k in range(first[p], first[p + 1]):
             for m in range(start[cells[k]], start[cells[k] + 1]):
                 if seen[nodes[m]] != p:
                     seen[nodes[m]] = p
-                    found += 1
-        count[p] = max(found, 1)  # a node without cells keeps its diagonal
+                    n_found += 1
+        count[p] = max(n_found, 1)  # a node without cells keeps its diagonal
 
 
 @kernel

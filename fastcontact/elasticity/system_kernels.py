@@ -22,15 +22,15 @@ def count_taken(indptr, indices, data, supported, supported_nodes, kept, low, hi
     for i in range(low, high):
         near = _near(i, indptr, indices, supported_nodes)
         for a in range(size):
-            row, found = size * i + a, 0
+            row, taken = size * i + a, 0
             for k in range(indptr[i] if near else indptr[i + 1], indptr[i + 1]):
                 j = indices[k]
                 for b in range(size):
                     if supported[i, a] or supported[j, b]:
                         stays = kept[row] if size * j + b == row else 0.0
                         if data[k, a, b] != stays:
-                            found += 1
-            count[row] = found
+                            taken += 1
+            count[row] = taken
 
 
 @kernel

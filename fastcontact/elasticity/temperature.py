@@ -76,12 +76,12 @@ class Temperature:
         else:
             blocks = [block for group in self.groups for block in mesh.cells_of(group, dim=mesh.dim).values()]
         points = np.unique(np.concatenate([block.ravel() for block in blocks]))
-        found = np.zeros(mesh.n_points)
+        rise = np.zeros(mesh.n_points)
         if isinstance(self.value, np.ndarray):
-            found[points] = self.value[points] - self.reference
+            rise[points] = self.value[points] - self.reference
         else:
-            found[points] = evaluated(self.value, mesh.points[points], self.name) - self.reference
-        return found
+            rise[points] = evaluated(self.value, mesh.points[points], self.name) - self.reference
+        return rise
 
 
 def checked_value(value: Any) -> Any:
@@ -110,23 +110,23 @@ def histories(
         If there are not as many times as instants, or they do not ascend.
     """
     instants = checked_times(times, len(values))
-    found = []
-    for place, time in enumerate(instants):
+    temperatures = []
+    for k, time in enumerate(instants):
         hat = tuple((other, float(other == time)) for other in instants)
-        own = Temperature(groups, values[place], reference, hat)
-        object.__setattr__(own, "times", instants)
-        object.__setattr__(own, "place", place)
-        found.append(own)
-    return found
+        temperature = Temperature(groups, values[k], reference, hat)
+        object.__setattr__(temperature, "times", instants)
+        object.__setattr__(temperature, "place", k)
+        temperatures.append(temperature)
+    return temperatures
 
 
 def checked_times(times: Sequence[float], count: int) -> tuple[float, ...]:
     """Return the load factors of the instants of a history; ModelError unless they are `count`, at least two, and ascend."""
-    found = np.asarray(times, float)
-    if found.shape != (count,) or count < 2:
+    checked = np.asarray(times, float)
+    if checked.shape != (count,) or count < 2:
         raise ModelError(
-            f"the temperature has {count} instants, but {found.size} times: give the load factor of each, at least two"
+            f"the temperature has {count} instants, but {checked.size} times: give the load factor of each, at least two"
         )
-    if not (np.isfinite(found).all() and (np.diff(found) > 0.0).all()):
-        raise ModelError(f"the times of the temperature must ascend, not {found.tolist()}")
-    return tuple(found.tolist())
+    if not (np.isfinite(checked).all() and (np.diff(checked) > 0.0).all()):
+        raise ModelError(f"the times of the temperature must ascend, not {checked.tolist()}")
+    return tuple(checked.tolist())

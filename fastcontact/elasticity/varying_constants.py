@@ -50,7 +50,7 @@ class Tabulated:
         if self.along not in AXES:
             raise ModelError(f"a table is along {', '.join(AXES[:3])} or {AXES[3]}, not along {self.along!r}")
         try:
-            rows = tuple((_number(place), _number(value)) for place, value in self.table)
+            rows = tuple((_number(abscissa), _number(value)) for abscissa, value in self.table)
         except (TypeError, ValueError):
             raise ModelError(f"the table along {self.along} must be pairs [place, value] of numbers") from None
         for number in (number for row in rows for number in row):
@@ -144,7 +144,7 @@ class Varying:
         mesh = cells.mesh
         total = sum(map(len, mesh.solids.values()))
         lengths = {"cells": cells.count, "solid cells of the mesh": total, "points of the mesh": mesh.n_points}
-        counts = ", ".join(f"{count} {what}" for what, count in lengths.items())
+        counts = ", ".join(f"{count} {unit}" for unit, count in lengths.items())
         column = given.ndim == 2 and given.shape[1] == 1
         if column:
             given = given[:, 0]
@@ -164,13 +164,13 @@ class Varying:
         if len(given) == mesh.n_points and not column:
             self._nodal = given.astype(float)
             return
-        found, first = {}, 0
+        blocks, first = {}, 0
         for name, block in mesh.solids.items():
-            found[name] = np.full(len(block), np.nan)
+            blocks[name] = np.full(len(block), np.nan)
             rows = np.arange(len(block)) if len(given) != cells.count else cells.rows.get(name, np.empty(0, np.intp))
-            found[name][rows] = given[first : first + len(rows)]
+            blocks[name][rows] = given[first : first + len(rows)]
             first += len(rows)
-        self._by_cell = found
+        self._by_cell = blocks
 
     @property
     def inside(self) -> bool:
@@ -181,8 +181,8 @@ class Varying:
     def range(self) -> tuple[float, float]:
         """The smallest and the largest number in its cells."""
         assert self.cells is not None
-        found = [self.at(*sample) for sample in self.cells.samples()]
-        return float(min(values.min() for values in found)), float(max(values.max() for values in found))
+        samples = [self.at(*sample) for sample in self.cells.samples()]
+        return float(min(values.min() for values in samples)), float(max(values.max() for values in samples))
 
     def at(self, name: str, rows: Indices, N: Array) -> Array:
         """Return the numbers (n_rows * n,) [unit of the constant] at points of cells of an element, cell by cell.

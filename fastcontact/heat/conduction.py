@@ -65,13 +65,13 @@ class Conduction:
 
     def flux(self, temperature: Array) -> Array:
         """Return the mean heat flux (n_solids, dim) of every cell [power / area], by temperatures (n_points,)."""
-        found = []
+        flux = []
         for name, rows in self._cells():
             gradient, k, volume = self._at(name, rows)
             slope = np.einsum("cqai,ca->cqi", gradient, temperature[self.mesh.cells[name][rows]])
             total = -np.einsum("cq,cqij,cqj->ci", volume, k, slope, optimize=True)
-            found.append(total / volume.sum(axis=1)[:, None])
-        return np.concatenate(found)
+            flux.append(total / volume.sum(axis=1)[:, None])
+        return np.concatenate(flux)
 
     def _cells(self) -> Iterator[tuple[str, Indices]]:
         """Yield elements and numbers (n,) of cells, so many at a time as memory bears."""
@@ -89,9 +89,9 @@ class Conduction:
         slopes = np.einsum("qak,cad->cqdk", dN, mesh.points[nodes], optimize=True)
         gradient = np.einsum("qak,cqkd->cqad", dN, np.linalg.inv(slopes), optimize=True)
         volume = cell_volumes(mesh.points[nodes], N, dN, self.kinematics == "axisymmetric") * weights
-        k, own = np.zeros((*volume.shape, mesh.dim, mesh.dim)), self.number[name][rows]
-        for index in np.unique(own):
-            cells = np.flatnonzero(own == index)
+        k, number = np.zeros((*volume.shape, mesh.dim, mesh.dim)), self.number[name][rows]
+        for index in np.unique(number):
+            cells = np.flatnonzero(number == index)
             constants = self.materials[index].constants_at(name, rows[cells], N)
             at = self.materials[index].conductivity_at(positions(mesh, nodes[cells], N), self.kinematics, constants)
             k[cells] = at.reshape(len(cells), *k.shape[1:])

@@ -155,5 +155,5 @@ class Film(Load):
             rows.append(np.broadcast_to(facets[:, :, None], local.shape).ravel())
             columns.append(np.broadcast_to(facets[:, None, :], local.shape).ravel())
             values.append(local.ravel())
-        place = np.concatenate(rows), np.concatenate(columns)
-        return csr_array(coo_array((np.concatenate(values), place), shape=(mesh.n_points,) * 2)), powers[:, 0]
+        positions = np.concatenate(rows), np.concatenate(columns)
+        return csr_array(coo_array((np.concatenate(values), positions), shape=(mesh.n_points,) * 2)), powers[:, 0]

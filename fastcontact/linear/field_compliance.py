@@ -1,13 +1,13 @@
 r"""Compliance of point forces outside a multiplier field, and the equivalent equations for the field.
 
 Forces of points with the weights W belong to a field with the values p, ``P p`` at the points. What the field does not
-represent gives way: :math:`C = (W^{-1} - P M^{-1} P^T) / \rho` among the points of some equations, M the mass matrix of the
+represent complies: :math:`C = (W^{-1} - P M^{-1} P^T) / \rho` among the points of some equations, M the mass matrix of the
 field over these and all other points. With forces W (P p - rho (B u - c)) the equations ``B u + C force = c`` are
 :math:`P^T W (B u - c) + E p = 0` for the field, E the mass matrix of the other points over rho, which vanishes but at the
 edge of the contact. Springs of the stiffness rho W act along the rows B: on what the field does not represent.
 
 Points that are softer by S, as with a penalty, have the compliance :math:`C + S`. With :math:`W' = W / (1 + \rho W S)` in
-place of W, which is in the equations of the field as in the springs, E becomes :math:`E + P^T W W' S P`: all values give way.
+place of W, which is in the equations of the field as in the springs, E becomes :math:`E + P^T W W' S P`: all values comply.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class FieldCompliance:
     dense : callable
         Returns C (m, m) [length / force].
     bordered : bool
-        Whether values that do not give way stay unknowns, too: on quadratic facets, whose equations resemble each other.
+        Whether values without compliance stay unknowns, too: on quadratic facets, whose equations resemble each other.
     """
 
     P: csr_array
@@ -64,8 +64,8 @@ class FieldCompliance:
     @classmethod
     def none(cls, m: int) -> FieldCompliance:
         """Return that of m exact constraints."""
-        one = csr_array(diags_array(np.ones(m)))
-        return cls(one, np.ones(m), np.zeros(m), csr_array((m, m)), lambda: np.zeros((m, m)))
+        identity = csr_array(diags_array(np.ones(m)))
+        return cls(identity, np.ones(m), np.zeros(m), csr_array((m, m)), lambda: np.zeros((m, m)))
 
     def softened(self, softness: Array, dense: Callable[[], Array]) -> FieldCompliance:
         """Return that of points softer by `softness` (m,) [length / force]."""
@@ -98,8 +98,8 @@ class FieldCompliance:
             beside = np.flatnonzero(np.diff(across.indptr))
             of_beside = csr_array(across[beside])
             gives = of_beside @ splu(csc_array(self.others[rest][:, rest])).solve(of_beside.T.toarray())
-            place = csr_array((np.ones(len(beside)), (beside, np.arange(len(beside)))), (len(given), len(beside)))
-            E = csr_array(E - place @ csr_array(gives) @ place.T)
+            selection = csr_array((np.ones(len(beside)), (beside, np.arange(len(beside)))), (len(given), len(beside)))
+            E = csr_array(E - selection @ csr_array(gives) @ selection.T)
         in_units = diags_array(units)
         return csr_array(in_units @ E @ in_units)
 
@@ -114,7 +114,7 @@ class FieldEquations:
     right : ndarray (l,)
     P : csr_array (m, l)
     edge : ndarray of bool (l,)
-        Values that stay unknowns: those at the edge of the contact, which give way; with a penalty all, see `bordered`.
+        Values that stay unknowns: those at the edge of the contact, which are compliant; with a penalty all, see `bordered`.
     compliance : csr_array (e, e)
         E among those that stay unknowns.
     at, units : ndarray (e,)

@@ -58,7 +58,7 @@ class Loaded(Protocol):
         """
         ...
 
-    def flexibility(self, R: csr_array) -> tuple[Array, Array]:
+    def delassus(self, R: csr_array) -> tuple[Array, Array]:
         """Return ``R K^-1 f``, shape (m,) [length], and ``R K^-1 R.T``, shape (m, m) [length / force], of rows R (m, n)."""
         ...
 
@@ -150,7 +150,7 @@ class LinearSolver(Protocol):
     contrast : float
         By how much some deformations of a cell are stiffer than others: errors of displacements may exceed residuals by so
         much, and iterations that need not end with exact solutions go on by so much further [-].
-    corner_functions : csr_array (n, n), optional
+    basis_transformation : csr_array (n, n), optional
         Rows of mid nodes of quadratic facets: what they move by where corners do, if gaps are weighted with functions that
         are linear on facets. A hint which motions to eliminate [-].
     """
@@ -161,7 +161,7 @@ class LinearSolver(Protocol):
     error: float = 0.0
     gave_up: str = ""
     contrast: float = 1.0
-    corner_functions: csr_array | None = None
+    basis_transformation: csr_array | None = None
 
     @property
     def iterative(self) -> bool:

@@ -51,8 +51,8 @@ class Springs:
         rows = csr_array(vstack([one.rows for one in pair], format="csr"))
         through = None
         if self.through is not None or others.through is not None:
-            own = [one.rows if one.through is None else one.through for one in pair]
-            through = csr_array(vstack(own, format="csr"))
+            rows_of_forces = [one.rows if one.through is None else one.through for one in pair]
+            through = csr_array(vstack(rows_of_forces, format="csr"))
         return Springs(rows, np.concatenate([one.stiffness for one in pair]), through)
 
     def under(self, pivots: Indices, weights: csr_array) -> Springs:
@@ -60,12 +60,12 @@ class Springs:
         R, W, n = self.rows, weights, self.rows.shape[1]
         number = np.full(n, -1, np.int32)
         number[pivots] = np.arange(len(pivots))
-        place = number[R.indices]
-        follows = place >= 0
+        column = number[R.indices]
+        follows = column >= 0
         starts = np.concatenate([[0], np.cumsum(follows)])[R.indptr]
-        followed = csr_array((R.data[follows], place[follows], starts), shape=(R.shape[0], W.shape[0]))
-        own = csr_array((R.data[~follows], R.indices[~follows], R.indptr - starts), shape=R.shape)
-        return Springs(csr_array(own + followed @ W), self.stiffness)
+        followed = csr_array((R.data[follows], column[follows], starts), shape=(R.shape[0], W.shape[0]))
+        kept = csr_array((R.data[~follows], R.indices[~follows], R.indptr - starts), shape=R.shape)
+        return Springs(csr_array(kept + followed @ W), self.stiffness)
 
     def scaled(self, factor: float, kind: DTypeLike = float) -> Springs:
         """Return them `factor` times as stiff, in a precision."""

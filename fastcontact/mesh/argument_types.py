@@ -79,31 +79,31 @@ def _called(call: Callable[..., Any], name: str, args: tuple[Any, ...]) -> str:
     return f"{type(args[0]).__name__}.{method}" if owner and args else name
 
 
-def check_fields(what: str, values: abc.Mapping[str, Any], kind: type, error: type[FastcontactError]) -> None:
-    """Raise `error` if a value by name is none of the type of that field of a dataclass; `what` tells whose they are."""
+def check_fields(owner: str, values: abc.Mapping[str, Any], kind: type, error: type[FastcontactError]) -> None:
+    """Raise `error` if a value by name is none of the type of that field of a dataclass; `owner` tells whose they are."""
     known = {name: text for base in reversed(kind.__mro__) for name, text in types_of(base).items()}
     for name, value in values.items():
-        check_type(f"{name} of {what}", value, known.get(name, Any), error)
+        check_type(f"{name} of {owner}", value, known.get(name, Any), error)
 
 
 @functools.cache
 def types_of(call: Callable[..., Any]) -> dict[str, Any]:
     """Return the types of the arguments of a function, or of the fields of a class itself, by name."""
-    found: dict[str, Any] = {}
-    own = inspect.get_annotations(call)
+    annotations: dict[str, Any] = {}
+    given = inspect.get_annotations(call)
     space = vars(sys.modules[call.__module__])
-    for name, text in own.items():
+    for name, text in given.items():
         try:
-            found |= typing.get_type_hints(types.SimpleNamespace(__annotations__={name: text}), space)
+            annotations |= typing.get_type_hints(types.SimpleNamespace(__annotations__={name: text}), space)
         except (NameError, TypeError):  # imported for type checkers alone, or of the class and no argument
             continue
-    return found
+    return annotations
 
 
-def check_type(what: str, value: Any, annotation: Any, error: type[FastcontactError]) -> None:
-    """Raise `error` if a value is none of the annotated type, or has a mask; the message calls it `what`."""
+def check_type(name_shown: str, value: Any, annotation: Any, error: type[FastcontactError]) -> None:
+    """Raise `error` if a value is none of the annotated type, or has a mask; the message calls it `name_shown`."""
     if is_masked(value):
-        raise error(f"{what} {REFUSAL}")
+        raise error(f"{name_shown} {REFUSAL}")
     if fits(value, annotation):
         return
     shown = f"an object of the class {type(value).__name__}"
@@ -118,7 +118,7 @@ def check_type(what: str, value: Any, annotation: Any, error: type[FastcontactEr
     remedy = ""
     if isinstance(value, str) and _is_number(value) and fits(1, annotation):
         remedy = f": write {value.strip()} without quotation marks"
-    raise error(f"{what} must be {words(annotation)}, not {shown}{remedy}")
+    raise error(f"{name_shown} must be {words(annotation)}, not {shown}{remedy}")
 
 
 def _is_number(text: str) -> bool:
@@ -179,8 +179,8 @@ def fits(value: Any, annotation: Any) -> bool:
 
 def _asked(protocol: type) -> list[str]:
     """Return the attributes that a protocol asks for."""
-    own = [*vars(protocol), *inspect.get_annotations(protocol)]
-    return [name for name in own if not name.startswith("_")]
+    names = [*vars(protocol), *inspect.get_annotations(protocol)]
+    return [name for name in names if not name.startswith("_")]
 
 
 def _is_real(value: Any, kind: type) -> bool:

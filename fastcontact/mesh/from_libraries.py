@@ -80,14 +80,14 @@ def from_pyvista(grid: Any) -> Mesh:
         raise MeshError(
             f"PyVista's data set has cells that fastcontact does not know ({unknown}): use {', '.join(elements.ELEMENTS)}"
         )
-    found = {
+    content = {
         "points": np.asarray(grid.points, np.float64),
         "cells": [[names[kind], len(rows), np.asarray(grid.cells_dict[kind])] for kind, rows in kinds.items()],
         "cell_data": {k: [v[rows] for rows in kinds.values()] for k, v in _flags(grid.cell_data, CELL_PREFIX).items()},
         "point_data": _flags(grid.point_data, POINT_PREFIX),
         "cell_sets": {}, "point_sets": {}, "field_data": {},
     }  # fmt: skip
-    return _made(found, "", "PyVista's data set")
+    return _made(content, "", "PyVista's data set")
 
 
 def from_gmsh() -> Mesh:
@@ -147,24 +147,24 @@ def _tell_what_is_left_out(gmsh: Any, dim: int) -> None:
 
 def _flags(data: Any, prefix: str) -> dict[str, Any]:
     """Return the arrays that mean groups, under the names that `mesh_of` knows."""
-    found = {}
+    groups = {}
     for name in data.keys():  # noqa: SIM118, PyVista's data are no mapping
         values = np.asarray(data[name])
         if name in TAGS or name.startswith(prefix):
-            found[name] = values
+            groups[name] = values
         elif values.ndim == 1 and values.dtype == bool:
-            found[prefix + quote(name)] = values
+            groups[prefix + quote(name)] = values
         elif name.startswith(RESULT_PREFIX) and values.ndim == 1 and np.isin(values, (0, 1)).all():
-            found[prefix + quote(name.removeprefix(RESULT_PREFIX))] = values
-    return found
+            groups[prefix + quote(name.removeprefix(RESULT_PREFIX))] = values
+    return groups
 
 
-def _made(found: dict[str, Any], file_format: str, what: str) -> Mesh:
+def _made(content: dict[str, Any], file_format: str, library: str) -> Mesh:
     """Return the mesh of plain data, its cells turned where they are inside out."""
     try:
-        mesh, _ = mesh_of(found, file_format)
+        mesh, _ = mesh_of(content, file_format)
     except MeshError as error:
-        raise MeshError(f"{what}: {error}") from None
+        raise MeshError(f"{library}: {error}") from None
     except UNFIT as error:
-        raise MeshError(f"the arrays of {what} do not fit together: {error}") from error
+        raise MeshError(f"the arrays of {library} do not fit together: {error}") from error
     return topology.oriented(mesh)[0]

@@ -25,15 +25,15 @@ def _read_only(values: ArrayLike, dtype: Any) -> AnyArray:
     return array
 
 
-def _numbers(what: str, values: ArrayLike) -> AnyArray:
+def _numbers(name: str, values: ArrayLike) -> AnyArray:
     """Return whole numbers as an array that loses nothing when it becomes one of 32 bits."""
     array = np.asarray(values)
     if array.size == 0:
         return array.astype(np.int32)
     if array.dtype.kind not in "iuf" or (array.dtype.kind == "f" and not np.array_equal(array, np.floor(array))):
-        raise MeshError(f"{what} must be given by whole numbers, counted from 0, not by {array.dtype} values")
+        raise MeshError(f"{name} must be given by whole numbers, counted from 0, not by {array.dtype} values")
     if array.min() < -(2**31) or array.max() >= 2**31:
-        raise MeshError(f"{what} name the number {array.max()}, beyond the 2147483647 that a mesh can count to")
+        raise MeshError(f"{name} name the number {array.max()}, beyond the 2147483647 that a mesh can count to")
     return array
 
 
@@ -315,7 +315,7 @@ class Mesh:
         def numbers(of: Mapping[str, AnyArray]) -> AnyArray:
             return np.concatenate([starts[kind] + place for kind, place in of.items()] or [np.empty(0, np.intp)])
 
-        kept = {own: numbers(self.split(members)) for own, members in self.cell_groups.items()}
+        kept = {group: numbers(self.split(members)) for group, members in self.cell_groups.items()}
         return self.replace(cells=cells, cell_groups={**kept, **{name: numbers(rows[name]) for name in rows}})
 
     @typed(MeshError)

@@ -128,9 +128,9 @@ def square(rule: Rule) -> Rule:
 
 def _merged(points: Array, weights: Array) -> Rule:
     """Return a rule whose points that coincide are one."""
-    unique, place = np.unique(np.round(points, 14), axis=0, return_inverse=True)
+    unique, index = np.unique(np.round(points, 14), axis=0, return_inverse=True)
     merged = np.zeros(len(unique))
-    np.add.at(merged, place.ravel(), weights)
+    np.add.at(merged, index.ravel(), weights)
     return unique, merged
 
 

@@ -76,17 +76,17 @@ def quality(mesh: Mesh) -> MeshQuality:
     length = np.concatenate([block.ravel() for block in lengths]) if lengths else np.array([np.nan])
     with np.errstate(divide="ignore", invalid="ignore"):
         aspects = [(block.max(axis=1) / block.min(axis=1)).max() for block in lengths]
-    found = [_bad_cells(mesh, name) for name in mesh.solids]
+    bad = [_bad_cells(mesh, name) for name in mesh.solids]
     return MeshQuality(
         smallest_angle=float(np.degrees(angle.min())),
         largest_angle=float(np.degrees(angle.max())),
         shortest_edge=float(length.min()),
         longest_edge=float(length.max()),
         worst_aspect=float(max(aspects, default=np.nan)),
-        measure=float(sum(measure.sum() for measure, _, _ in found)),
+        measure=float(sum(measure.sum() for measure, _, _ in bad)),
         n_points=mesh.n_points,
         n_cells={name: len(block) for name, block in mesh.cells.items()},
-        n_bad=sum(int((flat | inverted).sum()) for _, flat, inverted in found),
+        n_bad=sum(int((flat | inverted).sum()) for _, flat, inverted in bad),
         dim=mesh.dim,
     )
 
@@ -102,7 +102,7 @@ def check_cells(mesh: Mesh) -> None:
         _check_nodes(mesh, name)
         _check_twice(mesh, name)
         measure, flat, inverted = _bad_cells(mesh, name)
-        for bad, what, remedy in (
+        for bad, fault, remedy in (
             (flat, "degenerate", "remove it or merge its points differently"),
             (
                 inverted,
@@ -113,7 +113,7 @@ def check_cells(mesh: Mesh) -> None:
             if bad.any():
                 row = int(np.flatnonzero(bad)[0])
                 cell = _described(mesh, name, row, measure[row])
-                raise MeshError(f"{cell} is {what}, one of {int(bad.sum())} such cells: {remedy}")
+                raise MeshError(f"{cell} is {fault}, one of {int(bad.sum())} such cells: {remedy}")
 
 
 def poorest_cell(mesh: Mesh) -> str:
@@ -178,9 +178,9 @@ def _check_twice(mesh: Mesh, name: str) -> None:
 
 def _described(mesh: Mesh, name: str, row: int, measure: float) -> str:
     """Return the number, element, place and size of a cell for messages."""
-    place = ", ".join(f"{x:.6g}" for x in _corners(mesh, name)[row].mean(axis=0))
+    centre = ", ".join(f"{x:.6g}" for x in _corners(mesh, name)[row].mean(axis=0))
     kind = "area" if mesh.dim == 2 else "volume"
-    return f"cell {mesh.offsets[name] + row} ({name} at ({place}), {kind} {measure:.3g})"
+    return f"cell {mesh.offsets[name] + row} ({name} at ({centre}), {kind} {measure:.3g})"
 
 
 def _corners(mesh: Mesh, name: str) -> Array:

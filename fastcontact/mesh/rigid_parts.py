@@ -40,13 +40,13 @@ class RigidParts:
     hinge_part: Indices
 
     def hinges_of(self, number: int) -> Indices:
-        """Return the nodes at which a part hangs on others, ascending."""
+        """Return the nodes at which a part is attached to others, ascending."""
         return self.hinge_node[self.hinge_part == number]
 
     def nodes_of(self, number: int) -> Indices:
         """Return the nodes of a part, ascending, with those at hinges."""
-        own, hinges = np.flatnonzero(self.part == number), self.hinges_of(number)
-        return np.union1d(own, hinges) if len(hinges) else own
+        nodes, hinges = np.flatnonzero(self.part == number), self.hinges_of(number)
+        return np.union1d(nodes, hinges) if len(hinges) else nodes
 
 
 @remembered
@@ -84,11 +84,13 @@ def _shared_nodes(mesh: Mesh, label: Indices) -> tuple[Indices, Indices, Indices
     shared = np.zeros(mesh.n_points, bool)
     ends = np.cumsum([len(block) for block in mesh.solids.values()])
     owned = list(zip(mesh.solids.values(), np.split(label, ends[:-1]), strict=True))
-    for block, own in owned:
-        part[block] = own[:, None]
-    for block, own in owned:
-        shared[block[part[block] != own[:, None]]] = True
-    rows = [(block[shared[block]], np.broadcast_to(own[:, None], block.shape)[shared[block]]) for block, own in owned]
+    for block, owners in owned:
+        part[block] = owners[:, None]
+    for block, owners in owned:
+        shared[block[part[block] != owners[:, None]]] = True
+    rows = [
+        (block[shared[block]], np.broadcast_to(owners[:, None], block.shape)[shared[block]]) for block, owners in owned
+    ]
     node, several = np.unique(np.concatenate([np.stack(pair) for pair in rows], axis=1), axis=1).astype(np.intp)
     _, lowest = np.unique(node, return_index=True)
     part[node[lowest]] = several[lowest]
@@ -97,12 +99,12 @@ def _shared_nodes(mesh: Mesh, label: Indices) -> tuple[Indices, Indices, Indices
 
 def _meetings(node: Indices, part: Indices) -> tuple[Indices, Indices, Indices]:
     """Return two parts (m,) each and the node at which they meet, from nodes, ascending, with each part that has them."""
-    found = [np.empty((3, 0), np.intp)]
+    meetings = [np.empty((3, 0), np.intp)]
     apart = 1
     while len(same := np.flatnonzero(node[apart:] == node[:-apart])):
-        found.append(np.stack([part[same], part[same + apart], node[same]]))
+        meetings.append(np.stack([part[same], part[same + apart], node[same]]))
         apart += 1
-    first, second, at = np.concatenate(found, axis=1)
+    first, second, at = np.concatenate(meetings, axis=1)
     return first, second, at
 
 

@@ -72,14 +72,14 @@ def oriented(mesh: Mesh) -> tuple[Mesh, int]:
 
 def _check_folds(mesh: Mesh) -> None:
     """Raise MeshError if two solid cells, all of them oriented, go round a common facet in the same direction."""
-    found, owners = [], []
+    folds, owners = [], []
     for name, block in mesh.solids.items():
         element = elements.get(name)
         numbers = mesh.offsets[name] + np.arange(len(block))
         for facet, facet_element in zip(element.facets, element.facet_elements, strict=True):
-            found.append(_direction(block[:, list(facet)[: elements.get(facet_element).n_corners]].astype(np.int64)))
+            folds.append(_direction(block[:, list(facet)[: elements.get(facet_element).n_corners]].astype(np.int64)))
             owners.append(numbers)
-    keys, owner = np.concatenate(found), np.concatenate(owners)
+    keys, owner = np.concatenate(folds), np.concatenate(owners)
     order = np.lexsort(keys.T)
     same = np.flatnonzero((keys[order[1:]] == keys[order[:-1]]).all(axis=1))
     if len(same):
@@ -130,11 +130,11 @@ def bodies(mesh: Mesh) -> tuple[int, Numbers]:
     row, column = np.concatenate(rows), np.concatenate(columns)
     graph = coo_array((np.ones(len(row), np.int8), (row, column)), shape=(mesh.n_points, mesh.n_points))
     _, label = connected_components(graph, directed=False)
-    found, compact = np.unique(label[used], return_inverse=True)
+    labels, compact = np.unique(label[used], return_inverse=True)
     body = np.full(mesh.n_points, -1, np.int32)
     body[used] = compact
     body.setflags(write=False)
-    return len(found), body
+    return len(labels), body
 
 
 @typed(MeshError)
@@ -161,15 +161,15 @@ def cells_of_outer_facets(mesh: Mesh) -> Mapping[str, Numbers]:
 @remembered
 def _facets(mesh: Mesh) -> tuple[Mapping[str, Numbers], Numbers, Mapping[str, Numbers]]:
     """Return `outer_facets`, `cells_joined_by_facets` and `cells_of_outer_facets`."""
-    found: dict[str, list[Numbers]] = {}
+    facets_of_kind: dict[str, list[Numbers]] = {}
     owners: dict[str, list[Numbers]] = {}
     for name, block in mesh.solids.items():
         element, numbers = elements.get(name), mesh.offsets[name] + np.arange(len(block), dtype=np.int32)
         for facet, facet_element in zip(element.facets, element.facet_elements, strict=True):
-            found.setdefault(facet_element, []).append(block[:, list(facet)])
+            facets_of_kind.setdefault(facet_element, []).append(block[:, list(facet)])
             owners.setdefault(facet_element, []).append(numbers)
     parent, kept, behind = np.arange(sum(map(len, mesh.cells.values())), dtype=np.int32), {}, {}
-    for name, blocks in found.items():
+    for name, blocks in facets_of_kind.items():
         facets = np.ascontiguousarray(np.concatenate(blocks))
         alone = np.empty(len(facets), bool)
         owner = np.concatenate(owners[name])

@@ -23,12 +23,12 @@ def penetration(mesh: Mesh, kinematics: str, coordinates: Array) -> list[tuple[i
 
     Depth is the largest of `depths` [length].
     """
-    found = []
+    overlaps = []
     for number, other, points, depth in depths(mesh, kinematics, coordinates):
         deepest = int(np.argmax(depth))
         if depth[deepest] > 0.0:
-            found.append((number, other, float(depth[deepest]), coordinates[points[deepest]]))
-    return found
+            overlaps.append((number, other, float(depth[deepest]), coordinates[points[deepest]]))
+    return overlaps
 
 
 def depths(mesh: Mesh, kinematics: str, coordinates: Array) -> Iterator[tuple[int, int, Indices, Array]]:
@@ -98,9 +98,9 @@ def _depths_in_plane(points: Array, kinds: list[Array], axisymmetric: bool) -> t
             for corners in kinds
         ]
         away = [corners[kept] for corners, kept in zip(kinds, off_axis, strict=True)]
-        found = closest_of_kinds(points[inside], [corners for corners in away if len(corners)])
-        depth[inside] = found.distance
-        facet[inside] = np.flatnonzero(np.concatenate(off_axis))[found.facet]
+        closest = closest_of_kinds(points[inside], [corners for corners in away if len(corners)])
+        depth[inside] = closest.distance
+        facet[inside] = np.flatnonzero(np.concatenate(off_axis))[closest.facet]
     return np.where(depth > ON_SURFACE * size, depth, 0.0), facet
 
 
@@ -112,11 +112,11 @@ def _depths_in_space(points: Array, kinds: list[Array]) -> tuple[Array, Indices]
     Where the closest point lies inside a facet, its normal tells in from out. Where it lies on an edge or a corner the
     normals around may disagree, and the winding number of the surface tells.
     """
-    found = closest_of_kinds(points, kinds)
+    closest = closest_of_kinds(points, kinds)
     size = max(float(np.abs(corners).max()) for corners in kinds)
-    height = np.einsum("nd,nd->n", points - found.position, found.normal)  # above the tangent planes
+    height = np.einsum("nd,nd->n", points - closest.position, closest.normal)  # above the tangent planes
     inside = height < 0
-    unsure = np.flatnonzero((np.abs(height) < 0.999 * found.distance) & (found.distance > ON_SURFACE * size))
+    unsure = np.flatnonzero((np.abs(height) < 0.999 * closest.distance) & (closest.distance > ON_SURFACE * size))
     if len(unsure):
         triangles = np.concatenate(
             [corners[:, flat_triangles(corners.shape[1])].reshape(-1, 3, 3) for corners in kinds]
@@ -124,4 +124,4 @@ def _depths_in_space(points: Array, kinds: list[Array]) -> tuple[Array, Indices]
         number = np.empty(len(unsure))
         body_overlap_kernels.winding_numbers(np.ascontiguousarray(points[unsure]), triangles, number)
         inside[unsure] = number > 0.5
-    return np.where(inside & (found.distance > ON_SURFACE * size), found.distance, 0.0), found.facet
+    return np.where(inside & (closest.distance > ON_SURFACE * size), closest.distance, 0.0), closest.facet

@@ -25,7 +25,7 @@ def check_motions(mesh: Mesh, motions: FreeMotions) -> None:
     if not len(motions):
         return
     total = len(motions)
-    listing = "; ".join(f"{name}: {', '.join(found)}" for name, found in motions.by_body().items())
+    listing = "; ".join(f"{name}: {', '.join(motions_of_body)}" for name, motions_of_body in motions.by_body().items())
     raise ModelError(
         f"{total} rigid-body motion{'s are' if total > 1 else ' is'} not supported: {listing}. "
         "Fix or prescribe a displacement component that stops each, or let a load press the body against a contact"

@@ -14,7 +14,7 @@ from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.loads import Load, Table
-from fastcontact.elasticity.relations import Relation
+from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.errors import MeshError, ModelError, unknown
 from fastcontact.mesh.companion_groups import ROTATION
 from fastcontact.mesh.mesh import Mesh
@@ -33,7 +33,7 @@ class ReferencePoint:
     place: tuple[float, ...]
 
 
-def relation(name: str, rows: Sequence[Sequence[Term]], shape: tuple[int, int]) -> Relation:
+def relation(name: str, rows: Sequence[Sequence[Term]], shape: tuple[int, int]) -> MultiPointConstraint:
     """Return equations, lists of terms that sum to zero, as a relation of a mesh of `shape` (n_points, dim)."""
     n_points, dim = shape
     row = [i for i, terms in enumerate(rows) for _ in terms]
@@ -42,7 +42,7 @@ def relation(name: str, rows: Sequence[Sequence[Term]], shape: tuple[int, int]) 
     matrix = csr_array((values, (row, column)), shape=(len(rows), n_points * dim))
     matrix.sum_duplicates()
     matrix.eliminate_zeros()
-    return Relation(name, matrix)
+    return MultiPointConstraint(name, matrix)
 
 
 def _turn(dim: int, axis: int, arm: Array) -> list[tuple[int, float]]:
@@ -103,7 +103,7 @@ def distributing_rows(reference: ReferencePoint, points: Indices, places: Array,
 
 
 def reference_of(mesh: Mesh, name: str) -> ReferencePoint:
-    """Return a reference point by the name of its group; ModelError if it is none."""
+    """Return a reference point by the name of its group; ModelError if it is not one."""
     if name + ROTATION not in mesh.point_groups:
         raise ModelError(
             f"'{name}' is no reference point: make the model of fc.generate.with_reference_points(mesh, {{'{name}': (...)}})"
@@ -115,7 +115,7 @@ def reference_of(mesh: Mesh, name: str) -> ReferencePoint:
 def coupling(
     mesh: Mesh, kinematics: str, names: tuple[str, str], kind: str, axes: Sequence[int],
     weighting: tuple[str, float | None] = ("uniform", None),
-) -> Relation:  # fmt: skip
+) -> MultiPointConstraint:  # fmt: skip
     """Return the relation of a coupling.
 
     Parameters
@@ -149,8 +149,8 @@ def coupling(
         spread = Spread(reference.place, *weighting)
         spread.check(name, mesh.dim)
     points, weight = shares_of(mesh, kinematics, names[1], spread)
-    own = np.isin(points, (reference.point, reference.rotation))
-    if own.any() or not len(points):
+    reference_nodes = np.isin(points, (reference.point, reference.rotation))
+    if reference_nodes.any() or not len(points):
         raise ModelError(f"{name}: the group needs points, without the reference point itself")
     places = mesh.points[points]
     try:

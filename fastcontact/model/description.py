@@ -43,16 +43,16 @@ def sentences(model: Any) -> Iterator[str]:
     yield from _supports(model)
     for load in model.loads:
         yield f"Load: {load.name}: {_load(load)}{_history(load.ramp)}."
-    for own in model.temperatures:
-        if own.place:  # a further instant of the one before
+    for temperature in model.temperatures:
+        if temperature.place:  # a further instant of the one before
             continue
-        value = "a number for each point" if isinstance(own.value, np.ndarray) else _value(own.value)
-        where = own.name.removeprefix("the temperature of ")
-        if own.times:
-            when = f", at {len(own.times)} instants from {own.times[0]:g} to {own.times[-1]:g}"
-            yield f"Temperature: {value} over {own.reference:g} in {where}{when}."
+        value = "a number for each point" if isinstance(temperature.value, np.ndarray) else _value(temperature.value)
+        where = temperature.name.removeprefix("the temperature of ")
+        if temperature.times:
+            when = f", at {len(temperature.times)} instants from {temperature.times[0]:g} to {temperature.times[-1]:g}"
+            yield f"Temperature: {value} over {temperature.reference:g} in {where}{when}."
             continue
-        yield f"Temperature: {value} over {own.reference:g} in {where}{_history(own.ramp)}."
+        yield f"Temperature: {value} over {temperature.reference:g} in {where}{_history(temperature.ramp)}."
     for load in model.heat_loads:
         history = _history(load.ramp)
         yield f"Heat: {load.name.removeprefix('the ')}: {', '.join(map(_value, load.values))}{history}."

@@ -2,7 +2,7 @@
 
 The points of the mesh are followed by one for each such obstacle; its displacement is that of the obstacle. Components
 under a force are free rigid motions like those of a body without supports, and get weak springs like theirs (see
-`analysis.unsupported_bodies`); the others are prescribed. A gap against a rigid obstacle changes by
+`analysis.floating_bodies`); the others are prescribed. A gap against a rigid obstacle changes by
 ``n . (u - q)``, with q its displacement: the row of an obstacle is minus what the row of the gap makes of a common
 translation of all points.
 """
@@ -19,7 +19,7 @@ from scipy.sparse import bsr_array, csr_array, hstack
 
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
-from fastcontact.elasticity.relations import Relation
+from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.rigid_motions import FreeMotions
 
@@ -76,7 +76,7 @@ class ForceDrivenObstacles:
         indptr = np.r_[K.indptr, np.full(len(self), K.indptr[-1])].astype(K.indptr.dtype)
         return bsr_array((K.data, K.indices, indptr), shape=(self.n_dofs, self.n_dofs))
 
-    def relations(self, relations: Sequence[Relation]) -> list[Relation]:
+    def relations(self, relations: Sequence[MultiPointConstraint]) -> list[MultiPointConstraint]:
         """Return relations whose rows have columns for the obstacles, too."""
         return [dataclasses.replace(relation, rows=self._wider(relation.rows)) for relation in relations]
 
@@ -85,8 +85,8 @@ class ForceDrivenObstacles:
 
     def supported(self, fixed: Mask) -> Mask:
         """Return the supported components (n_points + n, dim) of points and obstacles."""
-        own = [[force is None for force in pair.force] for pair in self.pairs]
-        return np.vstack([fixed, np.array(own, bool).reshape(-1, self.shape[1])])
+        held = [[force is None for force in pair.force] for pair in self.pairs]
+        return np.vstack([fixed, np.array(held, bool).reshape(-1, self.shape[1])])
 
     def prescribed(self, by_ramp: dict[Table | None, Array]) -> dict[Table | None, Array]:
         """Return by history the displacements (n_points + n, dim) at multiplier 1, those of the obstacles included."""
@@ -128,29 +128,33 @@ class ForceDrivenObstacles:
         """Return displacements (n_dofs, k) that cost little energy: `modes`, translations first, and obstacles with them."""
         return np.vstack([modes, np.tile(np.eye(self.shape[1], modes.shape[1]), (len(self), 1))])
 
-    def constraints(self, name: str, part: Constraints, position: Array, moved: Array | None = None) -> Constraints:
+    def constraints(
+        self, name: str, constraints: Constraints, position: Array, moved: Array | None = None
+    ) -> Constraints:
         """Return the constraints of pair `name`, set up with its obstacle at `position` (dim,), with the obstacle free.
 
         Rows then have columns for all obstacles, and slip counts the motion of the obstacle. Where it turns, too, `moved`
-        (dim,) is what it has moved in the step as far as `part` counts that as slip [length].
+        (dim,) is what it has moved in the step as far as `constraints` counts that as slip [length].
         """
         if not self.pairs:
-            return part
+            return constraints
         number = self.number(name)
         if number is None:
-            wider = tuple(self._wider(tangent) for tangent in part.tangents)
-            return dataclasses.replace(part, B=self._wider(part.B), tangents=wider)
-        B, normal = self._free(part.B, number)
-        tangents = tuple(self._free(tangent, number)[0] for tangent in part.tangents)
-        drift = None
-        if moved is not None and part.drift is not None:
-            drift = part.drift + np.stack([t @ moved for t in part.directions])
-        return dataclasses.replace(part, B=B, gap0=part.gap0 + normal @ position, tangents=tangents, drift=drift)
+            wider = tuple(self._wider(tangent) for tangent in constraints.tangents)
+            return dataclasses.replace(constraints, B=self._wider(constraints.B), tangents=wider)
+        B, normal = self._free(constraints.B, number)
+        tangents = tuple(self._free(tangent, number)[0] for tangent in constraints.tangents)
+        slip0 = None
+        if moved is not None and constraints.slip0 is not None:
+            slip0 = constraints.slip0 + np.stack([t @ moved for t in constraints.directions])
+        return dataclasses.replace(
+            constraints, B=B, gap0=constraints.gap0 + normal @ position, tangents=tangents, slip0=slip0
+        )
 
     def _free(self, rows: csr_array, number: int) -> tuple[csr_array, Array]:
         """Return rows with those of the obstacle that they act against, and their direction (m, dim)."""
         n, dim = self.shape
         direction = rows @ np.tile(np.eye(dim), (n, 1))
-        own = np.zeros((rows.shape[0], len(self) * dim))
-        own[:, number * dim : (number + 1) * dim] = -direction
-        return csr_array(hstack([rows, csr_array(own)], format="csr")), direction
+        directions = np.zeros((rows.shape[0], len(self) * dim))
+        directions[:, number * dim : (number + 1) * dim] = -direction
+        return csr_array(hstack([rows, csr_array(directions)], format="csr")), direction

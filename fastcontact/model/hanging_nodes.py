@@ -97,12 +97,12 @@ def hanging_nodes(mesh: Mesh) -> tuple[Indices, Indices, OuterFacets]:
     low, high = _extent(mesh.points[outer.corners[order]])
     tree = build(low - reach[order, None], high + reach[order, None])
     nodes = np.flatnonzero(length > 0.0)
-    found = np.full((len(nodes), MOST), -1)
+    facets = np.full((len(nodes), MOST), -1)
     hanging_nodes_kernels.facing_facets(
-        mesh.points, nodes, outward, outer.nodes, outer.centre, outer.normal, reach, tree, order, found
+        mesh.points, nodes, outward, outer.nodes, outer.centre, outer.normal, reach, tree, order, facets
     )
-    row, column = np.nonzero(found >= 0)
-    node, facet = nodes[row], found[row, column]
+    row, column = np.nonzero(facets >= 0)
+    node, facet = nodes[row], facets[row, column]
     _, body = bodies(mesh)
     kept = body[node] == body[outer.corners[facet, 0]]
     node, facet = node[kept], facet[kept]
@@ -150,13 +150,13 @@ def _across(mesh: Mesh, node: Indices, outer: OuterFacets, facet: Indices) -> Ma
             own = frozenset(nodes[: elements.get(name).n_corners]), name
             for number in nodes:
                 cells.setdefault(number, []).append(own)
-    found = np.zeros(len(node), bool)
+    across = np.zeros(len(node), bool)
     for k, (number, ends) in enumerate(zip(node.tolist(), corners.tolist(), strict=True)):
         kind = outer.elements[outer.kind[facet[k]]]
         behind = [c for c, name in cells[ends[0]] if c.issuperset(ends) and kind in elements.get(name).facet_elements]
         shared = [cell & other for cell in behind for other, _ in cells[number]]
-        found[k] = any(len(common) >= mesh.dim and not common.issubset(ends) for common in shared)
-    return found
+        across[k] = any(len(common) >= mesh.dim and not common.issubset(ends) for common in shared)
+    return across
 
 
 def _closed_at_corners(outer: OuterFacets, facet: Indices) -> Mask:
@@ -179,13 +179,13 @@ def _closed_at_corners(outer: OuterFacets, facet: Indices) -> Mask:
 
 
 def _outer(mesh: Mesh) -> OuterFacets:
-    found = outer_facets(mesh)
-    most = max((block.shape[1] for block in found.values()), default=1)
+    facets = outer_facets(mesh)
+    most = max((block.shape[1] for block in facets.values()), default=1)
     n_corners = 2 if mesh.dim == 2 else 4
     nodes = [np.full((0, most), -1, np.int32)]
     corners = [np.full((0, n_corners), -1, np.int32)]
     rises = [np.zeros(0)]
-    for name, block in found.items():
+    for name, block in facets.items():
         element = elements.get(name)
         nodes.append(np.pad(block, ((0, 0), (0, most - block.shape[1])), constant_values=-1))
         # A triangle repeats its last corner.
@@ -200,7 +200,7 @@ def _outer(mesh: Mesh) -> OuterFacets:
     low, high = _extent(x)
     return OuterFacets(
         np.concatenate(nodes), corner, centre, normal, np.concatenate(rises), np.linalg.norm(high - low, axis=1),
-        tuple(found), np.repeat(np.arange(len(found)), [len(block) for block in found.values()]),
+        tuple(facets), np.repeat(np.arange(len(facets)), [len(block) for block in facets.values()]),
     )  # fmt: skip
 
 
@@ -239,18 +239,18 @@ def _within(points: Array, node: Indices, outer: OuterFacets, facet: Indices) ->
     members, size = outer.nodes[facet], outer.size[facet]
     apart = np.linalg.norm(points[members] - points[node][:, None], axis=2)
     away = (np.where(members >= 0, apart, np.inf) > NEAR * size[:, None]).all(axis=1)
-    x, place = points[outer.corners[facet]], points[node]
+    x, point = points[outer.corners[facet]], points[node]
     if points.shape[1] == 2:
-        return np.asarray(away & _in_simplex(place, x))
-    return np.asarray(away & (_in_simplex(place, x[:, [0, 1, 2]]) | _in_simplex(place, x[:, [0, 2, 3]])))
+        return np.asarray(away & _in_simplex(point, x))
+    return np.asarray(away & (_in_simplex(point, x[:, [0, 1, 2]]) | _in_simplex(point, x[:, [0, 2, 3]])))
 
 
-def _in_simplex(place: Array, x: Array) -> Mask:
+def _in_simplex(point: Array, x: Array) -> Mask:
     """Return whether the projections of points (m, dim) lie in lines (m, 2, dim) or triangles (m, 3, dim)."""
     sides = x[:, 1:] - x[:, :1]
     metric = np.einsum("mid,mjd->mij", sides, sides)
     flat = np.linalg.det(metric) <= 0.0
     metric[flat] = np.eye(metric.shape[1])
-    coordinate = np.linalg.solve(metric, np.einsum("mid,md->mi", sides, place - x[:, 0])[..., None])[..., 0]
+    coordinate = np.linalg.solve(metric, np.einsum("mid,md->mi", sides, point - x[:, 0])[..., None])[..., 0]
     inside = (coordinate >= -NEAR).all(axis=1) & (coordinate.sum(axis=1) <= 1.0 + NEAR)
     return np.asarray(inside & ~flat)

@@ -36,9 +36,9 @@ def facing_facets(points, nodes, outward, facets, centre, normal, reach, tree, o
                 height += normal[f, d] * (point[d] - centre[f, d])
             if along > -0.5 or abs(height) > reach[f]:
                 continue
-            own = False
+            is_corner = False
             for a in range(facets.shape[1]):
-                own = own or facets[f, a] == node
-            if not own:
+                is_corner = is_corner or facets[f, a] == node
+            if not is_corner:
                 found[i, count] = f
                 count += 1

@@ -15,7 +15,7 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.elasticity.constrained_system import ConstrainedMotion
 from fastcontact.elasticity.initial_states import InitialState
 from fastcontact.elasticity.loads import Load
-from fastcontact.elasticity.relations import Relation, TemporaryRelation
+from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, TemporaryConstraint
 from fastcontact.elasticity.temperature import Temperature
 from fastcontact.errors import ModelError
 from fastcontact.mesh.argument_types import typed
@@ -76,7 +76,7 @@ class Model(ModelSupports):
     def _repr_html_(self) -> str:
         """Return `describe` as a table for notebooks."""
         head, *parts = sentences(self)
-        rows = [part.split(": ", 1) for part in parts if ": " in part]
+        rows = [sentence.split(": ", 1) for sentence in parts if ": " in sentence]
         return html_table(rows, caption=head)
 
     def describe(self) -> str:
@@ -95,7 +95,7 @@ class Model(ModelSupports):
         self.thermal_forces_by_ramp()
         self.check_heat()
         if ramp is not None:
-            items: list[Support | Load | Relation | Temperature | InitialState] = [
+            items: list[Support | Load | MultiPointConstraint | Temperature | InitialState] = [
                 *self.supports, *self.loads, *self.relations, *self.temperatures, *self.initial_states,
                 *self.heat_loads,
             ]  # fmt: skip
@@ -119,7 +119,9 @@ class Model(ModelSupports):
         )
         for begin in self._changes():
             acting = copy.copy(self)
-            acting.relations = [r for r in self.relations if not isinstance(r, TemporaryRelation) or r.acts_from(begin)]
+            acting.relations = [
+                r for r in self.relations if not isinstance(r, TemporaryConstraint) or r.acts_from(begin)
+            ]
             try:
                 acting._check_motions(fixed, list(self.force_driven.forces(forces).values()))
             except ModelError as error:
@@ -127,11 +129,13 @@ class Model(ModelSupports):
 
     def _changes(self) -> list[float]:
         """Return the instants at which temporary relations begin or end, and 0."""
-        temporary = [own for own in self.relations if isinstance(own, TemporaryRelation)]
-        return sorted({0.0, *(t for own in temporary for t in (own.begins, own.ends) if 0.0 < t < np.inf)})
+        temporary = [relation for relation in self.relations if isinstance(relation, TemporaryConstraint)]
+        return sorted(
+            {0.0, *(t for relation in temporary for t in (relation.begins, relation.ends) if 0.0 < t < np.inf)}
+        )
 
     def _check_relations(self, fixed: Mask, prescribed: Mapping[Table | None, Array], ramp: Ramp) -> None:
-        relations = [own for own in self.relations if not isinstance(own, TemporaryRelation)]
+        relations = [relation for relation in self.relations if not isinstance(relation, TemporaryConstraint)]
         if not relations:
             return
         motion = ConstrainedMotion(fixed.ravel(), relations)
@@ -147,7 +151,7 @@ class Model(ModelSupports):
             return
         at_rest, still = Configuration.undeformed(self.mesh.points), np.zeros(self.mesh.dim)
         parts = [driven.constraints(pair.name, self.bind(pair).constraints(at_rest), still) for pair in self.contact]
-        rows = [resisting(part)[0] @ motions.displacement for part in parts]
+        rows = [resisting(constraints)[0] @ motions.displacement for constraints in parts]
         works = [generalised(motions, force.ravel()) for force in forces]
         k = len(motions)
         gaps, driven_by = np.vstack([*rows, np.empty((0, k))]), np.vstack([*works, np.empty((0, k))])

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 # Young's moduli that differ by more: steel against soft rubber is 200 000, MPa against Pa a million.
 MODULI = 3e5
-# A prescribed displacement of more than so many times the size of the model, and strains by the loads above and below these
+# A prescribed displacement beyond this multiple of the size of the model, and strains by the loads above and below these
 # bounds, are probably mistakes.
 DISPLACED, STRAINED, UNSTRAINED = 1.0, 1.0, 1e-12
 # Solids: aerogel to diamond [Pa]. Only here units of the user matter, and only where a case names them.
@@ -50,11 +50,11 @@ RUBBING = 3.0
 @on_one_blas_thread
 def model_warnings(model: Model, ramp: Ramp) -> list[str]:
     """Return the warnings about a model that `Model.check` has found complete, for an analysis along a ramp."""
-    found = _moduli(model) + _named_units(model) + _proportions(model)
-    found += [text for text in (poorest_cell(model.mesh), hanging_nodes_warning(model)) if text] + _coincident(model)
-    found += _friction(model) + _penetrating(model) + _unramped(model, ramp)
-    found += _prescribed_overlaps(model, ramp) + _lost_loads(model) + _split_sides(model)
-    return found + _stiffness(model.mesh) + [text for load in model.loads for text in _load_integral(model, load)]
+    warnings = _moduli(model) + _named_units(model) + _proportions(model)
+    warnings += [text for text in (poorest_cell(model.mesh), hanging_nodes_warning(model)) if text] + _coincident(model)
+    warnings += _friction(model) + _penetrating(model) + _unramped(model, ramp)
+    warnings += _prescribed_overlaps(model, ramp) + _lost_loads(model) + _split_sides(model)
+    return warnings + _stiffness(model.mesh) + [text for load in model.loads for text in _load_integral(model, load)]
 
 
 def _prescribed_overlaps(model: Model, ramp: Ramp) -> list[str]:
@@ -113,10 +113,10 @@ def _named_units(model: Model) -> list[str]:
     for material, groups in model.materials:
         low, high = (young * pascal for young in material.young)
         if low < SOLIDS[0] or high > SOLIDS[1]:
-            E, limit, what = (high, SOLIDS[1], "diamond") if high > SOLIDS[1] else (low, SOLIDS[0], "aerogel")
+            E, limit, quantity = (high, SOLIDS[1], "diamond") if high > SOLIDS[1] else (low, SOLIDS[0], "aerogel")
             where = "all cells" if groups is None else ", ".join(f"'{group}'" for group in groups)
             texts.append(
-                f"Young's modulus E = {E / pascal:g} {units['pressure']} of {where} is {E / limit:.3g} times that of {what}: "
+                f"Young's modulus E = {E / pascal:g} {units['pressure']} of {where} is {E / limit:.3g} times that of {quantity}: "
                 "is it in another unit?"
             )
     return texts
@@ -170,11 +170,11 @@ def _coincident(model: Model) -> list[str]:
     if count < mesh.dim:  # bodies that touch at a corner only
         return []
     first = pairs[np.lexsort(mesh.points[pairs[:, 0]].T)[0]]
-    place = ", ".join(f"{x:.6g}" for x in mesh.points[first[0]])
+    point = ", ".join(f"{x:.6g}" for x in mesh.points[first[0]])
     largest = float(apart.max())
     where = "where another one is" if largest <= ROUND_OFF * size else f"within {largest:.3g} of another one"
     return [
-        f"{count} nodes lie {where}, and no contact joins them (first: points {first[0]} and {first[1]} at ({place})): merge "
+        f"{count} nodes lie {where}, and no contact joins them (first: points {first[0]} and {first[1]} at ({point})): merge "
         "them in the mesher or with generate.transform.merge_points, or define the contact"
     ]
 
@@ -216,11 +216,11 @@ def _unramped(model: Model, ramp: Ramp) -> list[str]:
     if top <= 1.0 or len(ramp.table) > 2:
         return []
     items: list[Any] = [*(s for s in model.supports if s.value), *model.loads, *model.temperatures]
-    found = [(item.name, item.ramp) for item in items]
-    found += [(f"the motion of obstacle '{pair.name}'", pair.ramp) for pair in model.contact if any(pair.motion)]
-    found += [(f"the force on obstacle '{pair.name}'", pair.ramp) for pair in model.contact if any(pair.force)]
-    without = [name for name, own in found if own is None]
-    if not without or len(without) == len(found):
+    ramps = [(item.name, item.ramp) for item in items]
+    ramps += [(f"the motion of obstacle '{pair.name}'", pair.ramp) for pair in model.contact if any(pair.motion)]
+    ramps += [(f"the force on obstacle '{pair.name}'", pair.ramp) for pair in model.contact if any(pair.force)]
+    without = [name for name, own in ramps if own is None]
+    if not without or len(without) == len(ramps):
         return []
     return [
         f"{', '.join(without)} {'has' if len(without) == 1 else 'have'} no ramp, as others have: at load factor {top:g} "

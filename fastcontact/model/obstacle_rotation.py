@@ -21,27 +21,27 @@ LARGEST_TURN = 1.0
 
 def rotation_of(name: str, given: Mapping[str, Any], kinematics: str) -> tuple[Rotation, Table | None]:
     """Return the rotation of obstacle `name` and its history, None for that of the motion; ModelError if they are wrong."""
-    what = f"the rotation of obstacle '{name}'"
+    caption = f"the rotation of obstacle '{name}'"
     for key in given:
         if key not in KEYS:
-            raise ModelError(unknown(f"key of {what}", key, KEYS))
+            raise ModelError(unknown(f"key of {caption}", key, KEYS))
     if kinematics == "axisymmetric":
         raise ModelError(
-            f"{what}: an axisymmetric model has no displacement round its axis, and tilting is not axisymmetric: make a "
+            f"{caption}: an axisymmetric model has no displacement round its axis, and tilting is not axisymmetric: make a "
             "model in three dimensions"
         )
     dim = 3 if kinematics == "3d" else 2
     for key in ("angle", "centre", "axis")[:dim]:
         if key not in given:
-            raise ModelError(f"{what} needs '{key}'")
+            raise ModelError(f"{caption} needs '{key}'")
     if dim == 2 and given.get("axis") is not None:
-        raise ModelError(f"{what}: in the plane it is about z, counter-clockwise: leave out the axis")
-    check_number(f"the angle of {what}", given["angle"])
-    axis = _vector(f"the axis of {what}", given["axis"], 3) if dim == 3 else (0.0, 0.0, 1.0)
+        raise ModelError(f"{caption}: in the plane it is about z, counter-clockwise: leave out the axis")
+    check_number(f"the angle of {caption}", given["angle"])
+    axis = _vector(f"the axis of {caption}", given["axis"], 3) if dim == 3 else (0.0, 0.0, 1.0)
     if not any(axis):
-        raise ModelError(f"the axis of {what} has no length")
-    rotation = Rotation(_vector(f"the centre of {what}", given["centre"], dim), axis, float(given["angle"]))  # type: ignore[arg-type]
-    return rotation, table_of(given.get("ramp"), f"the ramp of {what}")
+        raise ModelError(f"the axis of {caption} has no length")
+    rotation = Rotation(_vector(f"the centre of {caption}", given["centre"], dim), axis, float(given["angle"]))  # type: ignore[arg-type]
+    return rotation, table_of(given.get("ramp"), f"the ramp of {caption}")
 
 
 def _vector(name: str, values: Sequence[float], size: int) -> tuple[float, ...]:
@@ -58,8 +58,8 @@ def angle_at(pair: ContactPair, ramp: Ramp, instant: float) -> float:
     """Return by how much the obstacle of a pair has turned at an instant [radian]."""
     if pair.rotation is None:
         return 0.0
-    own = pair.ramp if pair.rotation_ramp is None else pair.rotation_ramp
-    return multiplier(own, ramp, instant) * pair.rotation.angle
+    ramp_of_rotation = pair.ramp if pair.rotation_ramp is None else pair.rotation_ramp
+    return multiplier(ramp_of_rotation, ramp, instant) * pair.rotation.angle
 
 
 def check_turns(pairs: Iterable[ContactPair], ramp: Ramp) -> None:

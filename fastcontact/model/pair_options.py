@@ -146,13 +146,15 @@ def _positive(name: str, option: str, options: Mapping[str, Any], without: str) 
 
 def _friction_heat(name: str, options: Mapping[str, Any]) -> float:
     """Return what part of the work of friction becomes heat; zero where it is not given."""
-    part = options.get("friction_heat", 0.0)
-    check_number(f"the friction_heat of contact '{name}'", part)
-    if not 0.0 <= part <= 1.0:
-        raise ContactError(f"friction_heat = {part} of contact '{name}' must be a part of the work, between 0 and 1")
-    if part and not options.get("friction"):
+    fraction = options.get("friction_heat", 0.0)
+    check_number(f"the friction_heat of contact '{name}'", fraction)
+    if not 0.0 <= fraction <= 1.0:
+        raise ContactError(
+            f"friction_heat = {fraction} of contact '{name}' must be a part of the work, between 0 and 1"
+        )
+    if fraction and not options.get("friction"):
         raise ContactError(f"contact '{name}' has a friction_heat, but no friction that could make it")
-    return float(part)
+    return float(fraction)
 
 
 def _vector(name: str, option: str, options: Mapping[str, Any], dim: int) -> Array | None:
@@ -161,12 +163,12 @@ def _vector(name: str, option: str, options: Mapping[str, Any], dim: int) -> Arr
     if value is None:
         return None
     try:
-        found = np.asarray(value, float)
+        vector = np.asarray(value, float)
     except (TypeError, ValueError):
-        found = np.empty(0)
-    if found.shape != (dim,) or not np.isfinite(found).all() or not found.any():
+        vector = np.empty(0)
+    if vector.shape != (dim,) or not np.isfinite(vector).all() or not vector.any():
         raise ContactError(f"{option} = {value!r} of contact '{name}' must be a vector of {dim} numbers, not all zero")
-    return found
+    return vector
 
 
 def _tangential_penalty(name: str, value: Any) -> Field | None:
@@ -227,9 +229,9 @@ def _nodes(name: str, option: str, options: Mapping[str, Any], mesh: Mesh, side:
     return mask
 
 
-def _function(what: str, value: Any) -> Field | None:
+def _function(name: str, value: Any) -> Field | None:
     """Return a number or a function of position as a function that checks its result; pass None through."""
     if value is None:
         return None
-    check_value(what, value)
-    return partial(evaluated, value, name=what)
+    check_value(name, value)
+    return partial(evaluated, value, name=name)

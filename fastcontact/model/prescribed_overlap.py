@@ -36,8 +36,11 @@ class Supports:
 
     def instants(self) -> list[float]:
         """Return some instants of the ramp, the first and the last among them."""
-        found = list(self.ramp.instants)
-        return [found[k] for k in np.unique(np.linspace(0, len(found) - 1, SOME).round().astype(int))]
+        instants_of_ramps = list(self.ramp.instants)
+        return [
+            instants_of_ramps[k]
+            for k in np.unique(np.linspace(0, len(instants_of_ramps) - 1, SOME).round().astype(int))
+        ]
 
     def at(self, instant: float) -> Array:
         """Return the displacements (n_points, dim), zero where nothing is prescribed [length]."""
@@ -57,10 +60,10 @@ class Overlap:
 
 def check_prescribed(pairs: Pairs, supports: Supports) -> None:
     """Raise ModelError if supports alone bring all nodes of a contact that face its other side into that side."""
-    for contact, formulation, found in _overlaps(pairs, supports):
-        if found.count == found.total:
+    for contact, formulation, worst in _overlaps(pairs, supports):
+        if worst.count == worst.total:
             raise ModelError(
-                f"{_described(contact, formulation, found)}: contact forces cannot change what supports prescribe; prescribe "
+                f"{_described(contact, formulation, worst)}: contact forces cannot change what supports prescribe; prescribe "
                 "other values, or the displacement of nodes that are not in contact"
             )
 
@@ -68,19 +71,19 @@ def check_prescribed(pairs: Pairs, supports: Supports) -> None:
 def prescribed_overlap_warnings(pairs: Pairs, supports: Supports) -> list[str]:
     """Return a warning for each contact with nodes that supports alone bring into its other side."""
     return [
-        f"{_described(contact, formulation, found)}: contact forces cannot change what supports prescribe; leave these nodes "
+        f"{_described(contact, formulation, worst)}: contact forces cannot change what supports prescribe; leave these nodes "
         "out of the support, or out of the contact ('excluded')"
-        for contact, formulation, found in _overlaps(pairs, supports)
+        for contact, formulation, worst in _overlaps(pairs, supports)
     ]
 
 
-def _described(contact: ContactPair, formulation: Formulation, found: Overlap) -> str:
-    place = ", ".join(f"{x:.6g}" for x in formulation.points[found.point])
+def _described(contact: ContactPair, formulation: Formulation, overlap: Overlap) -> str:
+    position = ", ".join(f"{x:.6g}" for x in formulation.points[overlap.point])
     how = "off" if formulation.options.always_closed else "into"
     other = f"'{contact.primary}'" if contact.primary else "the rigid obstacle"
     return (
-        f"supports push {found.count} of the {found.total} nodes of '{contact.secondary}' {how} {other}, contact "
-        f"'{contact.name}', by up to {found.depth:.4g} (point {found.point} at ({place}), instant {found.instant:g})"
+        f"supports push {overlap.count} of the {overlap.total} nodes of '{contact.secondary}' {how} {other}, contact "
+        f"'{contact.name}', by up to {overlap.depth:.4g} (point {overlap.point} at ({position}), instant {overlap.instant:g})"
     )
 
 
@@ -103,8 +106,8 @@ def _overlaps(pairs: Pairs, supports: Supports) -> Iterator[tuple[ContactPair, F
             )
 
 
-def _worst(found: Iterable[Overlap]) -> Overlap:
-    return max(found, key=lambda overlap: overlap.depth)
+def _worst(overlaps: Iterable[Overlap]) -> Overlap:
+    return max(overlaps, key=lambda overlap: overlap.depth)
 
 
 def _at(contact: ContactPair, formulation: Formulation, nodes: Numbers, supports: Supports, instant: float) -> Overlap:

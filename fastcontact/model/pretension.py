@@ -11,7 +11,7 @@ from scipy.sparse import csr_array, vstack
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.loads import Load, Table, check_number
-from fastcontact.elasticity.relations import Relation
+from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.errors import ModelError
 from fastcontact.mesh.companion_groups import OPPOSITE
 from fastcontact.mesh.mesh import Mesh
@@ -74,26 +74,26 @@ class Pretension:
         each = np.tile(direction, (len(self.nodes), 1))
         return csr_array(along(self.nodes, each, n_dofs) - along(self.opposite, each, n_dofs))
 
-    def relations(self, n_dofs: int) -> list[Relation]:
+    def relations(self, n_dofs: int) -> list[MultiPointConstraint]:
         """Return the relations that hold at all times: no shear, one shortening of all nodes, the prescribed one if any."""
         rows = [self._approach(direction, n_dofs) for direction in _across(self.normal)]
-        own = self._approach(self.normal, n_dofs)
+        approach = self._approach(self.normal, n_dofs)
         if len(self.nodes) > 1:
-            rows.append(own[1:] - csr_array(vstack([own[[0]]] * (len(self.nodes) - 1))))
+            rows.append(approach[1:] - csr_array(vstack([approach[[0]]] * (len(self.nodes) - 1))))
         matrix = csr_array(vstack(rows, format="csr"))
         matrix.eliminate_zeros()
-        found = [Relation(f"the sides of {self.name}", matrix)]
+        constraints = [MultiPointConstraint(f"the sides of {self.name}", matrix)]
         if self.shortening is not None:
-            found.append(Relation(self.prescribed, self.row(n_dofs), self.shortening, self.ramp))
-        return found
+            constraints.append(MultiPointConstraint(self.prescribed, self.row(n_dofs), self.shortening, self.ramp))
+        return constraints
 
     def shortened(self, displacement: Array) -> float:
         """Return by how much the sides approach in displacements (n_points, dim) [length]."""
         return float((self.row(displacement.size) @ displacement.ravel())[0])
 
-    def locked(self, n_dofs: int, reached: float) -> Relation:
+    def locked(self, n_dofs: int, reached: float) -> MultiPointConstraint:
         """Return the relation that keeps a shortening [length]."""
-        return Relation(f"the locked length of {self.name}", self.row(n_dofs), reached, ((0.0, 1.0),))
+        return MultiPointConstraint(f"the locked length of {self.name}", self.row(n_dofs), reached, ((0.0, 1.0),))
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,10 +127,10 @@ class PretensionForce(Load):
         pass
 
     def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
-        own = self.section
-        share = own.force / len(own.nodes) * own.normal
-        forces[own.nodes] += share
-        forces[own.opposite] -= share
+        section = self.section
+        share = section.force / len(section.nodes) * section.normal
+        forces[section.nodes] += share
+        forces[section.opposite] -= share
 
 
 def pretension(
@@ -159,9 +159,9 @@ def pretension(
         raise ModelError(f"{name} needs either a force or a shortening")
     if shortening is not None and locked_from is not None:
         raise ModelError(f"{name} has a shortening, which is known at all times: locked_from belongs to a force")
-    for what, value in (("force", force), ("shortening", shortening), ("locked_from", locked_from)):
+    for name_of_value, value in (("force", force), ("shortening", shortening), ("locked_from", locked_from)):
         if value is not None:
-            check_number(f"the {what} of {name}", value)
+            check_number(f"the {name_of_value} of {name}", value)
     nodes, facing = _sides(mesh, name, section, opposite)
     direction = _outwards(mesh, name, section, _normal(mesh, name, nodes, normal))
     return Pretension(label, nodes, facing, direction, force or 0.0, shortening, locked_from, ramp)
@@ -182,8 +182,8 @@ def _sides(mesh: Mesh, name: str, section: str, opposite: str | None) -> tuple[I
         raise ModelError(
             f"{name}: '{section}' and '{other}' share point {shared[0]}: both sides need nodes of their own"
         )
-    place = matched(mesh, (section, nodes), (other, facing), [0.0] * mesh.dim)
-    return nodes, facing[place]
+    match = matched(mesh, (section, nodes), (other, facing), [0.0] * mesh.dim)
+    return nodes, facing[match]
 
 
 def _normal(mesh: Mesh, name: str, nodes: Indices, normal: Sequence[float] | None) -> Array:
@@ -219,8 +219,8 @@ def _outwards(mesh: Mesh, name: str, section: str, direction: Array) -> Array:
 def _across(normal: Array) -> Array:
     """Return the unit vectors (dim - 1, dim) across a normal, parallel to axes where it is."""
     axis = int(np.argmax(np.abs(normal)))
-    found = [unit for k, unit in enumerate(np.eye(len(normal))) if k != axis]
-    basis = np.linalg.qr(np.column_stack([normal, *found]))[0][:, 1:].T
+    directions = [unit for k, unit in enumerate(np.eye(len(normal))) if k != axis]
+    basis = np.linalg.qr(np.column_stack([normal, *directions]))[0][:, 1:].T
     return np.asarray(np.where(np.abs(basis) < 1e-14, 0.0, basis))
 
 
@@ -232,21 +232,21 @@ def locked_lengths(
     Those `kept` from when they were locked, those of displacements (n_points, dim) [length] of the others: what a solution
     keeps of a shortening is round-off beside it.
     """
-    locked = [own for own in sections if own.locked_from is not None and begin >= own.locked_from]
-    return {own.label: kept[own.label] if own.label in kept else own.shortened(displacement) for own in locked}
+    locked = [bolt for bolt in sections if bolt.locked_from is not None and begin >= bolt.locked_from]
+    return {bolt.label: kept[bolt.label] if bolt.label in kept else bolt.shortened(displacement) for bolt in locked}
 
 
 def check_locks(sections: Sequence[Pretension], instants: Sequence[float]) -> None:
     """Raise ModelError if a section is locked inside of a load step, or from the beginning."""
-    for own in sections:
-        at = own.locked_from
+    for bolt in sections:
+        at = bolt.locked_from
         if at is not None and at <= 0.0:
             raise ModelError(
-                f"{own.name} is locked from {at:g}, and its force never acts: lock it at the end of a load step"
+                f"{bolt.name} is locked from {at:g}, and its force never acts: lock it at the end of a load step"
             )
         if at is not None and instants[0] < at < instants[-1] and at not in instants:
             raise ModelError(
-                f"{own.name} is locked from {at:g}, but no load step ends there: give the ramp that instant, or lock it at "
+                f"{bolt.name} is locked from {at:g}, but no load step ends there: give the ramp that instant, or lock it at "
                 f"the end of a step, such as {min(instants, key=lambda t: abs(t - at)):g}"
             )
 
@@ -264,10 +264,10 @@ def section_results(
     factors : sequence of float
         What the force of each section is multiplied with [-].
     """
-    found = {}
-    for own, factor in zip(sections, factors, strict=True):
-        pulled = float(reaction[own.nodes].sum(axis=0) @ own.normal) + factor * own.force
-        found[own.label] = {
-            "force": pulled, "shortening": own.shortened(displacement)
+    results = {}
+    for section, factor in zip(sections, factors, strict=True):
+        pulled = float(reaction[section.nodes].sum(axis=0) @ section.normal) + factor * section.force
+        results[section.label] = {
+            "force": pulled, "shortening": section.shortened(displacement)
         }  # fmt: skip
-    return found
+    return results

@@ -19,30 +19,30 @@ Table = tuple[tuple[float, float], ...]
 MOST_STEPS = 1_000_000
 
 
-def checked_table(rows: Iterable[Iterable[float]], what: str = "the ramp") -> Table:
-    """Return the points (instant, multiplier) of a piecewise linear function of time; messages call it `what`.
+def checked_table(rows: Iterable[Iterable[float]], caption: str = "the ramp") -> Table:
+    """Return the points (instant, multiplier) of a piecewise linear function of time; messages call it `caption`.
 
     ModelError if there are fewer than two, their instants do not ascend, or a number is not finite.
     """
     try:
         table = tuple((float(time), float(value)) for time, value in rows)
     except (OverflowError, TypeError, ValueError):
-        raise ModelError(f"the table of {what} must hold pairs (instant, multiplier of the loads)") from None
+        raise ModelError(f"the table of {caption} must hold pairs (instant, multiplier of the loads)") from None
     times = np.asarray([time for time, _ in table])
     if len(table) < 2 or not (np.diff(times) > 0).all():
-        raise ModelError(f"the table of {what} needs at least two points with ascending instants")
+        raise ModelError(f"the table of {caption} needs at least two points with ascending instants")
     if not np.isfinite(table).all():
-        raise ModelError(f"the table of {what} holds a number that is not finite: {table}")
+        raise ModelError(f"the table of {caption} holds a number that is not finite: {table}")
     if np.abs(table).max() > LARGEST:
-        raise ModelError(f"the table of {what} is out of range: the size of its numbers must be at most {LARGEST:g}")
+        raise ModelError(f"the table of {caption} is out of range: the size of its numbers must be at most {LARGEST:g}")
     return table
 
 
-def table_of(ramp: History, what: str) -> Table | None:
+def table_of(ramp: History, caption: str) -> Table | None:
     """Return the table of a history, None for none; errors as for `checked_table`."""
     if ramp is None:
         return None
-    return ramp.table if isinstance(ramp, Ramp) else checked_table(ramp, what)
+    return ramp.table if isinstance(ramp, Ramp) else checked_table(ramp, caption)
 
 
 def table_value(table: Table, instant: float) -> float:
@@ -142,11 +142,11 @@ def ramp_of(steps: RampLike | None) -> Ramp:
     return Ramp(tuple(values), ((0.0, 0.0), (end, end)))
 
 
-def multiplier(own: Table | None, ramp: Ramp, instant: float) -> float:
+def multiplier(table: Table | None, ramp: Ramp, instant: float) -> float:
     """Return the multiplier of a load at `instant`: that of its own history, or else of the ramp."""
-    return ramp.value(instant) if own is None else table_value(own, instant)
+    return ramp.value(instant) if table is None else table_value(table, instant)
 
 
 def combined(by_ramp: Mapping[Table | None, Array], ramp: Ramp, instant: float, shape: tuple[int, ...]) -> Array:
     """Return the sum of the parts at `instant`, each times its multiplier."""
-    return sum((multiplier(own, ramp, instant) * part for own, part in by_ramp.items()), np.zeros(shape))
+    return sum((multiplier(table, ramp, instant) * values for table, values in by_ramp.items()), np.zeros(shape))

@@ -82,12 +82,12 @@ def matched(
         shift = np.asarray(translation, float)
         if shift.shape != (mesh.dim,) or not np.isfinite(shift).all():
             raise ModelError(f"the translation {translation} of '{name}' must be {mesh.dim} numbers")
-    distance, place = cKDTree(theirs).query(ours + shift)
+    distance, match = cKDTree(theirs).query(ours + shift)
     size = max(float(np.ptp(ours, axis=0).max()), 1e-3 * float(np.ptp(mesh.points, axis=0).max()))
     far = int(np.argmax(distance))
-    if distance[far] > APART * size or len(np.unique(place)) < len(place):
+    if distance[far] > APART * size or len(np.unique(match)) < len(match):
         raise ModelError(
             f"point {nodes[far]} of '{name}', moved by {shift}, lies {distance[far]:.3g} from the nearest node of '{other}': "
             "groups are joined nodes upon nodes; give the translation that brings them there, or another mesh"
         )
-    return np.asarray(place, np.intp)
+    return np.asarray(match, np.intp)

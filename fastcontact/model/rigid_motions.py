@@ -29,11 +29,11 @@ MODE_NAMES = {
 }
 # Relative to the motions, whose largest displacement is about 1.
 ZERO = 1e-8
-# A motion that contact does not stop within so many times the size of the model is not stopped at all.
+# A motion that contact does not stop within this multiple of the size of the model is not stopped at all.
 FAR = 1e3
 # Of the pyramid that stands for Coulomb's cone in space: forces up to 8 % outside of the cone are left to the solution.
 EDGES = 8
-# So much more friction is as good as none that could hold a body.
+# A coefficient of friction larger by this factor counts as none that could hold a body.
 MOST_FRICTION = 100.0
 # A mesh of more motions of parts between hinges is no structure that anybody meant.
 MANY = 1500
@@ -66,11 +66,11 @@ class FreeMotions:
 
     def by_body(self) -> dict[str, list[str]]:
         """Return the names of the motions of each body, each once: joint motions may hold alike ones of one body."""
-        found: dict[str, list[str]] = {}
+        by_body: dict[str, list[str]] = {}
         for column in self.parts.T:
             for body, motion in self._mixed(column):
-                found.setdefault(body, []).append(motion)
-        return {body: list(dict.fromkeys(motions)) for body, motions in found.items()}
+                by_body.setdefault(body, []).append(motion)
+        return {body: list(dict.fromkeys(motions)) for body, motions in by_body.items()}
 
     def _mixed(self, column: Array) -> list[tuple[str, str]]:
         mixed: dict[str, list[str]] = {}
@@ -134,8 +134,8 @@ def _of_bodies(mesh: Mesh, kinematics: str, fixed: Mask) -> FreeMotions:
     spans = np.split(kept, np.cumsum([motion.shape[2] for _, motion in moving]))
     displacement = np.zeros((mesh.n_points, mesh.dim, kept.shape[1]))
     for number, ((members, motion), span) in enumerate(zip(moving, spans[:-1], strict=True)):
-        own = rigid.part[members] == number
-        displacement[members[own]] = motion[own] @ span
+        members_of_body = rigid.part[members] == number
+        displacement[members[members_of_body]] = motion[members_of_body] @ span
     return FreeMotions(
         displacement.reshape(mesh.points.size, kept.shape[1]), np.asarray(block_diag(*parts), float) @ kept, labels,
         np.unique(rigid.hinge_node),
@@ -176,7 +176,7 @@ def node_at(mesh: Mesh, node: int) -> str:
 
 
 def _part_name(mesh: Mesh, rigid: RigidParts, number: int) -> str:
-    """Return the name of a body, or of a part of one and the first node at which it hangs on others."""
+    """Return the name of a body, or of a part of one and the first node at which it is attached to others."""
     _, body = bodies(mesh)
     members, hinges = rigid.nodes_of(number), rigid.hinges_of(number)
     name = f"body {body_name(mesh, body, int(body[members[0]]))}"
@@ -219,7 +219,10 @@ def _edges(constraints: Constraints) -> tuple[csr_array, Array]:
     edges = [
         csr_array(
             sum(
-                (T.multiply((part * constraints.friction)[:, None]) for T, part in zip(constraints.tangents, parts)),
+                (
+                    T.multiply((weight * constraints.friction)[:, None])
+                    for T, weight in zip(constraints.tangents, parts)
+                ),
                 start=constraints.B,
             )
         )
@@ -267,8 +270,8 @@ def stopped_at(gaps: Array, gap: Array, work: Array, size: float) -> Array | Non
         return np.zeros(len(work))
     rows = np.abs(gaps).max(axis=1, initial=0.0) > ZERO
     open_by = np.maximum(gap[rows], 0.0) / size
-    found = _extreme(work / np.abs(work).max(), gaps[rows], open_by, np.empty((0, len(work))), FAR)
-    return None if np.abs(found).max() > 0.99 * FAR else found * size
+    stop = _extreme(work / np.abs(work).max(), gaps[rows], open_by, np.empty((0, len(work))), FAR)
+    return None if np.abs(stop).max() > 0.99 * FAR else stop * size
 
 
 def needed_friction(
@@ -299,8 +302,8 @@ def _extreme(along: Array, gaps: Array, gap: Array, held: Array, bound: float) -
     """Return the y with the largest ``along @ y``, ``gap + gaps @ y >= 0``, ``held @ y = 0``, ``|y| <= bound``."""
     from scipy.optimize import linprog
 
-    found = linprog(
+    optimum = linprog(
         -along, A_ub=-gaps, b_ub=gap, A_eq=held if len(held) else None, b_eq=np.zeros(len(held)) if len(held) else None,
         bounds=(-bound, bound), method="highs",
     )  # fmt: skip
-    return np.zeros(len(along)) if found.x is None else np.asarray(found.x)
+    return np.zeros(len(along)) if optimum.x is None else np.asarray(optimum.x)

@@ -156,12 +156,12 @@ class SpreadForce(Load):
         forces[points] += found
 
 
-def spread_of(name: str, place: Sequence[float] | None, weighting: str, radius: float | None) -> Spread | None:
+def spread_of(name: str, point: Sequence[float] | None, weighting: str, radius: float | None) -> Spread | None:
     """Return how something is spread about a place, None without one; ModelError if only weighting or radius are given."""
-    if place is None:
+    if point is None:
         if weighting != "uniform" or radius is not None:
             raise ModelError(
                 f"{name} has a weighting or a radius, but no place from which distances count: give at=..."
             )
         return None
-    return Spread(tuple(float(v) for v in place), weighting, radius)
+    return Spread(tuple(float(v) for v in point), weighting, radius)

@@ -34,23 +34,23 @@ def read_temperatures(
         raise ModelError("no file is given for the temperature")
     parts, times = [], []
     for path in files:
-        found = read_point_field(path, field)
-        values = at_points_of(found, mesh, wanted, f"field '{field}' of '{path}'")
+        field_of_file = read_point_field(path, field)
+        values = at_points_of(field_of_file, mesh, wanted, f"field '{field}' of '{path}'")
         if len(files) > 1 and len(values) > 1:
             raise ModelError(
                 f"'{path}' has {len(values)} instants: one of several files has one, or give one file alone"
             )
         parts.append(values)
-        times.append(found.times)
-    values, own = np.concatenate(parts), times[0] if len(files) == 1 else None
+        times.append(field_of_file.times)
+    values, time = np.concatenate(parts), times[0] if len(files) == 1 else None
     if instant is None:
-        return values, own
-    if own is None:
+        return values, time
+    if time is None:
         raise ModelError(f"field '{field}' of '{files[0]}' has no times: leave out instant")
-    row = int(np.abs(own - instant).argmin())
-    if abs(own[row] - instant) > SAME_TIME * np.abs(own).max():
+    row = int(np.abs(time - instant).argmin())
+    if abs(time[row] - instant) > SAME_TIME * np.abs(time).max():
         raise ModelError(
-            f"field '{field}' of '{files[0]}' has no instant {instant:g}, the next is {own[row]:g}, of {own[0]:g} to "
-            f"{own[-1]:g}"
+            f"field '{field}' of '{files[0]}' has no instant {instant:g}, the next is {time[row]:g}, of {time[0]:g} to "
+            f"{time[-1]:g}"
         )
     return values[row : row + 1], None

@@ -47,8 +47,8 @@ class CommittedFile(DriverFile):
         super().__init__(path)
         self.synchronised = False
         repeated = journal.found(self._file)  # of a writer that the power or a kill has stopped
-        for place, data in repeated:
-            self._put(place, data)
+        for offset, data in repeated:
+            self._put(offset, data)
         self._pending: dict[int, bytes] = {}
         self.ours = True
         self._head = self._read_head()
@@ -80,7 +80,7 @@ class CommittedFile(DriverFile):
         return self.ours and self.failure is None
 
     def _size(self) -> int:
-        waiting = max((place + len(data) for place, data in self._pending.items()), default=0)
+        waiting = max((offset + len(data) for offset, data in self._pending.items()), default=0)
         return max(super()._size(), waiting)
 
     def _get(self, start: int, data: bytearray) -> None:
@@ -91,12 +91,12 @@ class CommittedFile(DriverFile):
         """Keep data for the position; later data replace earlier ones."""
         data, start = bytes(data), self._position
         end = start + len(data)
-        for place in [p for p, old in self._pending.items() if p < end and start < p + len(old)]:
-            old = self._pending.pop(place)
-            if place < start:
-                self._pending[place] = old[: start - place]
-            if end < place + len(old):
-                self._pending[end] = old[end - place :]
+        for offset in [p for p, old in self._pending.items() if p < end and start < p + len(old)]:
+            old = self._pending.pop(offset)
+            if offset < start:
+                self._pending[offset] = old[: start - offset]
+            if end < offset + len(old):
+                self._pending[end] = old[end - offset :]
         self._pending[start] = data
         self._position = end
         return len(data)
@@ -118,36 +118,36 @@ class CommittedFile(DriverFile):
 
     def _commit(self) -> None:
         waiting = sorted(self._pending.items(), key=lambda entry: self._turn(*entry))
-        n_new = sum(not self._overlaps(place, place + len(data)) for place, data in waiting)
+        n_new = sum(not self._overlaps(offset, offset + len(data)) for offset, data in waiting)
         new = waiting[:n_new]
         changes = [change for write in waiting[n_new:] if (change := self._changed(*write))[1]]
-        for place, data in new:
-            self._put(place, data)
+        for offset, data in new:
+            self._put(offset, data)
         if self.synchronised:
             self._synchronise(new, changes)
-        for place, data in changes:
-            self._put(place, data)
+        for offset, data in changes:
+            self._put(offset, data)
         if self.synchronised:
             os.fsync(self.fileno())
         self._head = self._read_head()
-        for place, data in waiting:
-            self._note(place, place + len(data))
+        for offset, data in waiting:
+            self._note(offset, offset + len(data))
         self._pending.clear()
 
-    def _changed(self, place: int, data: bytes) -> journal.Write:
+    def _changed(self, offset: int, data: bytes) -> journal.Write:
         """Return the part of a write that changes the file, from its first byte to its last."""
         if len(data) > COMPARED:
-            return place, data
+            return offset, data
         there = bytearray(len(data))
-        super()._get(place, there)
+        super()._get(offset, there)
         differs = np.flatnonzero(np.frombuffer(data, np.uint8) != np.frombuffer(there, np.uint8))
         if not len(differs):
-            return place, b""
-        return place + int(differs[0]), data[differs[0] : differs[-1] + 1]
+            return offset, b""
+        return offset + int(differs[0]), data[differs[0] : differs[-1] + 1]
 
     def _synchronise(self, new: list[journal.Write], changes: list[journal.Write]) -> None:
         """Have new places on the disk, and a journal of what changes old ones."""
-        end = max([self.end, self._ends[-1], *(place + len(data) for place, data in new)])
+        end = max([self.end, self._ends[-1], *(offset + len(data) for offset, data in new)])
         log = journal.packed(new, changes)
         self._put(end, log)
         self._cut(end + len(log))
@@ -156,15 +156,15 @@ class CommittedFile(DriverFile):
     def _cut(self, size: int) -> None:
         self._file.truncate(size)
 
-    def _turn(self, place: int, data: bytes) -> tuple[int, int, int]:
+    def _turn(self, offset: int, data: bytes) -> tuple[int, int, int]:
         """Return by what writes are sorted: new places, superblock, nodes from the root down, all else, names."""
-        if not self._overlaps(place, place + len(data)):
-            return 0, 0, place
-        if place == 0:
+        if not self._overlaps(offset, offset + len(data)):
+            return 0, 0, offset
+        if offset == 0:
             return 1, 0, 0
         if data.startswith(NODE):
-            return 2, -data[5], place
-        return (4 if data.startswith(NAMES) else 3), 0, place
+            return 2, -data[5], offset
+        return (4 if data.startswith(NAMES) else 3), 0, offset
 
     def _overlaps(self, start: int, end: int) -> bool:
         number = bisect.bisect_left(self._ends, start + 1)

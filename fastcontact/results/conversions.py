@@ -85,16 +85,16 @@ def contact_frame(steps: Iterable[StepResult], units: Mapping[str, str]) -> pand
 def dataset(mesh: Mesh, steps: Iterable[StepResult], units: dict[str, str]) -> Any:
     """Return steps as an ``xarray.Dataset`` with the dimensions step, point, axis, stress_component and contact."""
     xarray = library("xarray", "xarray", "xarray")
-    found = list(steps)
-    pairs = list(dict.fromkeys(name for step in found for name in step.contact))
+    steps_given = list(steps)
+    pairs = list(dict.fromkeys(name for step in steps_given for name in step.contact))
     width, dim = 4 if mesh.dim == 2 else 6, mesh.dim
 
     def over_steps(values: list[Any], shape: tuple[int, ...]) -> Any:
-        return np.array(values, np.float64).reshape(len(found), *shape)
+        return np.array(values, np.float64).reshape(len(steps_given), *shape)
 
     def of_pairs(name: str, shape: tuple[int, ...]) -> Any:
         missing = np.full(shape, np.nan)
-        rows = [[getattr(s.contact[p], name) if p in s.contact else missing for p in pairs] for s in found]
+        rows = [[getattr(s.contact[p], name) if p in s.contact else missing for p in pairs] for s in steps_given]
         return over_steps(rows, (len(pairs), *shape))
 
     n = mesh.n_points
@@ -107,15 +107,15 @@ def dataset(mesh: Mesh, steps: Iterable[StepResult], units: dict[str, str]) -> A
     }
     data = {}
     for name, (dims, shape, quantity) in by_name.items():
-        values = over_steps([getattr(s, name) for s in found], (n, *shape))
+        values = over_steps([getattr(s, name) for s in steps_given], (n, *shape))
         data[name] = (("step", "point", *dims), values, _unit(units, quantity))
-    nodal = over_steps([layout.contact_pressure(mesh, step) for step in found], (n,))
+    nodal = over_steps([layout.contact_pressure(mesh, step) for step in steps_given], (n,))
     data["contact_pressure"] = (("step", "point"), nodal, _unit(units, "pressure"))
     data["contact_force"] = (("step", "contact", "axis"), of_pairs("force", (dim,)), _unit(units, "force"))
     data["contact_pressure_max"] = (("step", "contact"), of_pairs("pressure_max", ()), _unit(units, "pressure"))
     coordinates = {
-        "step": [step.index for step in found],
-        "load_factor": ("step", [step.load_factor for step in found]),
+        "step": [step.index for step in steps_given],
+        "load_factor": ("step", [step.load_factor for step in steps_given]),
         "axis": list(AXES[:dim]),
         "stress_component": list(STRESS_COMPONENTS[:width]),
         "contact": pairs,

@@ -30,10 +30,10 @@ def reserve(descriptor: int, folder: Path, start: int, size: int) -> None:
 def left_at(path: Path) -> tuple[int, ...] | None:
     """Return device, number, size and time of change of the file at a path, by which it is known again; None without one."""
     try:
-        found = os.stat(path)
+        status = os.stat(path)
     except OSError:
         return None
-    return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns
+    return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
 
 
 class PathLock:
@@ -93,8 +93,12 @@ def _own_file(path: Path) -> IO[Any]:
         if error.errno != errno.ELOOP:
             raise
         raise FileError(f"'{path}' is a link, but a lock must be a file of its own: remove it") from error
-    found = os.fstat(descriptor)
-    if not stat.S_ISREG(found.st_mode) or found.st_nlink > 1 or (hasattr(os, "getuid") and found.st_uid != os.getuid()):
+    status = os.fstat(descriptor)
+    if (
+        not stat.S_ISREG(status.st_mode)
+        or status.st_nlink > 1
+        or (hasattr(os, "getuid") and status.st_uid != os.getuid())
+    ):
         os.close(descriptor)
         raise FileError(f"'{path}' is no plain file of yours, as a lock must be: remove it or write to another folder")
     return os.fdopen(descriptor, "r+b", buffering=0)

@@ -30,8 +30,8 @@ def packed(new: Sequence[Write], changes: Sequence[Write]) -> bytes:
     """Return, as the last bytes of a file, the changes of what was there and the checksums of new data that they lead to."""
     body = b"".join(
         [
-            *(HEADER.pack(place, len(data), True) + hashlib.sha256(data).digest() for place, data in new),
-            *(HEADER.pack(place, len(data), False) + data for place, data in changes),
+            *(HEADER.pack(offset, len(data), True) + hashlib.sha256(data).digest() for offset, data in new),
+            *(HEADER.pack(offset, len(data), False) + data for offset, data in changes),
         ]
     )
     return body + FOOTER.pack(len(body), hashlib.sha256(body).digest(), MAGIC)
@@ -58,48 +58,48 @@ def found(file: IO[bytes]) -> list[Write]:
     if sum(count for _, count, is_new, _ in records if is_new) > end:
         raise _forged(file, "counts data twice")
     changes = []
-    for place, count, is_new, data in records:
-        if count and place + count > end:
+    for offset, count, is_new, data in records:
+        if count and offset + count > end:
             raise _forged(file, "leads beyond the contents")
         file.seek(data)
         kept = file.read(DIGEST if is_new else count)
         if not is_new:
-            changes.append((place, kept))
-        elif _digest(file, place, count) != kept:
+            changes.append((offset, kept))
+        elif _digest(file, offset, count) != kept:
             return []
     return changes
 
 
-def _records(file: IO[bytes], place: int, end: int) -> list[tuple[int, int, bool, int]]:
+def _records(file: IO[bytes], offset: int, end: int) -> list[tuple[int, int, bool, int]]:
     """Return place, length and kind of each write of a journal, and where its data or checksum stand."""
-    found = []
-    while place < end:
-        file.seek(place)
-        head = file.read(min(HEADER.size, end - place))
+    records = []
+    while offset < end:
+        file.seek(offset)
+        head = file.read(min(HEADER.size, end - offset))
         if len(head) < HEADER.size:
             raise _forged(file, "is cut off")
         at, count, is_new = HEADER.unpack(head)
-        place += HEADER.size
-        found.append((at, count, is_new, place))
-        place += DIGEST if is_new else count
-    if place > end:
+        offset += HEADER.size
+        records.append((at, count, is_new, offset))
+        offset += DIGEST if is_new else count
+    if offset > end:
         raise _forged(file, "is cut off")
-    return found
+    return records
 
 
-def _digest(file: IO[bytes], place: int, count: int) -> bytes:
+def _digest(file: IO[bytes], offset: int, count: int) -> bytes:
     """Return the SHA-256 of a part of a file, read piece by piece."""
     hashed = hashlib.sha256()
-    file.seek(place)
+    file.seek(offset)
     while count > 0 and (piece := file.read(min(count, PIECE))):
         hashed.update(piece)
         count -= len(piece)
     return hashed.digest()
 
 
-def _forged(file: IO[bytes], what: str) -> FileError:
+def _forged(file: IO[bytes], reason: str) -> FileError:
     name = getattr(file, "name", "the file")
-    return FileError(f"the journal at the end of '{name}' {what}: no writer leaves that, compute the file again")
+    return FileError(f"the journal at the end of '{name}' {reason}: no writer leaves that, compute the file again")
 
 
 class Repeated(io.RawIOBase):
@@ -141,7 +141,7 @@ class Repeated(io.RawIOBase):
 def overlay(writes: Iterable[Write], start: int, view: memoryview | bytearray) -> None:
     """Put into `view`, which holds a file from `start` on, what writes change there."""
     end = start + len(view)
-    for place, data in writes:
-        first, last = max(place, start), min(place + len(data), end)
+    for offset, data in writes:
+        first, last = max(offset, start), min(offset + len(data), end)
         if first < last:
-            view[first - start : last - start] = data[first - place : last - place]
+            view[first - start : last - start] = data[first - offset : last - offset]

@@ -190,12 +190,12 @@ def contact_pressure(mesh: Mesh, step: StepResult) -> Array:
 
 def contact_slip(mesh: Mesh, step: StepResult, name: str) -> Array:
     """Return ``"slip"`` or ``"slip_total"`` at every point (n_points, dim), the larger one of several pairs [length]."""
-    found = np.zeros((mesh.n_points, mesh.dim))
+    slip = np.zeros((mesh.n_points, mesh.dim))
     for contact in step.contact.values():
-        own = getattr(contact, name)
-        larger = ~(np.abs(own).max(axis=1) < np.abs(found[contact.points]).max(axis=1))
-        found[contact.points[larger]] = own[larger]
-    return found
+        values = getattr(contact, name)
+        larger = ~(np.abs(values).max(axis=1) < np.abs(slip[contact.points]).max(axis=1))
+        slip[contact.points[larger]] = values[larger]
+    return slip
 
 
 def point_fields(mesh: Mesh, step: StepResult) -> dict[str, Array]:
@@ -281,9 +281,9 @@ def check_contact(where: str, contact: ContactResult, mesh: Mesh) -> None:
     """Refuse the state of a pair whose arrays do not fit one another or name points that are not in the mesh."""
     row = contact_row(mesh.dim, further_columns(contact))
     for name in row.names or ():
-        found, shape = np.shape(getattr(contact, name)), (len(contact.points), *row[name].shape)
-        if found != shape:
-            raise FileError(f"{where}: {name} has shape {found}, but {shape} is needed")
+        shape_given, shape = np.shape(getattr(contact, name)), (len(contact.points), *row[name].shape)
+        if shape_given != shape:
+            raise FileError(f"{where}: {name} has shape {shape_given}, but {shape} is needed")
     if np.shape(contact.primary_force_vectors) != (len(contact.primary_points), mesh.dim):
         raise FileError(
             f"{where}: primary_force_vectors has shape {np.shape(contact.primary_force_vectors)}, but "

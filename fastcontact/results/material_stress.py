@@ -55,7 +55,7 @@ def by_largest_von_mises(
     stress = at_places[:n_points].copy() if len(sides.points) else at_places
     if not len(sides.points):
         return stress, None
-    own = at_places[sides.place]
-    order = np.lexsort((recovery.von_mises(own), sides.points))  # the last row of each node has the largest
-    stress[sides.points[order]] = own[order]
-    return stress, MaterialStress(cells, sides.points, sides.material, own)
+    values = at_places[sides.place]
+    order = np.lexsort((recovery.von_mises(values), sides.points))  # the last row of each node has the largest
+    stress[sides.points[order]] = values[order]
+    return stress, MaterialStress(cells, sides.points, sides.material, values)

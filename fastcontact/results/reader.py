@@ -118,7 +118,7 @@ class Results(Sequence[StepResult]):
     def _checked(self) -> Any:
         """Return our group in the file, if it is one of ours and of a known schema."""
         if self._file.userblock_size or self._file.id.get_create_plist().get_sizes() != (8, 8):
-            raise ValueError("its addresses are none of ours")
+            raise ValueError("its addresses are not ours")
         check_contents(self._file, self.path)
         if "fastcontact" not in self._file:
             raise FileError(f"'{self.path}' holds no fastcontact results: name a file that fastcontact wrote (.vtkhdf)")
@@ -129,36 +129,36 @@ class Results(Sequence[StepResult]):
             )
         return self._file["fastcontact"]
 
-    def _read_header(self, own: Any) -> None:
+    def _read_header(self, group: Any) -> None:
         self._n_steps = _integer(self._file["VTKHDF/Steps"], "NSteps")
-        self.mesh = _read_mesh(own["mesh"], self._raw)
-        self.kinematics: str = _read_json(own["kinematics"], self._raw)
-        self.case_text: str = _read_json(own["case"], self._raw)
-        self.versions: dict[str, str] = _read_json(own["versions"], self._raw)
-        self._rows = own["steps"][: self._n_steps]
+        self.mesh = _read_mesh(group["mesh"], self._raw)
+        self.kinematics: str = _read_json(group["kinematics"], self._raw)
+        self.case_text: str = _read_json(group["case"], self._raw)
+        self.versions: dict[str, str] = _read_json(group["versions"], self._raw)
+        self._rows = group["steps"][: self._n_steps]
         if len(self._rows) != self._n_steps or self._rows.ndim != 1:
             raise ValueError(f"only {len(self._rows)} of {self._n_steps} steps")
         if not isinstance(self.kinematics, str) or not isinstance(self.case_text, str):
             raise ValueError("its kinematics or its case is no text")
         self.load_factors: Array = np.ascontiguousarray(self._rows["load_factor"])
-        run = self._run_record(own)
+        run = self._run_record(group)
         self.log: Any = (run or {}).get("log")
         self.error: str = (run or {}).get("error", "")
         self.complete = run is not None and not self.error
         notes = [self._notes(number) for number in range(self._n_steps)]
         self.case_text = next((note["case"] for note in reversed(notes) if "case" in note), self.case_text)
         of_steps = [text for note in notes for text in note["warnings"]]
-        named = _read_json(own["units"], self._raw) if "units" in own else self._units_of_case()
+        named = _read_json(group["units"], self._raw) if "units" in group else self._units_of_case()
         if not isinstance(named, dict) or not all(isinstance(text, str) for text in named.values()):
             raise ValueError("its units are no names")
         self.units: dict[str, str] = units_of_results(named, self.kinematics) if named else {}
         self.warnings: tuple[str, ...] = tuple(dict.fromkeys([*(run or {}).get("warnings", ()), *of_steps]))
 
-    def _run_record(self, own: Any) -> dict[str, Any] | None:
+    def _run_record(self, group: Any) -> dict[str, Any] | None:
         """Return how the run ended; None while it goes on, after a crash, and when steps have been added since."""
-        if "runs" not in own:  # schema 1
-            return _read_json(own["run"], self._raw) if "run" in own else None
-        rows = own["runs"][-1:]
+        if "runs" not in group:  # schema 1
+            return _read_json(group["run"], self._raw) if "run" in group else None
+        rows = group["runs"][-1:]
         if not len(rows) or rows["n_steps"][0] != self._n_steps or not rows["count"][0]:
             return None
         return self._note(int(rows["first"][0]), int(rows["count"][0]))
@@ -182,12 +182,12 @@ class Results(Sequence[StepResult]):
             raise IndexError(f"'{self.path}' has {self._n_steps} steps, so there is no step at position {number}")
         return self._read_step(range(self._n_steps)[number])
 
-    def _positions(self, part: slice) -> range:
+    def _positions(self, chosen: slice) -> range:
         try:
-            return range(*part.indices(self._n_steps))
+            return range(*chosen.indices(self._n_steps))
         except (TypeError, ValueError) as error:
             raise FileError(
-                f"{part} of '{self.path}' needs whole numbers, and steps that are not 0 ({error})"
+                f"{chosen} of '{self.path}' needs whole numbers, and steps that are not 0 ({error})"
             ) from None
 
     def lacks(self, names: Sequence[str]) -> list[str]:
@@ -317,23 +317,23 @@ class Results(Sequence[StepResult]):
 
     def _restart(self, number: int) -> dict[str, Any] | None:
         """Return the restart data of the last step; None where there are none, or steps were written since we opened."""
-        own, name = self._file["fastcontact"], layout.restart_table(number)
+        group, name = self._file["fastcontact"], layout.restart_table(number)
         try:
-            kept = unpacked(own[name][()]) if name in own else {}
+            kept = unpacked(group[name][()]) if name in group else {}
         except (ValueError, LookupError, TypeError):
             return None
         return kept["restart"] if kept.get("step") == number else None
 
     def _material_stress(self, number: int) -> MaterialStress | None:
         """Return the stress of each side where materials meet; None for a step or file without."""
-        own = self._file["fastcontact"]
-        if "materials" not in own:
+        group = self._file["fastcontact"]
+        if "materials" not in group:
             return None
-        steps = own["materials/steps"][number : number + 1]
+        steps = group["materials/steps"][number : number + 1]
         if not len(steps) or not steps["count"][0]:
             return None
         first, count = int(steps["first"][0]), int(steps["count"][0])
-        rows, cells = own["materials/rows"][first : first + count], own["materials/cells"][()]
+        rows, cells = group["materials/rows"][first : first + count], group["materials/cells"][()]
         if len(rows) != count or first < 0 or len(cells) != len(self._file["VTKHDF/Types"]):
             raise ValueError("the table of stresses by material is cut off")
         if rows["points"].min() < 0 or rows["points"].max() >= self.mesh.n_points:

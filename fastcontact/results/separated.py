@@ -16,12 +16,12 @@ def separated(mesh: Mesh, step: StepResult) -> tuple[Mesh, Numbers, Array]:
     The points of `mesh` come first. Stress [pressure] has the components of `StepResult.stress`. The mesh has solid cells
     only and no groups; where no materials meet it is `mesh` itself.
     """
-    found = step.material_stress
-    if found is None:
+    material_stress = step.material_stress
+    if material_stress is None:
         return mesh, np.arange(mesh.n_points, dtype=np.int32), step.stress
-    sides = material_sides(mesh, cells_by_element(mesh, found.cells))
+    sides = material_sides(mesh, cells_by_element(mesh, material_stress.cells))
     stress = step.stress[sides.node]
-    stress[sides.place] = found.stress
+    stress[sides.place] = material_stress.stress
     return Mesh(mesh.points[sides.node], sides.cells), sides.node, stress
 
 

@@ -232,7 +232,7 @@ class ContactResult:
 
     @property
     def cancels(self) -> bool:
-        """Whether the resultant is next to nothing beside the normal forces, as all round a press fit."""
+        """Whether the resultant is negligible beside the normal forces, as in a press fit."""
         return bool(np.linalg.norm(self.force) < CANCELLED * self.normal_force)
 
     @property
@@ -319,13 +319,13 @@ class StepResult:
     def shown(self) -> dict[str, str]:
         """What reprs and tables tell, as texts: load factor, largest displacement and stress, iterations."""
         moved, stressed = (float(np.abs(own).max(initial=0.0)) for own in (self.displacement, self.von_mises))
-        found = {
+        shown = {
             "load factor": f"{self.load_factor:.6g}",
             "largest displacement": with_unit(f"{moved:.6g}", self.units, "length"),
             "largest von Mises stress": with_unit(f"{stressed:.6g}", self.units, "pressure"),
         }
         named = {"geometry_updates": "geometry updates", "active_set_iterations": "active-set iterations"}
-        return found | {text: str(self.iterations[key]) for key, text in named.items() if key in self.iterations}
+        return shown | {text: str(self.iterations[key]) for key, text in named.items() if key in self.iterations}
 
     def __repr__(self) -> str:
         pairs = [
@@ -338,8 +338,8 @@ class StepResult:
     def _repr_html_(self) -> str:
         """Return tables of the step and of its contact pairs for notebooks."""
         warnings = [("warning", text) for text in self.warnings]
-        own = html_table([*self.shown.items(), *warnings], caption=f"Step {self.index}")
-        return own + "".join(contact._repr_html_() for contact in self.contact.values())
+        table = html_table([*self.shown.items(), *warnings], caption=f"Step {self.index}")
+        return table + "".join(contact._repr_html_() for contact in self.contact.values())
 
     @property
     def pretension(self) -> dict[str, dict[str, float]]:
@@ -371,8 +371,8 @@ class StepResult:
     @property
     def heat_flux(self) -> Array | None:
         """Mean heat flux (n_solids, dim) of every solid cell [power / area]; None where heat is not conducted."""
-        own = [values for name, values in sorted(self.cell_fields.items()) if name.startswith("heat_flux_")]
-        return np.column_stack(own) if own else None
+        fluxes = [values for name, values in sorted(self.cell_fields.items()) if name.startswith("heat_flux_")]
+        return np.column_stack(fluxes) if fluxes else None
 
     def stress_of_material(self, number: int) -> Array:
         """Return the nodal stress (n_points, 4) or (n_points, 6) with the side of one material where several meet [pressure].
@@ -380,8 +380,8 @@ class StepResult:
         Materials count from 0, in the order in which they were added to the model; at nodes that the material does not have
         the stress is that of the others.
         """
-        found = self.stress.copy()
+        stress = self.stress.copy()
         if self.material_stress is not None:
-            own = self.material_stress.material == number
-            found[self.material_stress.points[own]] = self.material_stress.stress[own]
-        return found
+            of_material = self.material_stress.material == number
+            stress[self.material_stress.points[of_material]] = self.material_stress.stress[of_material]
+        return stress

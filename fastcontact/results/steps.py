@@ -16,14 +16,14 @@ class Steps(list[StepResult]):
     """A list of `StepResult`; in a notebook it shows a table."""
 
     @overload
-    def __getitem__(self, place: SupportsIndex) -> StepResult: ...
+    def __getitem__(self, index: SupportsIndex) -> StepResult: ...
     @overload
-    def __getitem__(self, place: slice) -> Steps: ...
-    def __getitem__(self, place: SupportsIndex | slice) -> StepResult | Steps:
+    def __getitem__(self, index: slice) -> Steps: ...
+    def __getitem__(self, index: SupportsIndex | slice) -> StepResult | Steps:
         """Return a step, or for a slice again such a list."""
-        if isinstance(place, slice):
-            return Steps(super().__getitem__(place))
-        return super().__getitem__(place)
+        if isinstance(index, slice):
+            return Steps(super().__getitem__(index))
+        return super().__getitem__(index)
 
     def __repr__(self) -> str:
         lines = (f"  {step!r}" for step in _shown(self))

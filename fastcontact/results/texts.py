@@ -27,9 +27,9 @@ def read_text(dataset: Any, raw: Any) -> str:
     if dataset.shape != () or start is None or kind is None or kind.length is not None:
         raise ValueError(f"'{dataset.name}' is no text")
     file_size = raw.seek(0, os.SEEK_END)
-    length, place, wanted = _unpacked(REFERENCE, raw, start, file_size)
-    signature, size = _unpacked(HEAD, raw, place, file_size)
-    at, end = place + HEAD.size, min(place + size, file_size)
+    length, offset, wanted = _unpacked(REFERENCE, raw, start, file_size)
+    signature, size = _unpacked(HEAD, raw, offset, file_size)
+    at, end = offset + HEAD.size, min(offset + size, file_size)
     while signature == SIGNATURE and at + OBJECT.size <= end:
         number, size = _unpacked(OBJECT, raw, at, end)
         at += OBJECT.size
@@ -41,8 +41,8 @@ def read_text(dataset: Any, raw: Any) -> str:
     raise ValueError(f"its texts are damaged at byte {at}")
 
 
-def _unpacked(kind: struct.Struct, raw: Any, place: int, end: int) -> tuple[Any, ...]:
-    if place + kind.size > end:
-        raise ValueError(f"its texts are damaged: they stand at byte {place} of {end}")
-    raw.seek(place)
+def _unpacked(kind: struct.Struct, raw: Any, offset: int, end: int) -> tuple[Any, ...]:
+    if offset + kind.size > end:
+        raise ValueError(f"its texts are damaged: they stand at byte {offset} of {end}")
+    raw.seek(offset)
     return kind.unpack(raw.read(kind.size))

@@ -20,8 +20,8 @@ def known_units(units: Mapping[str, str]) -> dict[str, str]:
     >>> known_units({"length": "mm", "force": "-"})
     {'length': 'mm', 'force': '', 'pressure': ''}
     """
-    found = {"length": "", "force": "", "pressure": "", **units}
-    return {key: "" if name == "-" else name for key, name in found.items()}
+    units_known = {"length": "", "force": "", "pressure": "", **units}
+    return {key: "" if name == "-" else name for key, name in units_known.items()}
 
 
 def units_of_results(units: Mapping[str, str], kinematics: str) -> dict[str, str]:
@@ -37,15 +37,15 @@ def units_of_results(units: Mapping[str, str], kinematics: str) -> dict[str, str
     >>> units_of_results({"length": "m", "force": "N"}, "3d")
     {'length': 'm', 'force': 'N', 'pressure': '', 'penalty': '', 'moment': 'N m', 'stiffness': 'N/m'}
     """
-    found = known_units(units)
-    length, force, pressure = found["length"], found["force"], found["pressure"]
-    found["penalty"] = f"{pressure}/{length}" if pressure and length else ""
+    units_known = known_units(units)
+    length, force, pressure = units_known["length"], units_known["force"], units_known["pressure"]
+    units_known["penalty"] = f"{pressure}/{length}" if pressure and length else ""
     if not (length and force):
-        return {**found, "moment": "", "stiffness": ""}
+        return {**units_known, "moment": "", "stiffness": ""}
     if kinematics not in ("plane_strain", "plane_stress") or "/" in force:
-        return {**found, "moment": f"{force} {length}", "stiffness": f"{force}/{length}"}
+        return {**units_known, "moment": f"{force} {length}", "stiffness": f"{force}/{length}"}
     return {
-        **found,
+        **units_known,
         "force": f"{force}/{length}",
         "moment": f"{force} {length}/{length}",
         "stiffness": f"{force}/{length}^2",

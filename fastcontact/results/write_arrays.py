@@ -93,14 +93,14 @@ def _write_steps_group(
 
 def write_own(file: Any, mesh: Mesh, kinematics: str, case_text: str, units: Mapping[str, str]) -> None:
     """Write /fastcontact: the mesh with all its cells and groups, the case, and room for the steps."""
-    own = file.create_group("fastcontact")
-    own.attrs["schema"] = np.int64(layout.SCHEMA)
-    own["kinematics"] = as_json(kinematics)
-    own["case"] = as_json(case_text)
-    own["versions"] = as_json(_versions())
+    group = file.create_group("fastcontact")
+    group.attrs["schema"] = np.int64(layout.SCHEMA)
+    group["kinematics"] = as_json(kinematics)
+    group["case"] = as_json(case_text)
+    group["versions"] = as_json(_versions())
     if units:
-        own["units"] = as_json(dict(units))
-    stored = own.create_group("mesh")
+        group["units"] = as_json(dict(units))
+    stored = group.create_group("mesh")
     stored.attrs["dim"] = np.int64(mesh.dim)
     stored["points"] = file["VTKHDF/Points"]
     stored["elements"] = as_json(list(mesh.cells))
@@ -112,12 +112,14 @@ def write_own(file: Any, mesh: Mesh, kinematics: str, case_text: str, units: Map
     topology = layout.xdmf_topology(mesh)
     if topology is not None:
         _packed(stored, "xdmf_topology", topology)
-    own.create_group("contact")
-    growing_table(own, "steps", layout.STEP_ROW)
-    growing_table(own, "notes", np.uint8, rows=BYTES)
-    growing_table(own, "runs", layout.RUN_ROW)
+    group.create_group("contact")
+    growing_table(group, "steps", layout.STEP_ROW)
+    growing_table(group, "notes", np.uint8, rows=BYTES)
+    growing_table(group, "runs", layout.RUN_ROW)
     for number in (0, 1):
-        growing_table(own, layout.restart_table(number), np.uint8, rows=int(np.clip(8 * mesh.n_points, BYTES, 1 << 20)))
+        growing_table(
+            group, layout.restart_table(number), np.uint8, rows=int(np.clip(8 * mesh.n_points, BYTES, 1 << 20))
+        )
 
 
 def _write_groups(parent: Any, name: str, groups: Any) -> None:
@@ -133,11 +135,11 @@ def _versions() -> dict[str, str]:
     import h5py
 
     packages = ("fastcontact", "numpy", "scipy", "numba", "pyamg", "h5py")
-    found = {"python": ".".join(map(str, sys.version_info[:3])), "hdf5": h5py.version.hdf5_version}
+    versions = {"python": ".".join(map(str, sys.version_info[:3])), "hdf5": h5py.version.hdf5_version}
     for package in packages:
         with contextlib.suppress(metadata.PackageNotFoundError):
-            found[package] = metadata.version(package)
-    return found
+            versions[package] = metadata.version(package)
+    return versions
 
 
 def _packed(parent: Any, name: str, values: AnyArray) -> None:
@@ -202,19 +204,19 @@ def append_tables(
     file: Any, mesh: Mesh, number: int, step: StepResult, pairs: dict[str, Any], notes: Mapping[str, Any]
 ) -> None:
     """Write contact tables, iterations, warnings and further `notes`; pairs that are new are added to `pairs`, by name."""
-    own = file["fastcontact"]
+    group = file["fastcontact"]
     for name in step.contact:
         if name not in pairs:
-            pairs[name] = _new_pair(own["contact"], name, mesh.dim, layout.further_columns(step.contact[name]))
+            pairs[name] = _new_pair(group["contact"], name, mesh.dim, layout.further_columns(step.contact[name]))
     for name, pair in pairs.items():
         _append_contact(pair, number, step.contact.get(name))
     if step.material_stress is not None:
-        _append_sides(own, mesh, number, step.material_stress)
+        _append_sides(group, mesh, number, step.material_stress)
     contact = [[name, contact.formulation] for name, contact in step.contact.items()]
     text = as_json({**notes, "contact": contact, "iterations": step.iterations, "warnings": list(step.warnings)})
-    row = (step.index, step.load_factor, len(own["notes"]), len(text))
-    _extend(own["notes"], np.frombuffer(text.encode("ascii"), np.uint8))
-    _set_row(own["steps"], number, np.array(row, layout.STEP_ROW))
+    row = (step.index, step.load_factor, len(group["notes"]), len(text))
+    _extend(group["notes"], np.frombuffer(text.encode("ascii"), np.uint8))
+    _set_row(group["steps"], number, np.array(row, layout.STEP_ROW))
 
 
 def append_rows(file: Any, mesh: Mesh, number: int, step: StepResult, cell_fields: Sequence[str]) -> None:
@@ -230,11 +232,11 @@ def append_rows(file: Any, mesh: Mesh, number: int, step: StepResult, cell_field
 
 def append_run(file: Any, n_steps: int, run: Any, flush: Callable[[], None]) -> None:
     """Write how a run ended after `n_steps` steps: whatever JSON can hold; `flush` sees it to the file."""
-    own, text = file["fastcontact"], as_json(run)
-    row = np.array((n_steps, len(own["notes"]), len(text)), layout.RUN_ROW)
-    _extend(own["notes"], np.frombuffer(text.encode("ascii"), np.uint8))
+    group, text = file["fastcontact"], as_json(run)
+    row = np.array((n_steps, len(group["notes"]), len(text)), layout.RUN_ROW)
+    _extend(group["notes"], np.frombuffer(text.encode("ascii"), np.uint8))
     flush()
-    _set_row(own["runs"], len(own["runs"]), row)
+    _set_row(group["runs"], len(group["runs"]), row)
     flush()
 
 
@@ -306,18 +308,18 @@ def _append_contact(pair: Any, number: int, contact: ContactResult | None) -> No
     _set_row(pair["steps"], number, row)
 
 
-def _append_sides(own: Any, mesh: Mesh, number: int, found: MaterialStress) -> None:
+def _append_sides(own: Any, mesh: Mesh, number: int, sides: MaterialStress) -> None:
     """Append the stress of each side where materials meet; the tables are made with the first one."""
     if "materials" not in own:
         group = own.create_group(None)  # without a name until it is whole: the program may be interrupted
-        _packed(group, "cells", np.asarray(found.cells, np.int32))
+        _packed(group, "cells", np.asarray(sides.cells, np.int32))
         growing_table(group, "rows", layout.material_row(mesh.dim))
         growing_table(group, "steps", layout.SIDES_STEP)
         own["materials"] = group
     group = own["materials"]
-    table = np.zeros(len(found.points), group["rows"].dtype)
+    table = np.zeros(len(sides.points), group["rows"].dtype)
     for name in ("points", "material", "stress"):
-        table[name] = getattr(found, name)
+        table[name] = getattr(sides, name)
     _set_row(group["steps"], number, np.array((len(group["rows"]), len(table)), layout.SIDES_STEP))
     _extend(group["rows"], table)
 

@@ -364,7 +364,7 @@ class ResultWriter:
         reserve(self._committed.fileno(), self.path.parent, self._committed.end, size + MARGIN)
 
     @contextlib.contextmanager
-    def _explained(self, what: str) -> Iterator[None]:
+    def _explained(self, action: str) -> Iterator[None]:
         """Turn errors of HDF5 and of the system into one sentence with a remedy; meanwhile signals wait."""
         with uninterrupted():
             try:
@@ -381,7 +381,7 @@ class ResultWriter:
                 if not isinstance(told, (OSError, RuntimeError)):
                     remedy = "its tables are damaged: name another file, or start anew without resuming"
                 raise FileError(
-                    f"'{self.path}' cannot be {what} ({reason}), {self.n_steps} steps are complete: {remedy}"
+                    f"'{self.path}' cannot be {action} ({reason}), {self.n_steps} steps are complete: {remedy}"
                 ) from error
 
     def _begin(self, kinematics: str, case_text: str) -> None:
@@ -437,8 +437,8 @@ def _steps_to_resume(
         if lost := old.lacks(layout.CONTINUED):
             raise FileError(f"'{path}' is damaged, it lacks '{lost[0]}': restore a copy, {begin_anew}")
         if not _same_mesh(old.mesh, mesh) or old.kinematics != kinematics:
-            what = "kinematics" if _same_mesh(old.mesh, mesh) else "mesh"
-            raise FileError(f"'{path}' belongs to another {what}: resume the case it was begun for, {begin_anew}")
+            difference = "kinematics" if _same_mesh(old.mesh, mesh) else "mesh"
+            raise FileError(f"'{path}' belongs to another {difference}: resume the case it was begun for, {begin_anew}")
         names = sorted(old.cell_field_names)
         if names != sorted(cell_fields):
             raise FileError(
@@ -455,12 +455,12 @@ def _case_of(step: StepResult) -> Any:
     return (step.restart or {}).get("case", {}).get("parts")
 
 
-def _same_mesh(one: Mesh, other: Mesh) -> bool:
+def _same_mesh(old: Mesh, other: Mesh) -> bool:
     """Return whether points, cells and groups of two meshes are the same."""
-    if not np.array_equal(one.points, other.points):
+    if not np.array_equal(old.points, other.points):
         return False
     for kind in ("cells", "cell_groups", "point_groups"):
-        ours, theirs = getattr(one, kind), getattr(other, kind)
+        ours, theirs = getattr(old, kind), getattr(other, kind)
         if list(ours) != list(theirs) or not all(np.array_equal(ours[name], theirs[name]) for name in ours):
             return False
     return True

@@ -162,7 +162,7 @@ def _solved(
         raise CaseError(unknown("quantity", quantity, values))
     exact = quantities.by_theory(case, pair, 0.0)
     n_cells = sum(map(len, case.mesh.solids.values()))
-    estimate = _estimate([*(found.values[quantity] for found in before), values[quantity]])
+    estimate = _estimate([*(round_before.values[quantity] for round_before in before), values[quantity]])
     this = Round(
         n_dofs=case.model.n_dofs,
         n_cells=n_cells,

@@ -88,9 +88,9 @@ class AdaptiveStudy(Report):
 
     def effectivity(self, number: int = -1) -> float:
         """Return estimated over true error of the quantity in a round [-]; NaN without a reference."""
-        found = self.rounds[number]
-        true = found.true_error(self.quantity)
-        return found.estimate / true if true > 0 else math.nan
+        round_ = self.rounds[number]
+        true = round_.true_error(self.quantity)
+        return round_.estimate / true if true > 0 else math.nan
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers, texts, lists and dictionaries, as ``--json`` writes them; errors are relative."""
@@ -105,9 +105,9 @@ class AdaptiveStudy(Report):
         return self.framed(numbers)
 
     def _round(self, k: int) -> dict[str, Any]:
-        found, errors = self.rounds[k], {name: finite(values[k]) for name, values in self._errors().items()}
-        counts = {"n_dofs": found.n_dofs, "n_cells": found.n_cells}
-        return {**counts, **found.values, **errors, "seconds": found.seconds}
+        round_, errors = self.rounds[k], {name: finite(values[k]) for name, values in self._errors().items()}
+        counts = {"n_dofs": round_.n_dofs, "n_cells": round_.n_cells}
+        return {**counts, **round_.values, **errors, "seconds": round_.seconds}
 
     def table(self) -> AnyArray:
         """Return a structured array (n_rounds,), one row a mesh, as ``--csv`` writes it.
@@ -115,8 +115,8 @@ class AdaptiveStudy(Report):
         Fields ``n_dofs``, ``n_cells``, the quantity in its unit, and ``energy_error``, ``estimate``, ``true_error`` (against
         the case's mesh-converged solution) and ``effectivity`` [-].
         """
-        counts = {name: [getattr(found, name) for found in self.rounds] for name in ("n_dofs", "n_cells")}
-        values = [found.values[self.quantity] for found in self.rounds]
+        counts = {name: [getattr(round_, name) for round_ in self.rounds] for name in ("n_dofs", "n_cells")}
+        values = [round_.values[self.quantity] for round_ in self.rounds]
         return structured({**counts, self.quantity: values, **self._errors()})
 
     def tables(self) -> list[tuple[str, Rows]]:
@@ -136,9 +136,9 @@ class AdaptiveStudy(Report):
     def _errors(self) -> dict[str, list[float]]:
         """Return the errors of all rounds by name, each (n_rounds,)."""
         return {
-            "energy_error": [found.energy_error for found in self.rounds],
-            "estimate": [found.estimate for found in self.rounds],
-            "true_error": [found.true_error(self.quantity) for found in self.rounds],
+            "energy_error": [round_.energy_error for round_ in self.rounds],
+            "estimate": [round_.estimate for round_ in self.rounds],
+            "true_error": [round_.true_error(self.quantity) for round_ in self.rounds],
             "effectivity": [self.effectivity(k) for k in range(len(self.rounds))],
         }
 
@@ -149,17 +149,17 @@ class AdaptiveStudy(Report):
         if math.isfinite(errors["true_error"][-1]):
             shown |= {"true error": "true_error", "effectivity": "effectivity"}
         rows = [["round", "cells", "DOF", column(q, q, self.units), *shown]]
-        for k, found in enumerate(self.rounds):
-            row = [str(k), str(found.n_cells), str(found.n_dofs), number(found.values[q], 8)]
+        for k, round_ in enumerate(self.rounds):
+            row = [str(k), str(round_.n_cells), str(round_.n_dofs), number(round_.values[q], 8)]
             rows.append(row + [number(errors[name][k], 2) for name in shown.values()])
         return rows
 
     def sentences(self) -> list[str]:
         """See `Report`."""
         last, q = self.rounds[-1], self.quantity
-        what = f"{title(q)} {last.values[q]:.8g} {unit(q, self.units)}".rstrip()
+        value = f"{title(q)} {last.values[q]:.8g} {unit(q, self.units)}".rstrip()
         verdict = "within" if self.reached else "NOT within"
-        text = f"{self.combination}: {what}, estimated error {last.estimate:.1e}, {verdict} the {self.tolerance:g} asked for"
+        text = f"{self.combination}: {value}, estimated error {last.estimate:.1e}, {verdict} the {self.tolerance:g} asked for"
         if not self.reached:
             text += ": the limit of meshes or degrees of freedom was reached; allow more (--max-dofs)"
         true = last.true_error(q)
@@ -168,7 +168,7 @@ class AdaptiveStudy(Report):
         ]
 
     def _draw_errors(self, ax: Any) -> None:
-        n_dofs, errors = [found.n_dofs for found in self.rounds], self._errors()
+        n_dofs, errors = [round_.n_dofs for round_ in self.rounds], self._errors()
         for name, style, label in (
             ("estimate", "o-", "estimated error"),
             ("true_error", "s-", "true error"),

@@ -21,13 +21,13 @@ def substituted(data: Mapping[str, Any], parameter: str, value: Any, linked: Map
     `linked` is ``[study.parameters]``: names that stand for several paths, each set to a law ``"a*value^p"`` of the value.
     Raises CaseError if there is no such place or name, or a law is wrong.
     """
-    found: dict[str, Any] = copy.deepcopy(dict(data))
+    case: dict[str, Any] = copy.deepcopy(dict(data))
     if parameter not in linked:
-        _set(found, parameter, value, [*linked, *found])
-        return found
+        _set(case, parameter, value, [*linked, *case])
+        return case
     for path, law in linked[parameter].items():
-        _set(found, path, by_law(law, value, f"study.parameters.{parameter}.'{path}'"), found)
-    return found
+        _set(case, path, by_law(law, value, f"study.parameters.{parameter}.'{path}'"), case)
+    return case
 
 
 def by_law(law: Any, value: Any, where: str) -> Any:
@@ -56,21 +56,21 @@ def _set(data: dict[str, Any], path: str, value: Any, names: Iterable[str]) -> N
         raise CaseError(
             unknown("parameter", path, [name for name in names if not isinstance(data.get(name), (dict, list))])
         )
-    place: Any = data
+    entry: Any = data
     for key in keys[:-1]:
-        place = _inside(place, key, path)
+        entry = _inside(entry, key, path)
     last: Any = keys[-1]
-    if isinstance(last, int) or not isinstance(place, dict):
-        _inside(place, last, path)
-    if isinstance(place[last] if isinstance(place, list) else place.get(last), (dict, list)):
+    if isinstance(last, int) or not isinstance(entry, dict):
+        _inside(entry, last, path)
+    if isinstance(entry[last] if isinstance(entry, list) else entry.get(last), (dict, list)):
         raise CaseError(f"'{path}' is a table or a list of the case: name a single value in it")
-    place[last] = value
+    entry[last] = value
 
 
 def _keys(path: str) -> list[str | int]:
     keys: list[str | int] = []
-    for part in path.split("."):
-        match = _PART.match(part)
+    for key in path.split("."):
+        match = _PART.match(key)
         if match is None:
             raise CaseError(f"'{path}' is no path into a case file: write for example support[1].y")
         keys.append(match[1])
@@ -78,11 +78,11 @@ def _keys(path: str) -> list[str | int]:
     return keys
 
 
-def _inside(place: Any, key: str | int, path: str) -> Any:
+def _inside(entry: Any, key: str | int, path: str) -> Any:
     if isinstance(key, int):
-        if not isinstance(place, list) or key >= len(place):
-            count = len(place) if isinstance(place, list) else 0
+        if not isinstance(entry, list) or key >= len(entry):
+            count = len(entry) if isinstance(entry, list) else 0
             raise CaseError(f"'{path}' asks for entry [{key}], counted from [0], and the case has {count} there")
-    elif not isinstance(place, dict) or key not in place:
-        raise CaseError(unknown(f"entry of the case in '{path}'", key, place if isinstance(place, dict) else ()))
-    return place[key]
+    elif not isinstance(entry, dict) or key not in entry:
+        raise CaseError(unknown(f"entry of the case in '{path}'", key, entry if isinstance(entry, dict) else ()))
+    return entry[key]

@@ -125,9 +125,9 @@ def draw_differences(
         off = [100 * value for value in series.from_theory(quantity)]
         ax.plot(series.h, off, f"{marker(k)}-", ms=5, lw=1.0, label=str(series.combination))
     best = best if best.split(quantity) else known[-1][1]
-    found, same = best.split(quantity), best.split_equal_force(quantity)
-    assert found is not None
-    model, bar = 100 * found.model, 100 * found.uncertainty
+    split, same = best.split(quantity), best.split_equal_force(quantity)
+    assert split is not None
+    model, bar = 100 * split.model, 100 * split.uncertainty
     ax.axhline(model, color="tab:red", lw=1.2, label=f"model error {model:+.3f} % (stays)")
     ax.axhspan(model - bar, model + bar, color="tab:red", alpha=0.15, lw=0)
     if same is not None and quantity != "force":

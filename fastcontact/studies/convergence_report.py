@@ -101,15 +101,15 @@ class Study(Report):
 
     def remarks(self) -> list[str]:
         """See `Report`."""
-        found = []
+        remarks = []
         for series in self.series:
-            found += [
+            remarks += [
                 f"warning: {text}" for text in sorted({text for level in series.levels for text in level.warnings})
             ]
             if not series.limits:
-                found.append(f"no limits: {len(series.levels)} levels were solved, and a limit takes three")
-            found += [f"level {number} failed: {text}" for number, text in series.failed.items()]
-        return found + [f"{name} failed: {text}" for name, text in self.failed.items()]
+                remarks.append(f"no limits: {len(series.levels)} levels were solved, and a limit takes three")
+            remarks += [f"level {number} failed: {text}" for number, text in series.failed.items()]
+        return remarks + [f"{name} failed: {text}" for name, text in self.failed.items()]
 
     def figure(self) -> Any:
         """Return a matplotlib figure: errors, pressure over the radius, differences from theory."""

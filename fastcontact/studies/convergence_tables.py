@@ -62,7 +62,7 @@ def _start(series: Series) -> list[str]:
 
 def _cells(series: Series, quantity: str, columns: Sequence[str]) -> list[str]:
     """Return some columns about the limit of a quantity as texts; dashes where there is no limit."""
-    limit, found = series.limits.get(quantity), series.split(quantity)
+    limit, split = series.limits.get(quantity), series.split(quantity)
     if limit is None:
         return ["-"] * len(columns)
     same = series.split_equal_force(quantity) if quantity != "force" else None
@@ -73,7 +73,7 @@ def _cells(series: Series, quantity: str, columns: Sequence[str]) -> list[str]:
         "order": f"{order} +- {limit.order_uncertainty:.2f}" if math.isfinite(limit.order) else "-",
         "order alone": order,
         "theory": number(series.theory.get(quantity, math.nan), 8),
-        "model error": percent(found.model if found else None),
+        "model error": percent(split.model if split else None),
         "mesh error": percent(series.mesh_error(quantity)),
         "at equal force": percent(same.model if same else None),
     }
@@ -126,13 +126,13 @@ def series_dict(series: Series) -> dict[str, Any]:
         "quantities": {name: _quantity_dict(series, name) for name in series.quantities},
         "equal_force": {
             name: {
-                "theory": found.theory,
-                "model_error": found.model,
-                "mesh_error": found.mesh,
-                "uncertainty": found.uncertainty,
+                "theory": split.theory,
+                "model_error": split.model,
+                "mesh_error": split.mesh,
+                "uncertainty": split.uncertainty,
             }
             for name in series.quantities
-            if name != "force" and (found := series.split_equal_force(name)) is not None
+            if name != "force" and (split := series.split_equal_force(name)) is not None
         },
         "sentences": sentences(series),
     }
@@ -140,7 +140,7 @@ def series_dict(series: Series) -> dict[str, Any]:
 
 def _quantity_dict(series: Series, name: str) -> dict[str, Any]:
     """Return limit, order, theory and errors of a quantity; None where there is no such number."""
-    limit, found, reference = series.limits.get(name), series.split(name), series.reference.get(name)
+    limit, split, reference = series.limits.get(name), series.split(name), series.reference.get(name)
     entry: dict[str, Any] = {
         "limit": limit.value if limit else None,
         "uncertainty": limit.uncertainty if limit else None,
@@ -149,8 +149,8 @@ def _quantity_dict(series: Series, name: str) -> dict[str, Any]:
         "converging": limit.converging if limit else None,
         "converges_to_theory": series.converges_to_theory(name),
         "theory": series.theory.get(name),
-        "model_error": found.model if found else None,
-        "model_error_uncertainty": found.uncertainty if found else None,
+        "model_error": split.model if split else None,
+        "model_error_uncertainty": split.uncertainty if split else None,
         "mesh_error": finite(series.mesh_error(name)),
     }
     if reference is not None:

@@ -90,8 +90,8 @@ def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
     smooth = smoothed_stress(model.mesh, model.kinematics, model.material_field(), step.displacement, offset)
     squares, energy = [], 0.0
     for name in model.mesh.solids:
-        own, whole = _differences(model, step.displacement, name, smooth[name], offset)
-        squares.append(own)
+        difference, whole = _differences(model, step.displacement, name, smooth[name], offset)
+        squares.append(difference)
         energy += whole
     contact = np.zeros(sum(map(len, squares)))
     for result in step.contact.values():
@@ -118,7 +118,7 @@ def _add_contact(model: Model, result: ContactResult, smooth: dict[str, Array], 
     nodal = np.zeros(mesh.n_points)
     nodal[result.points] = result.pressure
     first = np.cumsum([0, *(len(block) for block in mesh.solids.values())])
-    stiffness, material = np.array([own.young[0] for own, _ in model.materials]), model.material_field().number
+    stiffness, material = np.array([law.young[0] for law, _ in model.materials]), model.material_field().number
     for block in surface(mesh, pair.secondary).blocks:
         xi, weights = fine_rule(block.element)
         reference = elements.get(block.element)

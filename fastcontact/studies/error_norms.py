@@ -131,11 +131,11 @@ def error_against(
     if n_points is not None and n_points < 1:
         raise ModelError(f"n_points = {n_points} points along each direction of a cell must be at least 1")
     chosen = _rows(model, (groups,) if isinstance(groups, str) else groups)
-    offset = model.material_field().offset(rise, [(1.0, own) for own in model.initial_states], model.mesh.n_points)
+    offset = model.material_field().offset(rise, [(1.0, state) for state in model.initial_states], model.mesh.n_points)
     total = np.zeros(4)
     for name, rows in chosen.items():
-        for part in _portions(rows, elements.get(name), n_points):
-            total += _squares(theory, model, u, name, part, n_points, offset)
+        for rows_of_part in _portions(rows, elements.get(name), n_points):
+            total += _squares(theory, model, u, name, rows_of_part, n_points, offset)
     return ErrorNorms(*(math.sqrt(square) for square in total))
 
 
@@ -175,8 +175,8 @@ def stress_in_cells(
     N, dN = np.ascontiguousarray(element.shape(xi)), np.ascontiguousarray(element.gradient(xi))
     cells, field = mesh.cells[name][rows], model.material_field()
     numbers = field.loops[name][rows]
-    found = CellStress(mesh, model.kinematics, field.moduli, displacement, field.treatment, offset)
-    stress = found.at(name, xi, cells, numbers, np.arange(len(mesh.cells[name]))[rows])
+    cell_stress = CellStress(mesh, model.kinematics, field.moduli, displacement, field.treatment, offset)
+    stress = cell_stress.at(name, xi, cells, numbers, np.arange(len(mesh.cells[name]))[rows])
     elastic = field.compliance[numbers.reshape(len(numbers), -1)]
     if elastic.shape[1] > 1:
         elastic = np.einsum("nq,cqij->cnij", beside(name, xi), elastic)

@@ -122,11 +122,11 @@ class Store:
             temporary.write_text(text + "\n", encoding="utf-8")
 
 
-def raise_first(what: str, jobs: Sequence[Run], results: Sequence[Result]) -> None:
-    """Raise the error of the first run if all runs failed; `what` begins the message."""
+def raise_first(name: str, jobs: Sequence[Run], results: Sequence[Result]) -> None:
+    """Raise the error of the first run if all runs failed; `name` begins the message."""
     if all("error" in result for result in results):
         kind = getattr(errors, str(results[0].get("kind")), CaseError)
-        raise kind(f"{what}; {jobs[0].label}: {results[0]['error']}")
+        raise kind(f"{name}; {jobs[0].label}: {results[0]['error']}")
 
 
 def _run_rest(

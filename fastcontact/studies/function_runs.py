@@ -158,7 +158,7 @@ def refuse(of_cases: Mapping[str, Any]) -> None:
 
 def run_functions(
     runs: Sequence[FunctionRun],
-    what: str,
+    name: str,
     *,
     executor: Executor | None,
     workers: int | None,
@@ -166,19 +166,19 @@ def run_functions(
     on_progress: Callable[[Progress], None] | None,
     progress: bool,
 ) -> list[dict[str, Any]]:
-    """Return the results of the runs, by default one after the other in this process; `what` begins the error if all fail."""
+    """Return the results of the runs, by default one after the other in this process; `name` begins the error if all fail."""
     if (executor is not None or (workers or 1) > 1) and not isinstance(executor, ThreadPoolExecutor):
         _check_sendable(runs[0])
     with told(on_progress, progress) as told_to:
         results = run_all(runs, executor=executor, workers=workers or 1, store=store, on_progress=told_to)
-    raise_first(what, runs, results)
+    raise_first(name, runs, results)
     return results
 
 
 def _check_sendable(run: FunctionRun) -> None:
     """Raise CaseError for a function that cannot be sent to another process, or that it would not find there."""
     try:
-        if any(own.__module__ == "__main__" for own in (run.function, *run.measures.values())):
+        if any(function.__module__ == "__main__" for function in (run.function, *run.measures.values())):
             inspect.getfile(sys.modules["__main__"])  # TypeError without one, as in notebooks
         ForkingPickler.dumps(run)
     except Exception as error:

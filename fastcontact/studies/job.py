@@ -126,11 +126,11 @@ def job_of(
 
 
 def _fingerprint(mesh: Mesh) -> bytes:
-    found = hashlib.sha256(np.ascontiguousarray(mesh.points).tobytes())
+    digest = hashlib.sha256(np.ascontiguousarray(mesh.points).tobytes())
     for block in (mesh.cells, mesh.cell_groups, mesh.point_groups):
         for name, numbers in block.items():
-            found.update(name.encode() + np.ascontiguousarray(numbers).tobytes())
-    return found.digest()
+            digest.update(name.encode() + np.ascontiguousarray(numbers).tobytes())
+    return digest.digest()
 
 
 def case_data(settings: Settings, combination: Combination) -> dict[str, Any]:
@@ -152,9 +152,9 @@ def case_data(settings: Settings, combination: Combination) -> dict[str, Any]:
     return data
 
 
-def _exchange(entry: dict[str, Any], formulation: str, settings: Settings, own: str) -> None:
-    """Give the table of a contact pair or obstacle another formulation than its `own`."""
-    if formulation != own:
+def _exchange(entry: dict[str, Any], formulation: str, settings: Settings, name: str) -> None:
+    """Give the table of a contact pair or obstacle another formulation than its `name`."""
+    if formulation != name:
         known = {f.name for f in dataclasses.fields(FORMULATIONS[formulation])} | KEYS | set(SHARED_OPTIONS)
         for key in [key for key in entry if key not in known]:
             del entry[key]
@@ -191,8 +191,8 @@ def run(job: Run, threads: int | None = None) -> dict[str, Any]:
 
 def fields_of(kind: type, result: dict[str, Any]) -> dict[str, Any]:
     """Return the entries of a result that a dataclass has as fields."""
-    found = {field.name: result[field.name] for field in dataclasses.fields(kind) if field.name in result}
-    return {**found, "warnings": tuple(found["warnings"])}
+    fields = {field.name: result[field.name] for field in dataclasses.fields(kind) if field.name in result}
+    return {**fields, "warnings": tuple(fields["warnings"])}
 
 
 def last_step(case: Case) -> StepResult:

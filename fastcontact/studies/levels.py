@@ -122,7 +122,7 @@ def _finer(settings: Settings, element: str, given: Mapping[str, Any], level: in
         if key not in signature:
             raise CaseError(unknown(f"argument of the generator {name} in [study]", key, signature))
     rule = RULES[name](element, given) if name in RULES else Rule()
-    own = bool(settings.halve or settings.double)  # then the rule's ratios may not suit
+    own_rule = bool(settings.halve or settings.double)  # then the rule's ratios may not suit
     halve, double = settings.halve or rule.halve, settings.double or rule.double
     if not (halve or double):
         raise CaseError(
@@ -135,7 +135,7 @@ def _finer(settings: Settings, element: str, given: Mapping[str, Any], level: in
             value = arguments.get(key, signature[key].default if key in signature else None)
             if value is not None:
                 arguments[key] = _scaled(value, factor)
-    for key in () if own else rule.root:
+    for key in () if own_rule else rule.root:
         arguments[key] = arguments.get(key, signature[key].default) ** (0.5**level)
     return {key: list(value) if isinstance(value, tuple) else value for key, value in arguments.items()}
 

@@ -40,13 +40,13 @@ LABELS = {
 
 def measure(case: Case, last: StepResult, pair: str | None) -> dict[str, float]:
     """Return every quantity of interest of a solved case, in the case's units; without a `pair` those of no contact."""
-    found = {} if pair is None else _of_contact(case, last.contact[pair], pair)
-    found["von_mises_max"], where = peak(case.mesh, last.von_mises, case.model.kinematics == "axisymmetric")
+    values_measured = {} if pair is None else _of_contact(case, last.contact[pair], pair)
+    values_measured["von_mises_max"], where = peak(case.mesh, last.von_mises, case.model.kinematics == "axisymmetric")
     if pair is not None:
-        found["von_mises_depth"] = _depth(case, pair, where)
+        values_measured["von_mises_depth"] = _depth(case, pair, where)
     for name, point in case.probes.items():
-        found |= _of_probe(name, point, last)
-    return found
+        values_measured |= _of_probe(name, point, last)
+    return values_measured
 
 
 def check_names(case: Case, names: Iterable[str]) -> None:
@@ -65,27 +65,27 @@ def of_contacts(last: StepResult) -> dict[str, float]:
 
 
 def _of_pressure(contact: ContactResult) -> dict[str, float]:
-    found = {
+    quantities = {
         "force": float(np.linalg.norm(contact.force)),
         "pressure_max": contact.pressure_max,
         "contact_radius": contact_radius(contact),
     }
     at_middle = np.abs(contact.place) <= 1e-9 * np.ptp(contact.coordinates, axis=0).max()
     if at_middle.any():
-        found["pressure_pole"] = float(contact.pressure[at_middle][0])
-    return found
+        quantities["pressure_pole"] = float(contact.pressure[at_middle][0])
+    return quantities
 
 
 def _of_contact(case: Case, contact: ContactResult, pair: str) -> dict[str, float]:
-    found = _of_pressure(contact)
+    quantities = _of_pressure(contact)
     theory: Any = case.theories.get(pair, {}).get("theory")
     if case.mesh.dim == 2 and pressure_curve(theory) is not None:
         side = secondary(case, pair)
-        found["pressure_error"] = pressure_error(case, side, contact, theory)
-        if hasattr(theory, "at_force") and found["force"] > 0:
-            same = theory.at_force(found["force"] / case.theories[pair]["share"])
-            found["pressure_error_equal_force"] = pressure_error(case, side, contact, same)
-    return {name: value for name, value in found.items() if np.isfinite(value)}
+        quantities["pressure_error"] = pressure_error(case, side, contact, theory)
+        if hasattr(theory, "at_force") and quantities["force"] > 0:
+            same = theory.at_force(quantities["force"] / case.theories[pair]["share"])
+            quantities["pressure_error_equal_force"] = pressure_error(case, side, contact, same)
+    return {name: value for name, value in quantities.items() if np.isfinite(value)}
 
 
 def secondary(case: Case, pair: str) -> Surface:
@@ -142,9 +142,9 @@ def peak(mesh: Mesh, values: Array, axisymmetric: bool) -> tuple[float, Array]:
     """
     top = int(np.argmax(values))
     on_axis = axisymmetric and abs(mesh.points[top, 0]) <= 1e-9 * np.abs(mesh.points).max()
-    found = _along_axis(mesh, values, top) if on_axis else None
-    if found is not None:
-        return found
+    on_axis_peak = _along_axis(mesh, values, top) if on_axis else None
+    if on_axis_peak is not None:
+        return on_axis_peak
     ring = _around(mesh, top)
     x = (mesh.points[ring] - mesh.points[top]).T
     size = np.abs(x).max()
@@ -196,11 +196,11 @@ def _vertex(x: Array, v: Array, on_axis: bool) -> tuple[float, Array] | None:
         hessian[0, 0] = -1.0  # whatever the curvature across, the vertex is on the axis
     if not (np.linalg.eigvalsh(hessian) < 0).all():
         return None
-    place = np.linalg.solve(hessian, -np.array([c[4], c[1]]))
-    value = float(c[0] + 0.5 * (c[4] * place[0] + c[1] * place[1]))
-    if np.abs(place).max() > 1.0 or abs(value - v.max()) > 0.5 * np.ptp(v):
+    vertex = np.linalg.solve(hessian, -np.array([c[4], c[1]]))
+    value = float(c[0] + 0.5 * (c[4] * vertex[0] + c[1] * vertex[1]))
+    if np.abs(vertex).max() > 1.0 or abs(value - v.max()) > 0.5 * np.ptp(v):
         return None
-    return value, place
+    return value, vertex
 
 
 def _depth(case: Case, pair: str, where: Array) -> float:
@@ -211,15 +211,15 @@ def _depth(case: Case, pair: str, where: Array) -> float:
 
 
 def _of_probe(name: str, point: int, last: StepResult) -> dict[str, float]:
-    found = {f"{name}.von_mises": float(last.von_mises[point])}
+    quantities = {f"{name}.von_mises": float(last.von_mises[point])}
     for component, value in zip(STRESS, last.stress[point], strict=False):
-        found[f"{name}.stress.{component}"] = float(value)
+        quantities[f"{name}.stress.{component}"] = float(value)
     for axis, value in zip("xyz", last.displacement[point], strict=False):
-        found[f"{name}.displacement.{axis}"] = float(value)
+        quantities[f"{name}.displacement.{axis}"] = float(value)
     if at := at_point(last, point):
         contact, row = at
-        found[f"{name}.pressure"] = float(contact.pressure[row])
-    return found
+        quantities[f"{name}.pressure"] = float(contact.pressure[row])
+    return quantities
 
 
 def mesh_size(case: Case, pair: str | None) -> float:
@@ -238,16 +238,16 @@ def mesh_size(case: Case, pair: str | None) -> float:
 def of_theory(theory: Any, share: float = 1.0) -> dict[str, float]:
     """Return the quantities of interest that a theory gives, in its units; the model holds a `share` of its force."""
     names = {"force": "force", "pressure_max": "pressure_max", "contact_radius": "radius"}
-    found = {key: float(getattr(theory, name)) for key, name in names.items() if hasattr(theory, name)}
-    if "force" in found:
-        found["force"] *= share
+    quantities = {key: float(getattr(theory, name)) for key, name in names.items() if hasattr(theory, name)}
+    if "force" in quantities:
+        quantities["force"] *= share
     curve = pressure_curve(theory)
     if curve is not None:
-        found |= {"pressure_max": curve.pressure_max, "pressure_pole": float(curve.pressure(0.0))}
+        quantities |= {"pressure_max": curve.pressure_max, "pressure_pole": float(curve.pressure(0.0))}
     if hasattr(theory, "von_mises_maximum"):
         greatest = theory.von_mises_maximum()
-        found |= {"von_mises_max": greatest.value, "von_mises_depth": greatest.depth}
-    return {quantity: value for quantity, value in found.items() if np.isfinite(value) and value > 0}
+        quantities |= {"von_mises_max": greatest.value, "von_mises_depth": greatest.depth}
+    return {quantity: value for quantity, value in quantities.items() if np.isfinite(value) and value > 0}
 
 
 def by_theory(case: Case, pair: str | None, force: float) -> dict[str, dict[str, float]]:

@@ -69,12 +69,12 @@ class Report:
 
     def lines(self) -> list[str]:
         """Return tables and sentences for a person, as the command line prints them."""
-        found = [self.title]
+        lines = [self.title]
         for caption, rows in self.tables():
-            found += ["", caption, *aligned(rows)]
-        found += [f"  {text}" for text in self.remarks()]
+            lines += ["", caption, *aligned(rows)]
+        lines += [f"  {text}" for text in self.remarks()]
         sentences = self.sentences()
-        return [*found, "", *sentences] if sentences else found
+        return [*lines, "", *sentences] if sentences else lines
 
     def html(self) -> str:
         """Return the study as one self-contained HTML page."""

@@ -21,8 +21,8 @@ def sentences(series: Series) -> list[str]:
 
 
 def _about_quantity(series: Series, quantity: str) -> list[str]:
-    found, name = series.split(quantity), title(quantity)
-    if found is None:
+    split, name = series.split(quantity), title(quantity)
+    if split is None:
         off = percent(series.errors(quantity)[-1])
         told = f"{series.combination}: the mesh error of the {name} is {off} on the finest mesh."
         return [told, *_about_settling(series, quantity, name)]
@@ -32,22 +32,22 @@ def _about_quantity(series: Series, quantity: str) -> list[str]:
         else f"{series.combination}: {series.compared} the {name}"
     )
     finest = f"({series.finest.n_dofs} degrees of freedom)"
-    bar = f"{100 * found.uncertainty:.2g} %"
+    bar = f"{100 * split.uncertainty:.2g} %"
     if series.converges_to_theory(quantity) is False:
-        texts = [_not_to_theory(series, quantity, start, found)]
-    elif found.resolved and not series.exact_theory:
+        texts = [_not_to_theory(series, quantity, start, split)]
+    elif split.resolved and not series.exact_theory:
         texts = [
-            f"{start} differs from theory by {percent(found.total)}. Of that, "
-            f"{percent(found.model, found.uncertainty)} (+- {bar}) is model error, which no mesh removes, and "
-            f"{percent(found.mesh)} is mesh error on the finest mesh {finest}, which goes to zero."
+            f"{start} differs from theory by {percent(split.total)}. Of that, "
+            f"{percent(split.model, split.uncertainty)} (+- {bar}) is model error, which no mesh removes, and "
+            f"{percent(split.mesh)} is mesh error on the finest mesh {finest}, which goes to zero."
         ]
     else:
         texts = [
-            f"{start} agrees with theory within the error bar of its limit, {percent(found.model)} +- {bar}; "
-            f"{percent(found.mesh)} is mesh error on the finest mesh {finest}."
+            f"{start} agrees with theory within the error bar of its limit, {percent(split.model)} +- {bar}; "
+            f"{percent(split.mesh)} is mesh error on the finest mesh {finest}."
         ]
     texts += _about_settling(series, quantity, name)
-    return texts + _about_cancelling(series, quantity, found) + _about_reference(series, quantity)
+    return texts + _about_cancelling(series, quantity, split) + _about_reference(series, quantity)
 
 
 def _about_settling(series: Series, quantity: str, name: str) -> list[str]:
@@ -59,27 +59,27 @@ def _about_settling(series: Series, quantity: str, name: str) -> list[str]:
     ]
 
 
-def _not_to_theory(series: Series, quantity: str, start: str, found: Split) -> str:
+def _not_to_theory(series: Series, quantity: str, start: str, split: Split) -> str:
     """Return that a formulation misses a theory which is exact for the model."""
     limit = series.limits[quantity]
     tends = f"tends to {number(limit.value, 6)} +- {number(limit.uncertainty, 2)}"
     return (
-        f"{start} {tends} where the theory has {number(found.theory, 6)}. That theory is about the very bodies of the model, "
+        f"{start} {tends} where the theory has {number(split.theory, 6)}. That theory is about the very bodies of the model, "
         f"so this is no model error: {series.combination} does not converge to it on these meshes. Compare formulations "
         "(--formulations all), or let the meshes of the two sides match."
     )
 
 
-def _about_cancelling(series: Series, quantity: str, found: Split) -> list[str]:
+def _about_cancelling(series: Series, quantity: str, split: Split) -> list[str]:
     """Name the mesh that lies nearer to theory than half the model error by its mesh error: it looks better than it is."""
     off = series.from_theory(quantity)
     best = min(range(len(off)), key=lambda k: abs(off[k]))
-    if series.exact_theory or not found.resolved or not abs(off[best]) < 0.5 * abs(found.model):
+    if series.exact_theory or not split.resolved or not abs(off[best]) < 0.5 * abs(split.model):
         return []
     level = series.levels[best]
     return [
         f"Level {level.number} ({level.n_dofs} degrees of freedom) lies only {percent(off[best])} from theory because its "
-        f"mesh error of {percent(off[best] - found.model)} cancels model error: that it agrees is no proof of a good mesh."
+        f"mesh error of {percent(off[best] - split.model)} cancels model error: that it agrees is no proof of a good mesh."
     ]
 
 

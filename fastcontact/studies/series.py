@@ -175,10 +175,10 @@ class Series:
 
     def converges_to_theory(self, quantity: str) -> bool | None:
         """Return whether the limit is that of an exact theory, within its error bar; None without such a theory."""
-        found, limit = self.split(quantity), self.limits.get(quantity)
-        if found is None or limit is None or not self.exact_theory:
+        split, limit = self.split(quantity), self.limits.get(quantity)
+        if split is None or limit is None or not self.exact_theory:
             return None
-        return bool(limit.converging and abs(found.model) <= max(found.uncertainty, EXACT))
+        return bool(limit.converging and abs(split.model) <= max(split.uncertainty, EXACT))
 
     def split_equal_force(self, quantity: str) -> Split | None:
         """Return model and mesh error against the theory at the limit of the force."""
@@ -191,5 +191,5 @@ class Series:
 
     def mesh_error(self, quantity: str) -> float:
         """Return the error of the finest mesh [-], relative to the theory, or without one to the limit."""
-        found = self.split(quantity)
-        return found.mesh if found else self.errors(quantity)[-1]
+        split = self.split(quantity)
+        return split.mesh if split else self.errors(quantity)[-1]

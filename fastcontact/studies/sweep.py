@@ -123,9 +123,9 @@ def _of_function(
         for choice in choices
     ]  # fmt: skip
     results = functions.run_functions(runs, "no point of the sweep could be solved", **options)
-    found = _points(by_name, choices, results)
+    points = _points(by_name, choices, results)
     return Sweep(
-        **functions.of_function(function, results), **found, combination=name, asked=tuple(wanted), compared=""
+        **functions.of_function(function, results), **points, combination=name, asked=tuple(wanted), compared=""
     )
 
 

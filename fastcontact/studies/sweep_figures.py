@@ -47,9 +47,9 @@ def parameter_label(parameter: str, units: Mapping[str, str]) -> str:
     if last not in MEANINGS:
         return parameter
     words, kind = MEANINGS[last]
-    found = _TABLE.match(parameter)
-    if found is not None:
-        words += f" of {found['table']} " + (f"'{found['name']}'" if found["name"] else str(int(found["number"]) + 1))
+    match = _TABLE.match(parameter)
+    if match is not None:
+        words += f" of {match['table']} " + (f"'{match['name']}'" if match["name"] else str(int(match["number"]) + 1))
     elif "." in parameter:
         words += f" of the {parameter.split('.', 1)[0]}"
     unit = units.get(kind, "") if kind else "-"

@@ -39,7 +39,7 @@ CASES = [
     ("kinematics missing", 'kinematics = "axisymmetric"', "", r"case\.toml: the key 'kinematics' is missing"),
     ("key misspelled", "[ramp]", "[ramps]", r"case\.toml: unknown key 'ramps': did you mean 'ramp'\?"),
     ("key of a material misspelled", "nu = 0.3", "mu = 0.3",
-     r"case\.toml: the key 'material\[0\]\.mu' is none of a material that is isotropic"),
+     r"case\.toml: the key 'material\[0\]\.mu' does not belong to a material that is isotropic"),
     ("key of a support misspelled", 'group = "A2B2"', 'grup = "A2B2"',
      r"case\.toml: unknown key 'support\[1\]\.grup': did you mean 'support\[1\]\.group' or 'support\[1\]\.ramp' or 'support\[1\]\.z'\?"),
     ("support without component", "y = -2.0", "", r"prescribe\('A2B2'\) has no component: give for example y=-1\.0"),

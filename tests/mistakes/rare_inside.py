@@ -17,7 +17,7 @@ from scipy.sparse import bsr_array, csr_array
 
 import fastcontact as fc
 from fastcontact import generate
-from fastcontact.analysis.unsupported_bodies import UnsupportedBodies
+from fastcontact.analysis.floating_bodies import FloatingBodies
 from fastcontact.cases.case import read_case
 from fastcontact.cases.keys import called
 from fastcontact.cli import _study, bench, cases
@@ -72,8 +72,8 @@ def out_of_balance(patch):
 
 
 def not_slack(patch):
-    settle = UnsupportedBodies.settle
-    patch.setattr(UnsupportedBodies, "settle", lambda *given: replace(settle(*given), slack=False))
+    settle = FloatingBodies.settle
+    patch.setattr(FloatingBodies, "settle", lambda *given: replace(settle(*given), slack=False))
     model = lifted()
     model.loads.clear()
     model.add_force("UPPER_TOP", y=-10.0)

@@ -66,7 +66,7 @@ def test_any_problem_from_any_set_ends(n, m, seed, spread, solver, repeated, lim
     if limit == 200 and not repeated:
         assert state.settled
     if state.settled:
-        # Equations that are linearly dependent are solved on their flexibility, column by column to the solver's tolerance.
+        # Linearly dependent equations are solved on their Delassus operator, column by column to the solver's tolerance.
         unit = made.tolerance if repeated and solver == "amg" else 1e-14
         rounding = max(1e-9, unit * np.linalg.cond(K))
         largest = np.abs(state.multiplier).max(initial=0.0)

@@ -17,7 +17,7 @@ ARRAYS = ("ArrayLike", "ndarray", "Sequence", "Array", "Value", "Constant", "Tab
 WITHOUT_NUMBERS = ("Sequence[str]", "Iterable[str]", "Sequence[StepResult]", "Mapping[str, str]", "dict[str, str]")
 # What the package itself makes and hands over; `ResultWriter.write` refuses masks in them.
 RESULTS = (
-    "ContactAnswers", "ContactResult", "Deck", "ErrorEstimate", "FoundContacts", "Modes", "OrderedLine", "Sensitivities",
+    "ContactResultants", "ContactResult", "Deck", "ErrorEstimate", "FoundContacts", "Modes", "OrderedLine", "Sensitivities",
     "StepResult",
 )  # fmt: skip
 MASK = np.ma.array([1.0, 2.0], mask=[False, True])
@@ -192,7 +192,7 @@ class Floor:
 @pytest.mark.parametrize(("kind", "text"), [(masked, "masked"), (lambda n: np.ones(n) + 1j, "real|complex")])
 def test_results_of_functions_of_the_caller(kind, text):
     """A load, a modulus, axes and the gap of an obstacle."""
-    from fastcontact.contact.obstacles.rigid_side import RigidSide, Stance
+    from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
     from fastcontact.elasticity.loads import evaluated
 
     points = np.zeros((3, 2))
@@ -200,7 +200,7 @@ def test_results_of_functions_of_the_caller(kind, text):
         evaluated(lambda x: kind(len(x)), points, "the pressure on 'TOP'")
     side = RigidSide(Floor(kind), np.zeros(2))
     with pytest.raises(fc.ContactError, match=text):
-        side.facing(points, Stance(np.zeros(2)))
+        side.facing(points, Pose(np.zeros(2)))
 
 
 def test_axes_of_a_function_have_no_mask_and_are_real():

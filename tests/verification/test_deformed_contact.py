@@ -52,7 +52,7 @@ def test_pressure_is_the_true_stress_across(kinematics: str, element: str, law: 
     thickness = step.cell_fields["J"][0] / (0.7 * grown) if kinematics == "plane_stress" else 1.0
     assert contact.pressure == pytest.approx(-stress[0] * thickness, rel=1e-6)
     # The true area is larger than that of before, by what the body has grown across.
-    answers = fc.contact_answers(model, [step], "joint")[0]
+    answers = fc.contact_resultants(model, [step], "joint")[0]
     area = {"plane_strain": grown, "plane_stress": grown, "axisymmetric": np.pi * grown**2, "3d": grown**2}[kinematics]
     assert grown > 1.1
     assert answers.area == pytest.approx(area, rel=1e-6)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
+from fastcontact.analysis.periodic_interfaces import periodicity_warnings
 from fastcontact.analysis.problem import prepare
-from fastcontact.analysis.seams import seam_warnings
 from fastcontact.cases.case import read_case
 from fastcontact.mesh.generate import block, box, merge_points, renamed, union
 
@@ -239,8 +239,8 @@ def test_an_uneven_split_where_the_period_ends_is_told():
         multiplier[ends] = np.array(parts) * contact.pressure[ends]
         return dataclasses.replace(step, contact={"floor": dataclasses.replace(contact, multiplier=multiplier)})
 
-    assert seam_warnings(problem, split(1.0, 1.0)) == []
-    (text,) = seam_warnings(problem, split(0.9, 1.1))
+    assert periodicity_warnings(problem, split(1.0, 1.0)) == []
+    (text,) = periodicity_warnings(problem, split(0.9, 1.1))
     assert "at 1 places its forces are split unevenly between the two nodes of one place, by 1.0" in text
 
 

@@ -8,7 +8,7 @@ import pytest
 import fastcontact as fc
 from fastcontact.cases.case import read_case
 from fastcontact.cli import main
-from fastcontact.contact.obstacles.rigid_side import RigidSide, Stance
+from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.obstacles.rotation import Rotation
 from fastcontact.mesh.generate import block, box
 
@@ -207,7 +207,7 @@ def test_slip_is_zero_where_a_point_sticks_and_the_arc_where_it_stands_still(dim
     axis = (0.0, 0.0, 1.0) if dim == 2 else (1.0, -2.0, 0.5)
     rotation = Rotation((0.3, -0.2, 0.7)[:dim], axis, 1.0)
     side = RigidSide(fc.obstacles.Sphere((0.0,) * dim, 1.0), np.zeros(dim), rotation)
-    then, now = Stance(np.full(dim, 0.1), 0.4), Stance(np.array([0.3, -0.2, 0.5])[:dim], 1.1)
+    then, now = Pose(np.full(dim, 0.1), 0.4), Pose(np.array([0.3, -0.2, 0.5])[:dim], 1.1)
     rng = np.random.default_rng(1)
     before, centre = rng.normal(size=(5, dim)), np.array(rotation.centre)
     stuck = (before - centre - then.displacement) @ rotation.matrix(0.7).T + centre + now.displacement

@@ -105,16 +105,16 @@ def newton(
             break
         there, gaps_there = problem.step(y, gaps, *law.state(y, gaps))
         step, change = there - y, gaps_there - gaps
-        part = 1.0
+        damping = 1.0
         while (
             line_search
-            and np.linalg.norm(law.residual(y + part * step, gaps + part * change)) > (1 - 1e-4 * part) * size
+            and np.linalg.norm(law.residual(y + damping * step, gaps + damping * change)) > (1 - 1e-4 * damping) * size
         ):
-            part *= 0.5
-            if part < SHORTEST:  # at a kink no step may go down: the whole one leads elsewhere
-                part, uphill = 1.0, uphill + 1
+            damping *= 0.5
+            if damping < SHORTEST:  # at a kink no step may go down: the whole one leads elsewhere
+                damping, uphill = 1.0, uphill + 1
                 break
-        y, gaps = (there, gaps_there) if part == 1.0 else (y + part * step, gaps + part * change)
+        y, gaps = (there, gaps_there) if damping == 1.0 else (y + damping * step, gaps + damping * change)
         residual = law.residual(y, gaps)
         size = float(np.linalg.norm(residual))
     if not settled:

@@ -57,8 +57,8 @@ def solve(F: Array, free: Array, mu: Array, closed: Mask, guess: Array | None = 
     if not m:
         return Forces(free * 0.0, free, closed, closed, True, 0.0, 0)
     # Each constraint in units of its own compliance, so that c = 1 suits all.
-    own = np.diag(F)[:m]
-    unit = 1.0 / np.sqrt(np.maximum(own, np.finfo(float).eps * own.max()))
+    compliance = np.diag(F)[:m]
+    unit = 1.0 / np.sqrt(np.maximum(compliance, np.finfo(float).eps * compliance.max()))
     length = float(np.abs(free * unit).max()) or 1.0
     everywhere = np.tile(unit, parts)
     F, best, iterations, yielded = everywhere[:, None] * F * everywhere, None, 0, 0.0
@@ -69,11 +69,11 @@ def solve(F: Array, free: Array, mu: Array, closed: Mask, guess: Array | None = 
         F[slips, slips] += yielding
         problem = _Problem(F, free * unit / length, mu)
         for start, line_search in _starts(problem, closed, guess):
-            found = newton(problem, start, problem.gaps(start), line_search=line_search)
-            iterations += 1 + found.iterations
-            if best is None or found.residual < best.residual:
-                best, yielded = found, yielding * float(np.abs(found.y[1:]).max(initial=0.0))
-            if found.settled:
+            forces = newton(problem, start, problem.gaps(start), line_search=line_search)
+            iterations += 1 + forces.iterations
+            if best is None or forces.residual < best.residual:
+                best, yielded = forces, yielding * float(np.abs(forces.y[1:]).max(initial=0.0))
+            if forces.settled:
                 break
         if best is not None and best.settled and yielded <= JAMMED:
             break
@@ -126,9 +126,9 @@ def _starts(problem: _Problem, closed: Mask, guess: Array | None) -> Iterator[tu
             break
         yield y.copy(), True
     for edges in EDGES if len(problem.free) == 3 else (2,):
-        found = _on_edges(problem, edges)
-        if found is not None:
-            yield found, True
+        edge_forces = _on_edges(problem, edges)
+        if edge_forces is not None:
+            yield edge_forces, True
 
 
 def _step(problem: _Problem, y: Array, gaps: Array, closed: Mask, sticking: Mask) -> Array:
@@ -141,17 +141,17 @@ def _step(problem: _Problem, y: Array, gaps: Array, closed: Mask, sticking: Mask
         return new
     unknown = (np.arange(1 + k)[:, None] * m + rows).ravel()
     A, right = problem.F[np.ix_(unknown, unknown)], -problem.free[:, rows].ravel()
-    place = np.flatnonzero(~sticking[rows])
-    if len(place):
-        sliding = rows[place]
+    slipping = np.flatnonzero(~sticking[rows])
+    if len(slipping):
+        sliding = rows[slipping]
         d, turning = problem.law.slide(y, gaps, sliding)
-        slips = [(1 + b) * q + place for b in range(k)]
+        slips = [(1 + b) * q + slipping for b in range(k)]
         compliance = [A[slips[b]] for b in range(k)]
         free = [-right[slips[b]] for b in range(k)]
         for a in range(k):
             A[slips[a]], right[slips[a]] = 0.0, 0.0
             A[slips[a], slips[a]] = 1.0
-            A[slips[a], place] -= problem.mu[sliding] * d[a]
+            A[slips[a], slipping] -= problem.mu[sliding] * d[a]
             for b in range(k) if k == 2 else ():
                 turn = turning * ((a == b) - d[a] * d[b])
                 A[slips[a], slips[b]] -= turn
@@ -164,9 +164,9 @@ def _step(problem: _Problem, y: Array, gaps: Array, closed: Mask, sticking: Mask
 def _solved(A: Array, right: Array) -> Array:
     """Solve a linear system; of minimum norm where constraints are linearly dependent."""
     try:
-        found = np.linalg.solve(A, right)
-        if np.abs(A @ found - right).max() <= 1e-8 * np.abs(right).max(initial=0.0):
-            return np.asarray(found)
+        solution = np.linalg.solve(A, right)
+        if np.abs(A @ solution - right).max() <= 1e-8 * np.abs(right).max(initial=0.0):
+            return np.asarray(solution)
     except np.linalg.LinAlgError:
         pass
     return np.asarray(np.linalg.lstsq(A, right, rcond=None)[0])

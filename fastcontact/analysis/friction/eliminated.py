@@ -27,9 +27,9 @@ from fastcontact.linear.springs import Springs
 # Bound of the tangential stiffness across a slip, which is unbounded as the slip vanishes, in units of the stiffness of the
 # constraint. The solution does not depend on it, since nothing slips across there.
 STIFFEST = 100.0
-# Constraints are taken for so much softer than the unknowns that they act on are by themselves, for neighbours give way, too.
+# Constraints are taken for so much softer than the unknowns that they act on are by themselves, since neighbours deform.
 # Nearly incompressible cells resist a single node far more than a surface (`LinearSolver.contrast`): beyond MILD, constraints
-# are softer still, with its root, or Newton's method turns a few slips to and fro (nu = 0.4999, 161 442 unknowns: 588
+# are softer still, with its root, or Newton's method reverses a few slips again and again (nu = 0.4999, 161 442 unknowns: 588
 # iterations, where it did not settle; nu = 0.499 did not care).
 SOFTER, MILD = 0.2, 10.0
 # The residual of the friction law that is small enough, in units of that of the linear solutions; and that which will do
@@ -80,21 +80,21 @@ def solve(
         if not state[0].any():  # what closes was not known: the bodies lie as if there were no contact
             y, gaps = problem.step(y, gaps, gaps[0] < 0.0, gaps[0] < 0.0)
         exact = max(EXACT, ENOUGH * tolerance)
-        found = newton(problem, y, gaps, exact, PATIENCE if steps is None else steps - 1)
+        iterate = newton(problem, y, gaps, exact, PATIENCE if steps is None else steps - 1)
         if problem.finish():
-            y, gaps = problem.step(found.y, found.gaps, found.closed, found.sticking)
-            found = newton(problem, y, gaps, exact, PATIENCE)
-        if steps is None and not found.settled:
-            if found.residual > ACCEPTABLE * tolerance:
-                found = newton(problem, found.y, found.gaps, exact)
-            found = replace(found, settled=found.settled or found.residual <= ACCEPTABLE * tolerance)
-            if not found.settled:
+            y, gaps = problem.step(iterate.y, iterate.gaps, iterate.closed, iterate.sticking)
+            iterate = newton(problem, y, gaps, exact, PATIENCE)
+        if steps is None and not iterate.settled:
+            if iterate.residual > ACCEPTABLE * tolerance:
+                iterate = newton(problem, iterate.y, iterate.gaps, exact)
+            iterate = replace(iterate, settled=iterate.settled or iterate.residual <= ACCEPTABLE * tolerance)
+            if not iterate.settled:
                 return None
-        if found.y is not problem.reached:  # between two steps: displacements are known at their ends
-            problem.step(found.y, found.gaps, found.closed, found.sticking)
+        if iterate.y is not problem.reached:  # between two steps: displacements are known at their ends
+            problem.step(iterate.y, iterate.gaps, iterate.closed, iterate.sticking)
     except ConvergenceError:
         return None
-    return problem.u, problem.unscaled(found)
+    return problem.u, problem.unscaled(iterate)
 
 
 class Eliminated:
@@ -119,22 +119,22 @@ class Eliminated:
         k, m = len(rows) - 1, len(constraints)
         yielding = np.divide(1.0, diagonal := loaded.diagonal(), out=np.zeros(len(u)), where=diagonal > 0.0)
         self._gives = _diagonal_compliance(constraints)
-        own = self._own(rows, yielding)
-        self._turn = aligning(own) if k == 2 else None
+        compliance = self._own(rows, yielding)
+        self._turn = aligning(compliance) if k == 2 else None
         if self._turn is not None:
             turned = csr_array(self._turn @ vstack(rows, format="csr"))
             rows = tuple(turned[a * m : (a + 1) * m] for a in range(3))
             free = (self._turn @ free.ravel()).reshape(free.shape)
-            own = self._own(rows, yielding)
-        still = idle(own)
+            compliance = self._own(rows, yielding)
+        still = idle(compliance)
         moved = still & constraints.moved_past
-        self._gives[1:][moved] += np.broadcast_to(GIVING * own[0, 0], still.shape)[moved]
+        self._gives[1:][moved] += np.broadcast_to(GIVING * compliance[0, 0], still.shape)[moved]
         slipping = [scaled(T, np.where(off, 0.0, 1.0)) for T, off in zip(rows[1:], still, strict=True)]
         self._rows = (rows[0], *slipping)
         self._free = np.vstack([free[0], np.where(still & ~moved, 0.0, free[1:])])
         self._slips = ~still | moved
         softer = SOFTER / np.sqrt(max(1.0, loaded.contrast / MILD))
-        self._unit = np.sqrt(1.0 / (np.where(own[0, 0] > 0.0, own[0, 0], 1.0) / softer + self._gives[0]))
+        self._unit = np.sqrt(1.0 / (np.where(compliance[0, 0] > 0.0, compliance[0, 0], 1.0) / softer + self._gives[0]))
         equality = constraints.equality
         self.law = Law(np.where(usable, mu, 0.0), None if equality is None else equality & usable)
         self.u = u
@@ -144,10 +144,10 @@ class Eliminated:
 
     def _own(self, rows: tuple[csr_array, ...], yielding: Array) -> Array:
         """Return `compliance_of_rows` plus the own tangential compliance: directions with compliance are not idle."""
-        own = compliance_of_rows(rows, yielding)
+        compliance = compliance_of_rows(rows, yielding)
         slips = np.arange(1, len(rows))
-        own[slips, slips] += self._gives[1:]
-        return own
+        compliance[slips, slips] += self._gives[1:]
+        return compliance
 
     def start(self, forces: Array | None) -> tuple[Array, Array]:
         """Return forces and gaps of the displacement to start from, scaled."""
@@ -158,13 +158,13 @@ class Eliminated:
         self.reached = y / self._unit
         return self.reached, self._scaled(self._gaps(self.u, y))
 
-    def unscaled(self, found: Forces) -> Forces:
+    def unscaled(self, scaled: Forces) -> Forces:
         """Return forces and gaps along the tangents as they were given."""
         y = self.reached * self._unit
         gaps = self._gaps(self.u, y)
         if self._turn is not None:
-            y, gaps = ((self._turn.T @ part.ravel()).reshape(part.shape) for part in (y, gaps))
-        return Forces(y, gaps, found.closed, found.sticking, found.settled, found.residual, 1 + found.iterations)
+            y, gaps = ((self._turn.T @ values.ravel()).reshape(values.shape) for values in (y, gaps))
+        return Forces(y, gaps, scaled.closed, scaled.sticking, scaled.settled, scaled.residual, 1 + scaled.iterations)
 
     def _gaps(self, u: Array, forces: Array | float = 0.0) -> Array:
         return self._free + np.stack([R @ u for R in self._rows]) + self._gives * forces
@@ -189,8 +189,8 @@ class Eliminated:
         self._last = self._accuracy(y, gaps)
         u, multiplier = self._loaded.solve_nonsymmetric(B, c, nodes, self.u, self._last, drag, C)
         new, first = np.zeros_like(y), 0
-        for own, at in zip(new, equations, strict=True):
-            own[at] = multiplier[first : first + len(at)]
+        for increment, at in zip(new, equations, strict=True):
+            increment[at] = multiplier[first : first + len(at)]
             first += len(at)
         new[1:, sliding.at] += sliding.force(new[0, sliding.at], u)
         self.u, self.reached = u, new / self._unit
@@ -217,7 +217,7 @@ class Eliminated:
         if len(d) == 1:
             return _Sliding(at, pull)
         across = np.stack([-d[1], d[0]])
-        rows = sum(scaled(taken(T, at), part) for part, T in zip(across, self._rows[1:], strict=True))
+        rows = sum(scaled(taken(T, at), factor) for factor, T in zip(across, self._rows[1:], strict=True))
         spring = np.minimum(turning / np.maximum(1.0 - turning, 1e-300), STIFFEST) * self._unit[at] ** 2
         spring = spring / (1.0 + spring * self._gives[1, at])  # behind that of the constraint itself
         return _Sliding(
@@ -229,8 +229,8 @@ class Eliminated:
         pull = np.zeros((len(self._rows) - 1, len(self._usable)))
         pull[:, sliding.at] = sliding.pull
         through = taken(self._rows[0], shut)
-        for T, part in zip(self._rows[1:], pull, strict=True):
-            through = through + scaled(taken(T, shut), part[shut])
+        for T, factor in zip(self._rows[1:], pull, strict=True):
+            through = through + scaled(taken(T, shut), factor[shut])
         through = csr_array(vstack([through, B[len(shut) :]], format="csr"))
         if sliding.springs is None:
             return FrictionTerms(through)
@@ -241,12 +241,12 @@ class Eliminated:
 
 def _diagonal_compliance(constraints: Constraints) -> Array:
     """Return the own compliance of constraints along normals and tangents (1 + k, m) [length / force]."""
-    found = np.zeros((1 + len(constraints.tangents), len(constraints)))
+    compliance = np.zeros((1 + len(constraints.tangents), len(constraints)))
     if constraints.softness is not None:
-        found[0] = constraints.softness
+        compliance[0] = constraints.softness
     if constraints.tangential_softness is not None:
-        found[1:] = constraints.tangential_softness
-    return found
+        compliance[1:] = constraints.tangential_softness
+    return compliance
 
 
 @dataclass(frozen=True, eq=False)

@@ -88,15 +88,15 @@ def _blocking(table, basic, column):
     size = 0.0
     for i in range(n):
         size = max(size, abs(table[i, column]))
-    found, least = -1, np.inf
+    row, least = -1, np.inf
     for i in range(n):
         slope = -table[i, column]
         if slope <= 1e-12 * size:
             continue
         ratio = max(table[i, constant], 0.0) / slope
         nearer = ratio < least * (1.0 - 1e-12)
-        if not nearer and ratio <= least * (1.0 + 1e-12) and basic[found] != 2 * n:
-            nearer = basic[i] == 2 * n or slope > -table[found, column]
+        if not nearer and ratio <= least * (1.0 + 1e-12) and basic[row] != 2 * n:
+            nearer = basic[i] == 2 * n or slope > -table[row, column]
         if nearer:
-            found, least = i, min(ratio, least)
-    return found
+            row, least = i, min(ratio, least)
+    return row

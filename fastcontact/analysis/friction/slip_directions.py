@@ -1,4 +1,4 @@
-"""Slip directions left free by supports: tangents are aligned with them, the others are idle.
+"""Slip directions left free by supports: tangents are aligned with them, the others are held.
 
 All of it looks at the compliance of each constraint by itself: `own` (1 + k, 1 + k, m), its normal part first.
 """
@@ -11,9 +11,9 @@ from scipy.sparse import block_array, csr_array, diags_array
 from fastcontact.analysis.friction import slip_directions_kernels
 from fastcontact.arrays import Array, Mask
 
-# A direction of slip in which a constraint gives less than this, relative to its gap, is none.
+# A direction of slip whose compliance, relative to that of the gap, is less than this is held.
 IDLE = 1e-10
-# What a prescribed slip gives way, relative to its gap: next to nothing, but sticking has an equation so, which no force in
+# Compliance of a prescribed slip relative to that of its gap: negligible, but sticking has an equation so, which no force in
 # the cone obeys.
 GIVING = 1e-8
 
@@ -35,21 +35,21 @@ def compliance_of_rows(rows: tuple[csr_array, ...], yielding: Array) -> Array:
     yielding : ndarray (n,)
         Compliance of each unknown [length / force].
     """
-    own = np.empty((len(rows), len(rows), rows[0].shape[0]))
+    compliance = np.empty((len(rows), len(rows), rows[0].shape[0]))
     parts = tuple(tuple(getattr(R, part) for R in rows) for part in ("indptr", "indices", "data"))
-    slip_directions_kernels.products_of_rows(*parts, yielding, own)
-    return own
+    slip_directions_kernels.products_of_rows(*parts, yielding, compliance)
+    return compliance
 
 
-def aligning(own: Array) -> csr_array | None:
+def aligning(compliance: Array) -> csr_array | None:
     """Return Q (3 m, 3 m) that turns two tangents so that one is idle where supports leave one direction of slip.
 
     In a plane of symmetry both tangents may lie across it; then neither is idle by itself. None where nothing turns.
     """
-    m = own.shape[2]
-    gap = np.maximum(own[0, 0], np.finfo(float).tiny)
-    first, second = own[1, 1] - own[1, 0] ** 2 / gap, own[2, 2] - own[2, 0] ** 2 / gap
-    mixed = own[1, 2] - own[1, 0] * own[2, 0] / gap
+    m = compliance.shape[2]
+    gap = np.maximum(compliance[0, 0], np.finfo(float).tiny)
+    first, second = compliance[1, 1] - compliance[1, 0] ** 2 / gap, compliance[2, 2] - compliance[2, 0] ** 2 / gap
+    mixed = compliance[1, 2] - compliance[1, 0] * compliance[2, 0] / gap
     apart = np.hypot(0.5 * (first - second), mixed)
     largest, least = 0.5 * (first + second) + apart, 0.5 * (first + second) - apart
     across = (least <= IDLE * np.maximum(largest, gap)) & (np.abs(mixed) > IDLE * np.maximum(largest, gap))

@@ -12,15 +12,15 @@ def products_of_rows(indptr, indices, data, weights, out):
 
     The matrices come as tuples of compressed rows, `weights` are w (n,).
     """
-    own = np.zeros(weights.shape[0])
+    weighted = np.zeros(weights.shape[0])
     for a in range(len(indptr)):
         for i in range(out.shape[2]):
             for e in range(indptr[a][i], indptr[a][i + 1]):
-                own[indices[a][e]] = data[a][e] * weights[indices[a][e]]
+                weighted[indices[a][e]] = data[a][e] * weights[indices[a][e]]
             for b in range(a, len(indptr)):
                 s = 0.0
                 for e in range(indptr[b][i], indptr[b][i + 1]):
-                    s += own[indices[b][e]] * data[b][e]
+                    s += weighted[indices[b][e]] * data[b][e]
                 out[a, b, i] = out[b, a, i] = s
             for e in range(indptr[a][i], indptr[a][i + 1]):
-                own[indices[a][e]] = 0.0
+                weighted[indices[a][e]] = 0.0

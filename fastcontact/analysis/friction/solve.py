@@ -21,7 +21,7 @@ from fastcontact.analysis.friction.slip_directions import GIVING, aligning, idle
 from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
-from fastcontact.linear.flexibility import MOST_ROWS_WITH_FRICTION, check_rows
+from fastcontact.linear.delassus import MOST_ROWS_WITH_FRICTION, check_rows
 from fastcontact.linear.protocol import Loaded, LoadedNonsymmetric
 
 log = logging.getLogger("fastcontact")
@@ -33,15 +33,15 @@ def solve(
 ) -> FrictionalEquilibrium:  # fmt: skip
     """Find displacement and contact forces under contact and friction.
 
-    Constraints that nothing presses together are left out, for each costs columns of the flexibility: the problem begins
-    with those that were closed, and takes up others as they are found to penetrate. What is left out in the end is open
-    and free of forces, so nothing is lost. Constraints that a compliance of their own couples are taken all at once.
+    Constraints that nothing presses together are left out, for each costs columns of the inverse stiffness: the problem
+    begins with those that were closed, and takes up others as they are found to penetrate. What is left out in the end is
+    open and free of forces, so nothing is lost. Constraints that a compliance of their own couples are taken all at once.
 
     Parameters
     ----------
     loaded : Loaded
     constraints : Constraints
-        Rows for the unknowns of the solver; `Constraints.drift` (k, m) is the slip at zero unknowns, minus that at the
+        Rows for the unknowns of the solver; `Constraints.slip0` (k, m) is the slip at zero unknowns, minus that at the
         beginning of the step [length].
     closed : ndarray of bool (m,)
         Constraints to start from as closed and sticking.
@@ -54,21 +54,21 @@ def solve(
     forces = None if guess is None else guess.forces_along(constraints.directions, len(constraints))
     together = constraints.compliance is not None or constraints.low_rank_compliance is not None
     if isinstance(loaded, LoadedNonsymmetric) and not together:
-        found = _eliminated(loaded, constraints, closed, accuracy, u, forces)
-        if found is not None:
-            return found
+        equilibrium = _eliminated(loaded, constraints, closed, accuracy, u, forces)
+        if equilibrium is not None:
+            return equilibrium
         log.info("friction: the iteration on eliminated constraints did not settle, their compliance is formed")
     usable = constraints.usable
     begun = closed if constraints.equality is None else closed | constraints.equality
     chosen = usable if together else usable & begun
     iterations = 0
     while True:
-        found = _among(chosen, loaded, constraints, closed, u, forces)
-        found.gap[~usable], found.slip[~usable] = np.inf, 0.0
-        iterations += found.iterations
-        missing = usable & ~chosen & (found.gap < 0.0)
+        equilibrium = _among(chosen, loaded, constraints, closed, u, forces)
+        equilibrium.gap[~usable], equilibrium.slip[~usable] = np.inf, 0.0
+        iterations += equilibrium.iterations
+        missing = usable & ~chosen & (equilibrium.gap < 0.0)
         if not missing.any():
-            return dataclasses.replace(found, iterations=iterations)
+            return dataclasses.replace(equilibrium, iterations=iterations)
         chosen = chosen | missing
 
 
@@ -80,16 +80,16 @@ def _eliminated(
     u: Array,
     forces: Array | None,
 ) -> FrictionalEquilibrium | None:
-    """Solve without the flexibility of the constraints, see `eliminated`; None where that fails."""
+    """Solve without the Delassus operator of the constraints, see `eliminated`; None where that fails."""
     usable = constraints.usable
     solved = eliminated.solve(loaded, constraints, closed & usable, accuracy, u, forces)
     if solved is None:
         return None
-    u, found = solved
-    found.gaps[0, ~usable], found.gaps[1:, ~usable] = np.inf, 0.0
+    u, cone = solved
+    cone.gaps[0, ~usable], cone.gaps[1:, ~usable] = np.inf, 0.0
     return FrictionalEquilibrium(
-        u, found.y[0], found.gaps[0], found.y[1:].T, found.gaps[1:].T, found.closed & usable, found.sticking, found.settled,
-        found.residual, found.iterations, constraints.directions,
+        u, cone.y[0], cone.gaps[0], cone.y[1:].T, cone.gaps[1:].T, cone.closed & usable, cone.sticking, cone.settled,
+        cone.residual, cone.iterations, constraints.directions,
     )  # fmt: skip
 
 
@@ -102,8 +102,8 @@ def _among(
     check_rows((1 + k) * len(rows), MOST_ROWS_WITH_FRICTION)
     R = csr_array(vstack([matrix[rows] for matrix in (constraints.B, *constraints.tangents)], format="csr"))
     at_rest = constraints.gaps_at_rest()
-    free, F = loaded.flexibility(R)
-    if constraints.tangential_softness is not None:  # before idle slips are looked for: what gives way is not idle
+    free, F = loaded.delassus(R)
+    if constraints.tangential_softness is not None:  # before held slips are sought: compliant ones are not held
         slips = np.arange(len(rows), len(F))
         F[slips, slips] += np.tile(constraints.tangential_softness[rows], k)
     Q = aligning(own_compliance(F, 3)) if k == 2 else None
@@ -122,17 +122,17 @@ def _among(
         F[still, still] = np.where(moved, GIVING * own[0, 0], np.diag(F).max())[idle_slips]
         free[1:][idle_slips & ~moved] = 0.0
     equations = np.zeros(len(rows), bool) if constraints.equality is None else constraints.equality[rows]
-    found = _on_flexibility(F, free, constraints.coefficients[rows], closed[rows], equations, start)
-    y, relative = found.y, found.gaps
+    result = _on_delassus_operator(F, free, constraints.coefficients[rows], closed[rows], equations, start)
+    y, relative = result.y, result.gaps
     if Q is not None:
         y, relative = (Q.T @ y.ravel()).reshape(y.shape), (Q.T @ relative.ravel()).reshape(y.shape)
     u = loaded.involved_solution(R.T @ y.ravel(), u)
     full, gaps = np.zeros((1 + k, m)), at_rest + np.stack([own @ u for own in (constraints.B, *constraints.tangents)])
     full[:, rows], gaps[:, rows] = y, relative
     active, sticking = np.zeros(m, bool), np.zeros(m, bool)
-    active[rows], sticking[rows] = found.closed, found.sticking
+    active[rows], sticking[rows] = result.closed, result.sticking
     return FrictionalEquilibrium(
-        u, full[0], gaps[0], full[1:].T, gaps[1:].T, active, sticking, found.settled, found.residual, found.iterations,
+        u, full[0], gaps[0], full[1:].T, gaps[1:].T, active, sticking, result.settled, result.residual, result.iterations,
         constraints.directions,
     )  # fmt: skip
 
@@ -149,7 +149,7 @@ def _add_compliance(F: Array, constraints: Constraints, rows: Indices) -> None:
         F[np.arange(len(rows)), np.arange(len(rows))] += constraints.softness[rows]
 
 
-def _on_flexibility(
+def _on_delassus_operator(
     F: Array, free: Array, friction: Array, closed: Mask, equality: Mask, start: Array | None
 ) -> dense.Forces:
     """Solve the problem on the compliance F, from which constraints that are equations are eliminated first."""
@@ -161,13 +161,13 @@ def _on_flexibility(
     rest = free.ravel()[r] - F[np.ix_(r, h)] @ give[:, -1]
     remaining = F[np.ix_(r, r)] - F[np.ix_(r, h)] @ give[:, :-1]
     start = None if start is None else start[:, ~equality]
-    found = dense.solve(remaining, rest.reshape(len(free), -1), friction[~equality], closed[~equality], start)
+    forces = dense.solve(remaining, rest.reshape(len(free), -1), friction[~equality], closed[~equality], start)
     y, gaps = np.zeros(free.shape), np.zeros(free.shape)
-    y[:, ~equality], gaps[:, ~equality] = found.y, found.gaps
-    y[0, equality] = -(give[:, -1] + give[:, :-1] @ found.y.ravel())
+    y[:, ~equality], gaps[:, ~equality] = forces.y, forces.gaps
+    y[0, equality] = -(give[:, -1] + give[:, :-1] @ forces.y.ravel())
     now, sticking = equality.copy(), equality.copy()
-    now[~equality], sticking[~equality] = found.closed, found.sticking
-    return dataclasses.replace(found, y=y, gaps=gaps, closed=now, sticking=sticking)
+    now[~equality], sticking[~equality] = forces.closed, forces.sticking
+    return dataclasses.replace(forces, y=y, gaps=gaps, closed=now, sticking=sticking)
 
 
 def _turned(C: Array, along: Array) -> Array:

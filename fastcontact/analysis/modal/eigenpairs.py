@@ -69,25 +69,25 @@ def lowest(
     rng = np.random.default_rng(0)
     if isinstance(solver, Multigrid):
         start = rng.normal(size=(len(free), n + n // 2 + 2)) * free[:, None]
-        found = _by_multigrid(solver, shifted, M, start, n)
+        pairs = _by_multigrid(solver, shifted, M, start, n)
     else:
-        found = _by_factors(solver, shifted, M, rng.normal(size=len(free)) * free, n)
+        pairs = _by_factors(solver, shifted, M, rng.normal(size=len(free)) * free, n)
     # Ritz values in the span: more accurate than those of the iteration, and vectors of equal ones are orthogonal.
-    small, mass = found.T @ (K @ found), found.T @ (M @ found)
+    small, mass = pairs.T @ (K @ pairs), pairs.T @ (M @ pairs)
     lower = np.linalg.inv(np.linalg.cholesky(mass))
     values, vectors = np.linalg.eigh(lower @ (0.5 * (small + small.T)) @ lower.T)
-    return values[:n], (found @ (lower.T @ vectors))[:, :n]
+    return values[:n], (pairs @ (lower.T @ vectors))[:, :n]
 
 
 def _of_few(K: bsr_array, M: bsr_array, free: Indices, n: int, shift: float) -> tuple[Array, Array]:
     """Return what `lowest` does for so few unknowns `free` (k,) that all eigenvalues are found at once."""
     stiff, heavy = (np.asarray(matrix.tocsr()[free][:, free].todense()) for matrix in (K, M))
     try:  # the inverse eigenvalues, since M may be singular
-        inverse, own = eigh(heavy, stiff + shift * heavy, subset_by_index=[len(free) - n, len(free) - 1])
+        inverse, modes = eigh(heavy, stiff + shift * heavy, subset_by_index=[len(free) - n, len(free) - 1])
     except np.linalg.LinAlgError as error:
         raise ModelError(UNSTABLE) from error
     vectors = np.zeros((K.shape[0], n))
-    vectors[free] = own[:, ::-1] / np.sqrt(inverse[::-1])
+    vectors[free] = modes[:, ::-1] / np.sqrt(inverse[::-1])
     return 1.0 / inverse[::-1] - shift, vectors
 
 
@@ -106,8 +106,8 @@ def _by_factors(solver: LinearSolver, shifted: bsr_array, M: bsr_array, start: A
 def _by_multigrid(solver: Multigrid, shifted: bsr_array, M: bsr_array, start: Array, n: int) -> Array:
     def cycle(residuals: Array) -> Array:
         out = np.zeros((residuals.shape[1], residuals.shape[0]))
-        for z, own in zip(out, residuals.T, strict=True):
-            r = np.ascontiguousarray(own)
+        for z, residual in zip(out, residuals.T, strict=True):
+            r = np.ascontiguousarray(residual)
             if norm := float(np.linalg.norm(r)):
                 solver.precondition(r, norm, z)
         return out.T

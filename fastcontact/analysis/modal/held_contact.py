@@ -35,7 +35,7 @@ class HeldContact:
     nodes : ndarray of int (m,)
         The secondary node of each.
     springs : list of (csr_array (m, n_dofs), ndarray (m, m))
-        Rows [-] that give way, and by how much [length / force].
+        Compliant rows [-], and their compliance [length / force].
     """
 
     rows: csr_array
@@ -61,8 +61,8 @@ def held_contact(model: Model, step: StepResult | None, held: HeldMotions, hold_
             raise ModelError(f"modes know no cohesion or adhesion: tie contact '{pair.name}', or leave it out")
         at = _configuration(model, step, contact)
         position = at.obstacle if contact is not None else np.zeros(model.mesh.dim)
-        part = model.force_driven.constraints(pair.name, bound.constraints(at), position)
-        for rows, owners, softness in _rows(bound, part, contact, hold_sliding):
+        constraints = model.force_driven.constraints(pair.name, bound.constraints(at), position)
+        for rows, owners, softness in _rows(bound, constraints, contact, hold_sliding):
             kept = np.flatnonzero(np.diff(rows.indptr) > 0)
             if softness is None:
                 equations.append(csr_array(rows[kept]))
@@ -91,29 +91,29 @@ def _worn(model: Model, contact: ContactResult) -> Array | None:
 
 
 def _rows(
-    pair: Formulation, part: Constraints, contact: ContactResult | None, hold_sliding: bool
+    pair: Formulation, constraints: Constraints, contact: ContactResult | None, hold_sliding: bool
 ) -> Iterator[tuple[csr_array, Indices, csr_array | None]]:
     """Yield rows along the normal and along each tangent, their nodes, and their compliance matrix, if any.
 
     They are tested with the formulation's multipliers, as those of tied pairs are, see `contact.tied`.
     """
-    if isinstance(part.tied, TiedPair):
-        node = _nodes(pair, part, part.tied.moments)
-        yield part.B, np.tile(pair.secondary.points[node].astype(np.intp), len(part) // len(node)), None
+    if isinstance(constraints.tied, TiedPair):
+        node = _nodes(pair, constraints, constraints.tied.moments)
+        yield constraints.B, np.tile(pair.secondary.points[node].astype(np.intp), len(constraints) // len(node)), None
         return
-    moments = moments_of(part)
-    node = _nodes(pair, part, moments)
+    moments = moments_of(constraints)
+    node = _nodes(pair, constraints, moments)
     owners = pair.secondary.points[node].astype(np.intp)
-    always = np.zeros(len(part), bool) if part.equality is None else part.equality
+    always = np.zeros(len(constraints), bool) if constraints.equality is None else constraints.equality
     closed = abs(moments) @ always.astype(float) > 0.0
     sticking = np.zeros(len(closed), bool)
     if contact is not None:
         closed |= contact.active[node]
-        rubs = abs(moments) @ (part.coefficients > 0.0).astype(float) > 0.0
+        rubs = abs(moments) @ (constraints.coefficients > 0.0).astype(float) > 0.0
         sticking = (contact.active & (contact.sticking | hold_sliding))[node] & rubs
     for along, held, softness in (
-        (part.B, closed, part.softness),
-        *((tangent, sticking, part.tangential_softness) for tangent in part.tangents),
+        (constraints.B, closed, constraints.softness),
+        *((tangent, sticking, constraints.tangential_softness) for tangent in constraints.tangents),
     ):
         tested = csr_array(moments[np.flatnonzero(held)])
         gives = softness is not None and (tested @ softness).any()
@@ -121,15 +121,15 @@ def _rows(
         yield csr_array(tested @ along), owners[held], compliance
 
 
-def _nodes(pair: Formulation, part: Constraints, moments: csr_array) -> Indices:
+def _nodes(pair: Formulation, constraints: Constraints, moments: csr_array) -> Indices:
     """Return the secondary node (q,), as an index on its side, of each row of the moments (q, m)."""
-    if isinstance(part.nodal, PressureField):
-        field = part.nodal
+    if isinstance(constraints.nodal, PressureField):
+        field = constraints.nodal
         alone = moments.indices[moments.indptr[len(field.independent) : -1]]  # points on an axis
         nearest = field.around[alone, field.shape[alone].argmax(axis=1)]
         return np.concatenate([field.independent, nearest])
     points = pair.secondary.points
-    if part.nodes is None:
+    if constraints.nodes is None:
         return np.arange(len(points))
     order = np.argsort(points)
-    return np.asarray(order[np.searchsorted(points, part.nodes[: moments.shape[0]], sorter=order)])
+    return np.asarray(order[np.searchsorted(points, constraints.nodes[: moments.shape[0]], sorter=order)])

@@ -42,13 +42,13 @@ class Reduced:
         unit = diags_array(system.free.astype(float))
         self._T = csr_array(unit if system.T is None else system.T @ unit)
         self.K, self.free = system.matrix, system.free.copy()
-        own = system.rows(rows, np.zeros(rows.shape[0]), np.zeros(n))[0]
-        kept = np.flatnonzero(np.diff(own.indptr) > 0)
+        rows_of_unknowns = system.rows(rows, np.zeros(rows.shape[0]), np.zeros(n))[0]
+        kept = np.flatnonzero(np.diff(rows_of_unknowns.indptr) > 0)
         if len(kept):
-            pivots, weights = _eliminated(csr_array(own[kept]), nodes[kept], size)
+            pivots, weights = _eliminated(csr_array(rows_of_unknowns[kept]), nodes[kept], size)
             self.free[pivots] = False
-            place = csr_array((np.ones(len(pivots)), (pivots, np.arange(len(pivots)))), shape=(n, len(pivots)))
-            among = csr_array(diags_array(self.free.astype(float)) + place @ weights)
+            at_pivots = csr_array((np.ones(len(pivots)), (pivots, np.arange(len(pivots)))), shape=(n, len(pivots)))
+            among = csr_array(diags_array(self.free.astype(float)) + at_pivots @ weights)
             K = csr_array(among.T @ self.K.tocsr() @ among).tobsr((size, size))
             K.sort_indices()
             self.K, self._T = supports_apart(K, ~self.free, diagonal_of(K))[0], csr_array(self._T @ among)
@@ -65,15 +65,15 @@ def _eliminated(rows: csr_array, nodes: Indices, size: int) -> tuple[Indices, cs
     Where the equations repeat each other, as at corners where several sides meet, those that are independent.
     """
     try:
-        found = eliminate(rows, np.zeros(rows.shape[0]), None, nodes, size)
+        elimination = eliminate(rows, np.zeros(rows.shape[0]), None, nodes, size)
     except RepeatedError:
         return _independent(rows)
-    weights = found.weights
-    if found.coupled is not None:
+    weights = elimination.weights
+    if elimination.coupled is not None:
         columns = np.unique(weights.indices)
-        full = found.coupled.solve(weights[:, columns].toarray())
+        full = elimination.coupled.solve(weights[:, columns].toarray())
         weights = csr_array(full @ _selection(columns, rows.shape[1]))
-    return found.pivots, weights
+    return elimination.pivots, weights
 
 
 def _independent(rows: csr_array) -> tuple[Indices, csr_array]:

@@ -97,12 +97,12 @@ class Adjoint:
         sample = change.sample + self._moving @ change.lift
         out = change.out + self._system.K @ change.lift - sample[:n]
         gap = sample[n : n + self._k] + self._B @ change.lift
-        found = gradient.displacement @ change.lift - self._w @ self._system.reduced(out) - self._mu @ gap
+        derivative = gradient.displacement @ change.lift - self._w @ self._system.reduced(out) - self._mu @ gap
         if gradient.sample is not None:
-            found += gradient.sample @ sample
+            derivative += gradient.sample @ sample
         if gradient.reaction is not None:
-            found += gradient.reaction @ out
-        return float(found)
+            derivative += gradient.reaction @ out
+        return float(derivative)
 
     def _right(self) -> tuple[Array, Array]:
         """Return the derivatives of the quantity by all unknowns (n,) and by the multipliers (k,)."""
@@ -144,9 +144,9 @@ class Adjoint:
 
     def _transposed(self, w: Array, mu: Array) -> Array:
         """Return ``E.T y`` (n,)."""
-        system, bodies = self._system, self._contact.problem.unsupported_bodies
+        system, bodies = self._system, self._contact.problem.floating_bodies
         along = w if system.T is None else system.T @ w
-        found = system.reduced(self._gap.T @ mu - self._force.T @ along)
+        product = system.reduced(self._gap.T @ mu - self._force.T @ along)
         if bodies is not None:
-            found[bodies.dofs] -= bodies.stiffness * w[bodies.dofs]
-        return found
+            product[bodies.dofs] -= bodies.stiffness * w[bodies.dofs]
+        return product

@@ -28,13 +28,13 @@ CHANGED = 1e-3
 def by_constant(contact: MovingContact, asked: Asked) -> tuple[Array, Array | None]:
     """Return the derivatives of `Change.out` (n_dofs,) and `Change.sample` with respect to a constant, None for zero."""
     model, name = contact.problem.model, str(asked[0])
-    number, material, place = _found(model, asked)
-    step = CHANGED * _room(material, name, place)
+    number, material, component = _found(model, asked)
+    step = CHANGED * _room(material, name, component)
 
     def at(by: float) -> MovingContact:
         made = copy.copy(model)
         made.materials = [
-            (_changed(m, name, place, by) if i == number else m, groups)
+            (_changed(m, name, component, by) if i == number else m, groups)
             for i, (m, groups) in enumerate(model.materials)
         ]
         return replace(contact, problem=_with_model(contact.problem, made))
@@ -51,14 +51,14 @@ def check_constant(model: Model, asked: Asked) -> None:
 
 def _found(model: Model, asked: Asked) -> tuple[int, Material, int | None]:
     """Return the number of a material in the model, itself, and which of several components is asked for."""
-    found = [
+    matches = [
         (i, material) for i, (material, groups) in enumerate(model.materials)
         if asked[1] == i or (groups is not None and asked[1] in groups)
     ]  # fmt: skip
-    if not found:
+    if not matches:
         names = [name for _, groups in model.materials for name in groups or ()]
         raise ModelError(unknown("material", str(asked[1]), [*names, *map(str, range(len(model.materials)))]))
-    (number, material), name = found[0], str(asked[0])
+    (number, material), name = matches[0], str(asked[0])
     value = getattr(material, name, None)
     components = value if isinstance(value, tuple) else (value,)
     if value is None or any(map(varying, components)):
@@ -79,28 +79,28 @@ def _component(asked: Asked, names: Sequence[str]) -> int | None:
     return names.index(str(asked[2]))
 
 
-def _room(material: Material, name: str, place: int | None) -> float:
+def _room(material: Material, name: str, component: int | None) -> float:
     """Return by how much about a constant may change, all others kept."""
     value = getattr(material, name)
     if name == "expansion":  # forces are linear in it
         return 1.0 / CHANGED
     if name != "nu":
-        return float(value if place is None else value[place])
+        return float(value if component is None else value[component])
     if isinstance(material, LinearElastic):
         return min(0.5 - value, 1.0 + value)
     assert isinstance(material, Orthotropic)
-    assert place is not None
-    i, j = (int(axis) - 1 for axis in NAMES[place])
+    assert component is not None
+    i, j = (int(axis) - 1 for axis in NAMES[component])
     S = material.local_compliance[:3, :3]
     size = np.sqrt(np.diag(S))
     return float(np.linalg.eigvalsh(S / np.outer(size, size))[0] * size[j] / size[i])
 
 
-def _changed(material: Material, name: str, place: int | None, by: float) -> Material:
+def _changed(material: Material, name: str, component: int | None, by: float) -> Material:
     """Return the material with a constant, or one of its components, changed by a number."""
     value = getattr(material, name)
     if isinstance(value, tuple):
-        value = tuple(v + by * (place in (None, i)) for i, v in enumerate(value))
+        value = tuple(v + by * (component in (None, i)) for i, v in enumerate(value))
     else:
         value = value + by
     if isinstance(material, LinearElastic):
@@ -121,10 +121,10 @@ def _inside(contact: MovingContact) -> Array:
     """Return the internal forces of the materials (n_dofs,) less those of heat and initial states [force]."""
     problem = contact.problem
     model = problem.model
-    found = np.zeros(len(contact.u))
+    force = np.zeros(len(contact.u))
     inside = model.internal_forces(problem.displacement(contact.u))
     for by_ramp in (model.thermal_forces_by_ramp(), model.initial_forces_by_ramp()):
         if by_ramp:
             inside = inside - combined(by_ramp, problem.ramp, contact.instant, problem.displacement(contact.u).shape)
-    found[: model.n_dofs] = inside.ravel()
-    return found
+    force[: model.n_dofs] = inside.ravel()
+    return force

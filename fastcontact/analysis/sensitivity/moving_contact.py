@@ -108,25 +108,25 @@ class MovingContact:
 
     def at(self, u: Array) -> Sample:
         """Return forces, gaps and pressures of surfaces paired at u (n_dofs,), the displacements kept [length]."""
-        found, multiplier = self.constraints_at(u), self.solution.multiplier
-        if len(found) != len(multiplier):
+        constraints, multiplier = self.constraints_at(u), self.solution.multiplier
+        if len(constraints) != len(multiplier):
             raise ModelError(
-                f"contact has {len(multiplier)} constraints, and {len(found)} as soon as nodes move: both sides have "
+                f"contact has {len(multiplier)} constraints, and {len(constraints)} as soon as nodes move: both sides have "
                 f"nodes in common places, where results have one derivative to either side. {REMEDY}"
             )
-        gap = found.gap0 + found.B @ self.u
-        if found.normal_compliance is not None:
-            gap = gap + found.normal_compliance.apply(multiplier)
-        return Sample(found.force(multiplier), gap[self.active], self.pressure(multiplier, found))
+        gap = constraints.gap0 + constraints.B @ self.u
+        if constraints.normal_compliance is not None:
+            gap = gap + constraints.normal_compliance.apply(multiplier)
+        return Sample(constraints.force(multiplier), gap[self.active], self.pressure(multiplier, constraints))
 
-    def pressure(self, multiplier: Array, found: StackedConstraints | None = None) -> Array:
+    def pressure(self, multiplier: Array, constraints: StackedConstraints | None = None) -> Array:
         """Return the nodal pressures (n_nodes,) of the pair for multipliers (m,) [force] [pressure]."""
         if not self.pair:
             return np.empty(0)
-        found = found or self.constraints
+        constraints = constraints or self.constraints
         assert self.closed is not None
-        own = multiplier[found.rows()[self.pair]]
-        return nodal_pressure(self.problem.pairs[self.pair], found.parts[self.pair], own, self.closed)
+        forces = multiplier[constraints.rows()[self.pair]]
+        return nodal_pressure(self.problem.pairs[self.pair], constraints.parts[self.pair], forces, self.closed)
 
     def along(self, changed: Callable[[float], MovingContact], by: float) -> Array:
         """Return the derivative of `Sample.all` by a parameter; `changed` is the contact with it changed by a number."""
@@ -158,9 +158,9 @@ class MovingContact:
             return csr_array((size, n)), csr_array((size, n))
         if len(dofs) > FEW:
             owner = self._reached()
-            found = self._differences(_apart(dofs, owner, self.problem.model.mesh.dim), owner)
-            if self._agrees(0.5 * (found[0] + found[1]), dofs):
-                return found
+            derivatives = self._differences(_apart(dofs, owner, self.problem.model.mesh.dim), owner)
+            if self._agrees(0.5 * (derivatives[0] + derivatives[1]), dofs):
+                return derivatives
         return self._differences([np.array([dof]) for dof in dofs], None)
 
     def kinks(self, forward: csr_array, backward: csr_array) -> csr_array:
@@ -190,11 +190,11 @@ class MovingContact:
         dim, B = self.problem.model.mesh.dim, csr_array(self.constraints.B[self.active])
         keep = (B.indices < self.problem.model.n_dofs) & (B.data != 0.0)
         row = np.repeat(np.arange(B.shape[0]), np.diff(B.indptr))[keep]
-        found = csr_array(
+        pattern = csr_array(
             (np.ones(len(row)), (row, B.indices[keep] // dim)),
             shape=(len(self.active), self.problem.model.mesh.n_points),
         )
-        return _ones(found)
+        return _ones(pattern)
 
     def _reached(self) -> csr_array:
         """Return which points (n_points,) active constraints (k,) may depend on: those they involve, and those around."""
@@ -226,7 +226,7 @@ class MovingContact:
                 else:
                     column = self._owners(rows, dofs, owner)
                 columns[side].append(csr_array((changed[rows], (rows, column)), shape=(len(base), n)))
-        forward, backward = (csr_array(sum(part[1:], part[0])) for part in columns)
+        forward, backward = (csr_array(sum(columns_of_pair[1:], columns_of_pair[0])) for columns_of_pair in columns)
         return forward, backward
 
     def _owners(self, rows: Indices, dofs: Indices, owner: csr_array) -> Indices:
@@ -251,11 +251,13 @@ class MovingContact:
         """Return whether the derivative is that along a direction in which all points move at once."""
         shift = np.zeros(len(self.u))
         shift[dofs] = np.random.default_rng(0).uniform(-1.0, 1.0, len(dofs))
-        found = (self.at(self.u + self.step * shift).all - self.at(self.u - self.step * shift).all) / (2 * self.step)
+        difference = (self.at(self.u + self.step * shift).all - self.at(self.u - self.step * shift).all) / (
+            2 * self.step
+        )
         n, k = len(self.u), len(self.active)
-        off = np.abs(found - derivative @ shift)
+        off = np.abs(difference - derivative @ shift)
         parts = (slice(0, n), slice(n, n + k), slice(n + k, None))
-        return all(off[p].max(initial=0.0) <= TOGETHER * np.abs(found[p]).max(initial=0.0) for p in parts)
+        return all(off[p].max(initial=0.0) <= TOGETHER * np.abs(difference[p]).max(initial=0.0) for p in parts)
 
 
 def _apart(dofs: Indices, reached: csr_array, dim: int) -> list[Indices]:
@@ -271,8 +273,8 @@ def _apart(dofs: Indices, reached: csr_array, dim: int) -> list[Indices]:
         colour[point] = next(c for c in range(len(points)) if c not in taken)
     groups: list[Indices] = []
     for c in range(max(colour.values(), default=-1) + 1):
-        own = np.array([p for p, found in colour.items() if found == c], np.intp)
-        groups += [own * dim + axis for axis in range(dim)]
+        group = np.array([p for p, c_of_node in colour.items() if c_of_node == c], np.intp)
+        groups += [group * dim + axis for axis in range(dim)]
     return groups + [np.array([dof]) for dof in dofs[dofs >= n_points * dim]]
 
 

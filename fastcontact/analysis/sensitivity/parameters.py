@@ -85,11 +85,11 @@ def _on(items: Sequence[Item], group: str) -> list[Item]:
 
 def _named(kind: str, items: Sequence[Item], asked: Asked, others: Sequence[str] = ()) -> list[Item]:
     """Return the loads or temperatures on a group; ModelError if there are none, and no other thing has that name."""
-    found = _on(items, str(asked[1]))
-    if not found and asked[1] not in others:
+    items_of_group = _on(items, str(asked[1]))
+    if not items_of_group and asked[1] not in others:
         names = [place for item in items for place in item.places]
         raise ModelError(unknown(kind, str(asked[1]), list(dict.fromkeys([*names, *others]))))
-    return found
+    return items_of_group
 
 
 def _loads(model: Model, asked: Asked) -> list[Load]:
@@ -100,11 +100,11 @@ def _loads(model: Model, asked: Asked) -> list[Load]:
 
 def _forces(contact: MovingContact, loads: Sequence[Load]) -> Array:
     """Return the nodal forces (n_dofs,) of loads at the end of the step [force]."""
-    problem, found = contact.problem, np.zeros(len(contact.u))
+    problem, force = contact.problem, np.zeros(len(contact.u))
     for load in loads:
         forces = problem.model.load_vector(load).ravel() * multiplier(load.ramp, problem.ramp, contact.instant)
-        found[: problem.model.n_dofs] += forces
-    return found
+        force[: problem.model.n_dofs] += forces
+    return force
 
 
 def _of_load(contact: MovingContact, asked: Asked) -> Change:
@@ -150,8 +150,8 @@ def _of_temperature(contact: MovingContact, asked: Asked) -> Change:
 
 def _pretension(model: Model, asked: Asked) -> Pretension:
     """Return a pretension section."""
-    found: Pretension = _one("pretension", {own.label: own for own in model.pretensions}, asked)
-    return found
+    section: Pretension = _one("pretension", {item.label: item for item in model.pretensions}, asked)
+    return section
 
 
 def _of_pretension(contact: MovingContact, asked: Asked) -> Change:
@@ -208,8 +208,8 @@ def _lifted(contact: MovingContact, values: Array, along: Sequence[int]) -> Chan
 def _moved(model: Model, asked: Asked) -> ContactPair:
     """Return the pair of a rigid obstacle that is moved."""
     moved = {pair.name: pair for pair in model.contact if any(pair.motion)}
-    found: ContactPair = _one("rigid obstacle with a motion", moved, asked)
-    return found
+    obstacle: ContactPair = _one("rigid obstacle with a motion", moved, asked)
+    return obstacle
 
 
 def _of_motion(contact: MovingContact, asked: Asked) -> Change:

@@ -68,13 +68,13 @@ def _axis(model: Model, asked: Asked) -> int:
     return axes.index(str(asked[-1]))
 
 
-def _point(model: Model, place: str | int) -> int:
+def _point(model: Model, point: str | int) -> int:
     """Return a point, by its number or the name of a group that holds it alone."""
-    if isinstance(place, str):
-        return int(model.mesh.point(place))
-    if not 0 <= place < model.mesh.n_points:
-        raise ModelError(f"point {place} is not in the mesh of {model.mesh.n_points} points (numbers from 0)")
-    return place
+    if isinstance(point, str):
+        return int(model.mesh.point(point))
+    if not 0 <= point < model.mesh.n_points:
+        raise ModelError(f"point {point} is not in the mesh of {model.mesh.n_points} points (numbers from 0)")
+    return point
 
 
 def _reaction(contact: MovingContact, none: Gradient, asked: Asked) -> Gradient:
@@ -86,18 +86,18 @@ def _reaction(contact: MovingContact, none: Gradient, asked: Asked) -> Gradient:
         )
     whole = np.zeros(len(contact.u))
     whole[points * model.mesh.dim + axis] = 1.0
-    own = contact.problem.system.balance(whole)[0]
-    if not own.any():
+    balance = contact.problem.system.balance(whole)[0]
+    if not balance.any():
         raise ModelError(f"no support acts along {asked[-1]} on group '{asked[1]}': its reaction is zero")
     force = contact.at(contact.u).force if contact.problem.pairs else 0.0
     out = contact.problem.system.K @ contact.u - contact.load.force - force
-    return replace(none, value=float(own @ out), reaction=own)
+    return replace(none, value=float(balance @ out), reaction=balance)
 
 
 def _contact_force(contact: MovingContact, none: Gradient, step: StepResult, asked: Asked) -> Gradient:
-    found, axis = step.contact[str(asked[1])], _axis(contact.problem.model, asked)
+    contact_of_step, axis = step.contact[str(asked[1])], _axis(contact.problem.model, asked)
     others = [name for name in contact.problem.pairs if name != asked[1]]
-    nodes = np.setdiff1d(found.points, found.primary_points)
+    nodes = np.setdiff1d(contact_of_step.points, contact_of_step.primary_points)
     for name in others:
         theirs = contact.problem.pairs[name]
         shared = np.intersect1d(nodes, [*theirs.secondary.points, *getattr(theirs.primary, "points", ())])
@@ -111,33 +111,33 @@ def _contact_force(contact: MovingContact, none: Gradient, step: StepResult, ask
     sample = np.zeros(size)
     sample[nodes * dim + axis] = 1.0
     rows = contact.constraints.B[contact.active]
-    return replace(none, value=float(found.force[axis]), multiplier=rows @ sample[:n], sample=sample)
+    return replace(none, value=float(contact_of_step.force[axis]), multiplier=rows @ sample[:n], sample=sample)
 
 
 def _pressure(contact: MovingContact, none: Gradient, step: StepResult, asked: Asked) -> tuple[MovingContact, Gradient]:
-    name, found = str(asked[1]), step.contact[str(asked[1])]
-    place = int(found.pressure.argmax())
+    name, result = str(asked[1]), step.contact[str(asked[1])]
+    row = int(result.pressure.argmax())
     if asked[0] == "pressure":
         point = _point(contact.problem.model, asked[2])
-        places = np.flatnonzero(found.points == point)
+        places = np.flatnonzero(result.points == point)
         if not len(places):
             raise ModelError(f"point {point} is no node of the secondary side of contact '{name}'")
-        place = int(places[0])
-    if not found.active[place]:
-        raise ModelError(f"point {found.points[place]} of contact '{name}' is open: its pressure is zero")
-    if contact.problem.model.seams:
+        row = int(places[0])
+    if not result.active[row]:
+        raise ModelError(f"point {result.points[row]} of contact '{name}' is open: its pressure is zero")
+    if contact.problem.model.periodic_interfaces:
         raise ModelError(
             "pressures of a part that repeats itself have no sensitivities: ask for a force or a displacement"
         )
-    contact = replace(contact, pair=name, closed=found.active)
+    contact = replace(contact, pair=name, closed=result.active)
     multiplier, by_multiplier = contact.solution.multiplier, none.multiplier
-    own, rows = contact.constraints.rows()[name], contact.active
-    size = float(np.abs(multiplier[own]).max(initial=0.0)) or 1.0
-    base = contact.pressure(multiplier)[place]
-    for k in np.flatnonzero((rows >= own.start) & (rows < own.stop)):
+    rows_of_pair, rows = contact.constraints.rows()[name], contact.active
+    size = float(np.abs(multiplier[rows_of_pair]).max(initial=0.0)) or 1.0
+    base = contact.pressure(multiplier)[row]
+    for k in np.flatnonzero((rows >= rows_of_pair.start) & (rows < rows_of_pair.stop)):
         more = multiplier.copy()
         more[rows[k]] += 1e-3 * size
-        by_multiplier[k] = (contact.pressure(more)[place] - base) / (1e-3 * size)
-    sample = np.zeros(len(contact.u) + len(rows) + len(found.points))
-    sample[len(contact.u) + len(rows) + place] = 1.0
+        by_multiplier[k] = (contact.pressure(more)[row] - base) / (1e-3 * size)
+    sample = np.zeros(len(contact.u) + len(rows) + len(result.points))
+    sample[len(contact.u) + len(rows) + row] = 1.0
     return contact, replace(none, value=float(base), sample=sample)

@@ -35,7 +35,7 @@ def settled_step(
     restart.check(step, case, model)
     model.check(ramp)
     problem = prepare(model, ramp, criteria, linear_solver=linear_solver)
-    touched = frozenset(name for name, found in step.contact.items() if found.active.any())
+    touched = frozenset(name for name, contact in step.contact.items() if contact.active.any())
     state, load = restart.put_back(problem, step, touched), problem.load_at(step.load_factor)
     state = replace(state, obstacles=problem.obstacles_at(load, state.u))
     loaded = with_loads(problem, load)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact.arrays import Array, Mask
-from fastcontact.cases.decks.blocks import Place, folded
+from fastcontact.cases.decks.blocks import Location, folded
 from fastcontact.cases.decks.content import Cell, Content, Instance, Members, Part, Section, SurfaceDefinition
 from fastcontact.cases.decks.element_types import ElementType, element_type
 from fastcontact.mesh import elements
@@ -78,12 +78,14 @@ class Assembled:
     @cached_property
     def solids(self) -> list[Element]:
         """All solids."""
-        return [own for elements in self.elements.values() for own in elements.values() if own.type is not None]
+        return [
+            element for elements in self.elements.values() for element in elements.values() if element.type is not None
+        ]
 
     @cached_property
     def discrete(self) -> list[Element]:
         """All gap elements and springs."""
-        return [own for elements in self.elements.values() for own in elements.values() if own.type is None]
+        return [element for elements in self.elements.values() for element in elements.values() if element.type is None]
 
     def part(self, scope: str) -> Part:
         """Return the part of an instance, or what belongs to none."""
@@ -102,130 +104,137 @@ class Assembled:
                 return scope, text[len(scope) + 1 :]
         return "", text
 
-    def members(self, kind: str, name: str, place: Place) -> list[Any]:
+    def members(self, kind: str, name: str, location: Location) -> list[Any]:
         """Return the points of nodes, or the elements (`kind`), of a set or a number; CaseError if there is none."""
         scope, rest = self.place_of(name)
         if rest.isdecimal():
-            return [self._existing(kind, scope, int(rest[:19]), place)]
-        return self.members_of(kind, scope, rest, place, name)
+            return [self._existing(kind, scope, int(rest[:19]), location)]
+        return self.members_of(kind, scope, rest, location, name)
 
-    def members_of(self, kind: str, scope: str, name: str, place: Place, shown: str = "") -> list[Any]:
+    def members_of(self, kind: str, scope: str, name: str, location: Location, shown: str = "") -> list[Any]:
         """Return the points or elements of a set that is defined in an instance, sets of sets included."""
         part, label = self.part(scope), (kind, scope, name)
         sets = part.node_sets if kind == "node" else part.element_sets
         if name not in sets:
             known = sorted({part.set_names[key] for key in sets})
             listed = ", ".join(known[:SHOWN]) + (", ..." if len(known) > SHOWN else "") or "none"
-            raise place.refuse(f"set '{(shown or name)[:LONGEST]}' is not defined; {kind} sets: {listed}")
+            raise location.refuse(f"set '{(shown or name)[:LONGEST]}' is not defined; {kind} sets: {listed}")
         if label not in self.resolved:
             if label in self.open:
-                raise place.refuse(f"set '{part.set_names[name]}' contains itself")
+                raise location.refuse(f"set '{part.set_names[name]}' contains itself")
             self.open.append(label)
-            found = [own for entry in sets[name] for own in self._entry(kind, scope, entry)]
+            members = [own for entry in sets[name] for own in self._entry(kind, scope, entry)]
             self.open.pop()
-            self.resolved[label] = list(dict.fromkeys(found)) if len(sets[name]) > 1 or len(found) > 1 else found
+            self.resolved[label] = list(dict.fromkeys(members)) if len(sets[name]) > 1 or len(members) > 1 else members
         return self.resolved[label]
 
     def _entry(self, kind: str, scope: str, entry: Members) -> Iterable[Any]:
         scope = entry.instance or scope
         if scope and scope not in self.content.instances:
             known = ", ".join(instance.name for instance in self.content.instances.values()) or "none"
-            raise entry.place.refuse(f"instance '{scope}' is not defined; instances: {known}")
+            raise entry.location.refuse(f"instance '{scope}' is not defined; instances: {known}")
         if entry.name:
             return self._named(kind, scope, entry)
         numbers = entry.numbers
         if not isinstance(numbers, range):
-            return (self._existing(kind, scope, number, entry.place) for number in numbers)
+            return (self._existing(kind, scope, number, entry.location) for number in numbers)
         there = self._there(kind, scope)
-        found = [n for n in (numbers if len(numbers) <= len(there) else sorted(there)) if n in there and n in numbers]
-        if len(found) < len(numbers):
-            absent = f"{len(numbers) - len(found)} of the {len(numbers)} numbers {numbers[0]} to {numbers[-1]}"
-            self.content.note(entry.place, f"{absent} are no {kind}s and left out")
-        return (there[n] for n in found)
+        numbers_there = [
+            n for n in (numbers if len(numbers) <= len(there) else sorted(there)) if n in there and n in numbers
+        ]
+        if len(numbers_there) < len(numbers):
+            absent = f"{len(numbers) - len(numbers_there)} of the {len(numbers)} numbers {numbers[0]} to {numbers[-1]}"
+            self.content.note(entry.location, f"{absent} are no {kind}s and left out")
+        return (there[n] for n in numbers_there)
 
     def _named(self, kind: str, scope: str, entry: Members) -> Iterable[Any]:
         if not scope and any(entry.name.upper().startswith(name) for name in self.content.instances):
-            return self.members(kind, entry.name, entry.place)
+            return self.members(kind, entry.name, entry.location)
         part, name = self.part(scope), folded(entry.name)
         if kind == "node" and name not in part.node_sets and name in part.element_sets:
-            return (point for own in self.members_of("element", scope, name, entry.place) for point in own.points)
-        return self.members_of(kind, scope, name, entry.place, entry.name)
+            return (
+                point for element in self.members_of("element", scope, name, entry.location) for point in element.points
+            )
+        return self.members_of(kind, scope, name, entry.location, entry.name)
 
     def _there(self, kind: str, scope: str) -> Mapping[int, Any]:
         """Return the points or elements of an instance by their numbers."""
         return self.index.get(scope, {}) if kind == "node" else self.elements.get(scope, {})
 
-    def _existing(self, kind: str, scope: str, number: int, place: Place) -> Any:
-        found = self._there(kind, scope).get(number)
-        if found is None:
+    def _existing(self, kind: str, scope: str, number: int, location: Location) -> Any:
+        item = self._there(kind, scope).get(number)
+        if item is None:
             where = f" in instance '{self.content.instances[scope].name}'" if scope else ""
-            raise place.refuse(f"{kind} {number} is not defined{where}")
-        return found
+            raise location.refuse(f"{kind} {number} is not defined{where}")
+        return item
 
-    def nodes(self, name: str, place: Place) -> list[int]:
+    def nodes(self, name: str, location: Location) -> list[int]:
         """Return the points of a node set or a single node; errors as for `members`."""
-        return self.members("node", name, place)
+        return self.members("node", name, location)
 
-    def elements_of(self, name: str, place: Place) -> list[Element]:
+    def elements_of(self, name: str, location: Location) -> list[Element]:
         """Return the elements of a set or a single one; errors as for `members`."""
-        return self.members("element", name, place)
+        return self.members("element", name, location)
 
-    def node(self, name: str, place: Place) -> int:
+    def node(self, name: str, location: Location) -> int:
         """Return the only point of a node set, or of a number; errors as for `keys`, or if there are several."""
-        found = self.nodes(name, place)
-        if len(found) != 1:
-            raise place.refuse(f"'{name}' holds {len(found)} nodes where one is needed")
-        return found[0]
+        nodes = self.nodes(name, location)
+        if len(nodes) != 1:
+            raise location.refuse(f"'{name}' holds {len(nodes)} nodes where one is needed")
+        return nodes[0]
 
-    def faces(self, name: str, place: Place) -> list[Face]:
+    def faces(self, name: str, location: Location) -> list[Face]:
         """Return the elements of a surface and the place of each face among the facets of its element."""
-        definition, scope = self.surface(name, place)
+        definition, scope = self.surface(name, location)
         if definition.of_nodes:
             whole, _, left = self.faces_of_nodes(definition, scope)
             if left:
-                raise definition.place.refuse(
-                    f"the nodes of surface '{definition.name}' make up no whole faces: {len(left)} belong to none (first: "
-                    f"node {self.number_of(left[0])}), and *{place.keyword} in line {place.line} needs faces, TYPE=ELEMENT"
+                raise definition.location.refuse(
+                    f"the nodes of surface '{definition.name}' make up no whole faces: {len(left)} belong to none "
+                    f"(first: node {self.number_of(left[0])}), and *{location.keyword} in line {location.line} "
+                    "needs faces, TYPE=ELEMENT"
                 )
             return whole
         if (label := folded(name)) not in self.surfaces:
-            found: dict[Face, None] = {}
+            faces: dict[Face, None] = {}
             for face in definition.faces:
-                own = self.elements_of(face.of if not scope else f"{scope}.{face.of}", face.place)
+                members = self.elements_of(face.of if not scope else f"{scope}.{face.of}", face.location)
                 if face.label:
-                    entries = [(element, self.facet(element, int(face.label[1:]), face.place)) for element in own]
+                    entries = [
+                        (element, self.facet(element, int(face.label[1:]), face.location)) for element in members
+                    ]
                 else:
-                    entries = [entry for element in own for entry in self._free_faces(element, face.place)]
-                found.update(dict.fromkeys(entries))
-            self.surfaces[label] = list(found)
+                    entries = [entry for element in members for entry in self._free_faces(element, face.location)]
+                faces.update(dict.fromkeys(entries))
+            self.surfaces[label] = list(faces)
         return self.surfaces[label]
 
-    def surface(self, name: str, place: Place) -> tuple[SurfaceDefinition, str]:
+    def surface(self, name: str, location: Location) -> tuple[SurfaceDefinition, str]:
         """Return the definition of a surface and the instance it stands in; CaseError if there is none."""
         scope, rest = self.place_of(name)
         surfaces = self.part(scope).surfaces
         if rest not in surfaces:
             known = ", ".join(sorted(other.name for other in surfaces.values())) or "none"
-            raise place.refuse(f"surface '{name[:80]}' is not defined; surfaces: {known}")
+            raise location.refuse(f"surface '{name[:80]}' is not defined; surfaces: {known}")
         if not surfaces[rest].faces:
-            raise surfaces[rest].place.refuse(f"surface '{surfaces[rest].name[:80]}' has no faces")
+            raise surfaces[rest].location.refuse(f"surface '{surfaces[rest].name[:80]}' has no faces")
         return surfaces[rest], scope
 
-    def facet(self, element: Element, label: int, place: Place) -> int:
+    def facet(self, element: Element, label: int, location: Location) -> int:
         """Return the place of the face with a label, 1 and up, among the facets of its element."""
         if element.type is None:
-            raise place.refuse(f"element {element.number} is no solid, so it has no faces")
+            raise location.refuse(f"element {element.number} is no solid, so it has no faces")
         faces = element.type.faces
         if not 1 <= label <= len(faces):
-            raise place.refuse(
+            raise location.refuse(
                 f"element {element.number} of type {element.type.name} has no face {label}, only 1 to {len(faces)}"
             )
         return matching(element.type.element)[label - 1]
 
-    def _free_faces(self, element: Element, place: Place) -> Iterator[Face]:
+    def _free_faces(self, element: Element, location: Location) -> Iterator[Face]:
         """Yield the faces of an element that no other one shares."""
         if element.type is None:
-            raise place.refuse(f"element {element.number} is no solid, so it has no faces")
+            raise location.refuse(f"element {element.number} is no solid, so it has no faces")
         facets = matching(element.type.element)
         for label in np.flatnonzero(self.free[element.type.element][element.row]).tolist():
             yield element, facets[label]
@@ -234,14 +243,14 @@ class Assembled:
     def free(self) -> dict[str, Mask]:
         """Which faces (n_elements, n_faces), by label, of the solids of each kind no other solid shares."""
         corners, shapes = [], {}
-        for name, own in self.by_kind.items():
-            points = np.array([element.points for element in own], np.int32)
-            faces = own[0].solid.faces
-            shapes[name] = len(own), len(faces)
-            found = np.full((len(own), len(faces), 4), -1, np.int32)
+        for name, members in self.by_kind.items():
+            points = np.array([element.points for element in members], np.int32)
+            faces = members[0].solid.faces
+            shapes[name] = len(members), len(faces)
+            neighbours = np.full((len(members), len(faces), 4), -1, np.int32)
             for label, face in enumerate(faces):
-                found[:, label, : len(face)] = np.sort(points[:, list(face)], axis=1)
-            corners.append(found.reshape(-1, 4))
+                neighbours[:, label, : len(face)] = np.sort(points[:, list(face)], axis=1)
+            corners.append(neighbours.reshape(-1, 4))
         _, inverse, count = np.unique(np.concatenate(corners), axis=0, return_inverse=True, return_counts=True)
         ends = np.cumsum([n * m for n, m in shapes.values()])
         parts = np.split(count[inverse.ravel()] == 1, ends[:-1])
@@ -250,23 +259,23 @@ class Assembled:
     @cached_property
     def by_kind(self) -> dict[str, list[Element]]:
         """The solids by the element that they become, each at its `row`."""
-        found: dict[str, list[Element]] = {}
+        elements: dict[str, list[Element]] = {}
         for element in self.solids:
-            found.setdefault(element.solid.element, []).append(element)
-        return found
+            elements.setdefault(element.solid.element, []).append(element)
+        return elements
 
     @cached_property
     def outer(self) -> dict[int, list[tuple[Face, frozenset[int]]]]:
         """Which outer faces the points have, each with its corners."""
-        found: dict[int, list[tuple[Face, frozenset[int]]]] = {}
-        for name, own in self.by_kind.items():
-            facets, faces = matching(name), own[0].solid.faces
+        by_part: dict[int, list[tuple[Face, frozenset[int]]]] = {}
+        for name, members in self.by_kind.items():
+            facets, faces = matching(name), members[0].solid.faces
             for row, label in np.argwhere(self.free[name]).tolist():
-                face = own[row], facets[label]
-                corners = frozenset(own[row].points[i] for i in faces[label])
+                face = members[row], facets[label]
+                corners = frozenset(members[row].points[i] for i in faces[label])
                 for point in facet_points(*face):
-                    found.setdefault(point, []).append((face, corners))
-        return found
+                    by_part.setdefault(point, []).append((face, corners))
+        return by_part
 
     def faces_within(self, points: set[int]) -> list[Face]:
         """Return the outer faces all of whose corners are among points."""
@@ -275,8 +284,8 @@ class Assembled:
 
     def surface_nodes(self, definition: SurfaceDefinition, scope: str) -> list[int]:
         """Return the points of a surface of nodes, each once."""
-        given = [(face.of if not scope else f"{scope}.{face.of}", face.place) for face in definition.faces]
-        return list(dict.fromkeys(point for name, place in given for point in self.nodes(name, place)))
+        given = [(face.of if not scope else f"{scope}.{face.of}", face.location) for face in definition.faces]
+        return list(dict.fromkeys(point for name, location in given for point in self.nodes(name, location)))
 
     def number_of(self, point: int) -> str:
         """Return how the deck names the node of a point."""
@@ -330,18 +339,18 @@ def assembled(content: Content) -> Assembled:
         places.append(_placed(part, content.instances.get(scope)))
         index = made.index[scope] = dict(zip(part.nodes, range(total, total + len(part.nodes)), strict=True))
         total += len(index)
-        found = made.elements[scope] = {}
+        elements = made.elements[scope] = {}
         for number, cell in part.cells.items():
             points = tuple(index.get(node, -1) for node in cell.nodes)
             if -1 in points:
-                raise cell.place.refuse(
+                raise cell.location.refuse(
                     f"element {number} uses node {cell.nodes[points.index(-1)]}, which is not defined"
                 )
             kind = element_type(cell.type)
             row = -1 if kind is None else counts.setdefault(kind.element, 0)
             if kind is not None:
                 counts[kind.element] += 1
-            found[number] = Element(scope, number, cell, kind, points, row)
+            elements[number] = Element(scope, number, cell, kind, points, row)
     made.points = np.concatenate(places)
     return made
 

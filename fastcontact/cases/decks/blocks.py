@@ -19,7 +19,7 @@ LARGEST_WHOLE = 1 << 53  # beyond, floating-point numbers leave some out
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class Location:
     """A line of a file, and the keyword to which it belongs."""
 
     file: str
@@ -38,7 +38,7 @@ class Place:
 class Row:
     """A data line: its entries without blanks around them, and its place."""
 
-    place: Place
+    location: Location
     entries: tuple[str, ...]
     goes_on: bool = False
 
@@ -51,15 +51,15 @@ class Row:
         text = self.text(index)
         if not text:
             if default is None:
-                raise self.place.refuse(f"entry {index + 1} is missing: a number is needed")
+                raise self.location.refuse(f"entry {index + 1} is missing: a number is needed")
             return default
-        return as_number(self.place, text)
+        return as_number(self.location, text)
 
     def whole(self, index: int, default: int | None = None) -> int:
         """Return an entry as a whole number; errors as for `number`."""
         value = self.number(index, default)
         if value != int(value) or abs(value) > LARGEST_WHOLE:
-            raise self.place.refuse(f"'{self.text(index)[:LONGEST_QUOTED]}' is no whole number")
+            raise self.location.refuse(f"'{self.text(index)[:LONGEST_QUOTED]}' is no whole number")
         return int(value)
 
 
@@ -67,27 +67,27 @@ class Row:
 class Lines:
     """The data lines of a keyword as they stand in a file, from a line number on: rows are made when they are asked for."""
 
-    place: Place
+    location: Location
     texts: tuple[str, ...] = ()
 
     def __iter__(self) -> Iterator[Row]:
-        for number, raw in enumerate(self.texts, start=self.place.line):
+        for number, raw in enumerate(self.texts, start=self.location.line):
             if not (line := raw.strip()).startswith("**"):
-                yield _row(Place(self.place.file, number, self.place.keyword), line)
+                yield _row(Location(self.location.file, number, self.location.keyword), line)
 
 
 @dataclass(frozen=True, slots=True)
 class Block:
     """A keyword with its parameters (names in upper case, without values None) and all its data lines."""
 
-    place: Place
+    location: Location
     parameters: dict[str, str | None]
     lines: Iterable[Row] = ()
 
     @property
     def keyword(self) -> str:
         """Return the keyword in upper case, without its asterisk."""
-        return self.place.keyword
+        return self.location.keyword
 
     @property
     def rows(self) -> list[Row]:
@@ -105,16 +105,16 @@ class Block:
     def choice(self, name: str, known: tuple[str, ...]) -> str:
         """Return the value of a parameter in upper case, the first of `known` by default; CaseError if it is another."""
         value = self.get(name, known[0]).upper()
-        for one in known:
-            if value.replace(" ", "") == one.replace(" ", ""):
-                return one
-        raise self.place.refuse(f"{name}={value[:LONGEST_QUOTED]} is not supported; known are {', '.join(known)}")
+        for option in known:
+            if value.replace(" ", "") == option.replace(" ", ""):
+                return option
+        raise self.location.refuse(f"{name}={value[:LONGEST_QUOTED]} is not supported; known are {', '.join(known)}")
 
     def required(self, name: str) -> str:
         """Return the value of a parameter; CaseError if there is none."""
         value = self.parameters.get(name)
         if not value:
-            raise self.place.refuse(f"the parameter {name} is missing")
+            raise self.location.refuse(f"the parameter {name} is missing")
         return value
 
 
@@ -129,14 +129,14 @@ class Source:
     open: list[Path] = field(default_factory=list)
 
 
-def as_number(place: Place, text: str) -> float:
+def as_number(location: Location, text: str) -> float:
     """Return a text as a finite number, also as Fortran writes it (1.D5); CaseError otherwise."""
     try:
         value = float(text.upper().replace("D", "E")) if text[:1].upper() not in "IN" else float("nan")
     except ValueError:
-        raise place.refuse(f"'{text[:LONGEST_QUOTED]}' is no number") from None
+        raise location.refuse(f"'{text[:LONGEST_QUOTED]}' is no number") from None
     if "_" in text or value != value or value in (float("inf"), float("-inf")):
-        raise place.refuse(f"'{text[:LONGEST_QUOTED]}' is no number that could be used")
+        raise location.refuse(f"'{text[:LONGEST_QUOTED]}' is no number that could be used")
     return value
 
 
@@ -198,17 +198,17 @@ def _blocks(path: Path, name: str, source: Source) -> Iterator[Block]:
             continue
         if len(line) > LONGEST_LINE:
             keyword = _keyword(line) if line.startswith("*") else current.keyword if current else ""
-            raise Place(name, number, keyword).refuse(_TOO_LONG)
+            raise Location(name, number, keyword).refuse(_TOO_LONG)
         if not line.startswith("*"):
             if line and current is None:
-                raise Place(name, number, "").refuse("a data line before any keyword")
+                raise Location(name, number, "").refuse("a data line before any keyword")
             continue
         if current is not None:
             yield _with_lines(current, texts, begin, number - 1, source)
-        place = Place(name, number, _keyword(line))
-        line, begin = _continued(place, line, lines, number)
-        current = Block(place, _parameters(place, line))
-        if place.keyword == "INCLUDE":
+        location = Location(name, number, _keyword(line))
+        line, begin = _continued(location, line, lines, number)
+        current = Block(location, _parameters(location, line))
+        if location.keyword == "INCLUDE":
             yield from _included(current, name, source)
             current = None
     if current is not None:
@@ -220,18 +220,18 @@ def _with_lines(block: Block, texts: list[str], begin: int, end: int, source: So
     """Return a block with the lines of a file from one to another, counted from 0."""
     if not source.with_data or begin >= end:
         return block
-    place = Place(block.place.file, begin + 1, block.keyword)
-    return Block(block.place, block.parameters, Lines(place, tuple(texts[begin:end])))
+    location = Location(block.location.file, begin + 1, block.keyword)
+    return Block(block.location, block.parameters, Lines(location, tuple(texts[begin:end])))
 
 
-def _continued(place: Place, line: str, lines: Iterator[tuple[int, str]], number: int) -> tuple[str, int]:
+def _continued(location: Location, line: str, lines: Iterator[tuple[int, str]], number: int) -> tuple[str, int]:
     """Return the keyword line of a number with the lines on which it goes on, after a comma, and the number of the last."""
     while line.endswith(","):
         number, more = next(lines, (number, ""))
         if not more.strip().startswith("**"):
             line = f"{line} {more.strip()}"
         if len(line) > LONGEST_LINE:
-            raise place.refuse(_TOO_LONG)
+            raise location.refuse(_TOO_LONG)
         if not more:
             break
     return line, number
@@ -256,21 +256,21 @@ def _parts(line: str) -> list[str]:
     return [part.strip() for part in parts]
 
 
-def _parameters(place: Place, line: str) -> dict[str, str | None]:
-    found: dict[str, str | None] = {}
+def _parameters(location: Location, line: str) -> dict[str, str | None]:
+    parameters: dict[str, str | None] = {}
     for part in _parts(line)[1:]:
         key, equal, value = part.partition("=")
         key = " ".join(key.upper().split())
-        if key in found:
-            raise place.refuse(f"the parameter {key} stands there twice")
+        if key in parameters:
+            raise location.refuse(f"the parameter {key} stands there twice")
         if key:
-            found[key] = unquoted(value.strip()) if equal else None
-    return found
+            parameters[key] = unquoted(value.strip()) if equal else None
+    return parameters
 
 
-def _row(place: Place, line: str) -> Row:
+def _row(location: Location, line: str) -> Row:
     goes_on = line.endswith(",")
-    return Row(place, tuple(_parts(line[:-1] if goes_on else line)), goes_on)
+    return Row(location, tuple(_parts(line[:-1] if goes_on else line)), goes_on)
 
 
 def _included(block: Block, name: str, source: Source) -> Iterator[Block]:
@@ -278,21 +278,21 @@ def _included(block: Block, name: str, source: Source) -> Iterator[Block]:
     given = block.required("INPUT")
     for parameter in block.parameters:
         if parameter != "INPUT":
-            raise block.place.refuse(f"the parameter {parameter} is not supported")
+            raise block.location.refuse(f"the parameter {parameter} is not supported")
     shown, path = given[:LONGEST_QUOTED], source.folder / given.replace("\\", "/")
     try:
         target = path.resolve()
         inside = target.is_relative_to(source.folder)
         there = inside and target.is_file()
     except (OSError, ValueError, RuntimeError):
-        raise block.place.refuse(f"'{shown}' is no name of a file") from None
+        raise block.location.refuse(f"'{shown}' is no name of a file") from None
     if not inside:
-        raise block.place.refuse(
+        raise block.location.refuse(
             f"'{shown}' is outside of the folder of the deck: refused, copy the file below '{source.folder}'"
         )
     if not there:
-        raise block.place.refuse(f"file '{shown}' not found beside the deck, in '{source.folder}'")
+        raise block.location.refuse(f"file '{shown}' not found beside the deck, in '{source.folder}'")
     if target in source.open:
-        what = "the deck" if target == source.open[0] else f"'{shown}'"
-        raise block.place.refuse(f"{what} includes itself")
+        target_name = "the deck" if target == source.open[0] else f"'{shown}'"
+        raise block.location.refuse(f"{target_name} includes itself")
     yield from _blocks(target, given, source)

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import Assembled, Element, assembled, facet_points
-from fastcontact.cases.decks.blocks import Place, folded
+from fastcontact.cases.decks.blocks import Location, folded
 from fastcontact.cases.decks.conditions import Acting, Component, Conditions, Distributed
 from fastcontact.cases.decks.content import Content, Interaction, Material, Pair, Section, Step
 from fastcontact.cases.decks.cyclic_symmetry import add_sectors
@@ -32,8 +32,8 @@ from fastcontact.contact.obstacles.shapes import HalfSpace
 from fastcontact.elasticity.anisotropic_materials import Orthotropic
 from fastcontact.elasticity.material_axes import CylindricalAxes
 from fastcontact.elasticity.materials import LinearElastic
+from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, TemporaryConstraint
 from fastcontact.elasticity.nonlinear_materials import NonlinearElastic
-from fastcontact.elasticity.relations import Relation, TemporaryRelation
 from fastcontact.errors import FastcontactError
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, Table
@@ -52,7 +52,7 @@ class Building:
     model : Model
     thickness : float
         Of a plane model; forces of the model are those of a unit of it [length].
-    local_supports : list of Relation
+    local_supports : list of MultiPointConstraint
         Relations that are supports: those along local axes, and those that come or go between steps.
     linearised : str
         Why small strains are solved although a step has NLGEOM; empty where not.
@@ -76,7 +76,7 @@ class Building:
         self.model = Model(mesh, self.found.kinematics, case_text, strain=strain)
         for material, group in materials:
             self.model.add_material(material, group)
-        self.local_supports: list[Relation] = []
+        self.local_supports: list[MultiPointConstraint] = []
         self._supports(conditions)
         self.links = relations_of(self.found, self.model.mesh)
         self.model.relations.extend(self.links)
@@ -99,17 +99,17 @@ class Building:
             for section in self.made.part(scope).sections:
                 self._material(section)
                 if self.found.dim == 2 and self.found.kinematics != "axisymmetric":
-                    own = 1.0 if section.thickness is None else section.thickness
-                    if thickness is not None and own != thickness:
-                        raise section.place.refuse(
-                            f"thickness {own:g} after {thickness:g}: plane models have one thickness"
+                    section_thickness = 1.0 if section.thickness is None else section.thickness
+                    if thickness is not None and section_thickness != thickness:
+                        raise section.location.refuse(
+                            f"thickness {section_thickness:g} after {thickness:g}: plane models have one thickness"
                         )
-                    thickness = own
+                    thickness = section_thickness
                 name = f"{scope}.{section.elements}" if scope else section.elements
-                for element in self.made.elements_of(name, section.place):
+                for element in self.made.elements_of(name, section.location):
                     if element.section not in (None, section):
-                        raise section.place.refuse(
-                            f"element {element.number} has a section already, in line {element.section.place.line}"
+                        raise section.location.refuse(
+                            f"element {element.number} has a section already, in line {element.section.location.line}"
                         )
                     element.section = section
         self._check_sections()
@@ -118,25 +118,25 @@ class Building:
             given = element.given_section
             key = (folded(given.material), folded(given.orientation), element.solid.modes)
             by_material.setdefault(key, []).append(element)
-        found = []
+        materials = []
         for (name, turned, modes), members in by_material.items():
             material = self.content.materials[name]
             axes = self._axes(members[0].section)
             group = f"material {material.name}" + (f" along {turned.lower()}" if turned else "")
             group += " with incompatible modes" if modes else ""
-            found.append(
+            materials.append(
                 (
                     _law(self.content, material, axes, modes),
                     self.found.add_solids(group, members),
                 )
             )
-        return found, thickness or 1.0
+        return materials, thickness or 1.0
 
     def _axes(self, section: Section) -> Any:
         """Return the axes of the material of a section, None for those of the mesh."""
         if not section.orientation:
             return None
-        axes = orientation_of(self.content, section.orientation, section.place)
+        axes = orientation_of(self.content, section.orientation, section.location)
         if axes.cylindrical:
             a, b = np.array(axes.points[:3]), np.array(axes.points[3:])
             return CylindricalAxes(tuple(a.tolist()), tuple((b - a).tolist()))
@@ -146,9 +146,9 @@ class Building:
         material = self.content.materials.get(folded(section.material))
         if material is None:
             known = ", ".join(m.name for m in self.content.materials.values()) or "none"
-            raise section.place.refuse(f"material '{section.material}' is not defined; materials: {known}")
+            raise section.location.refuse(f"material '{section.material}' is not defined; materials: {known}")
         if material.law is None:
-            raise material.place.refuse(f"material '{material.name}' has no *ELASTIC")
+            raise material.location.refuse(f"material '{material.name}' has no *ELASTIC")
         return material
 
     def _check_sections(self) -> None:
@@ -157,21 +157,21 @@ class Building:
             cell = without[0].cell
             many = "1 element" if len(without) == 1 else f"{len(without)} elements"
             named = f" of set '{cell.set}'" if cell.set else ""
-            raise cell.place.refuse(f"{many} ({without[0].number}){named} has no section, so no material")
+            raise cell.location.refuse(f"{many} ({without[0].number}){named} has no section, so no material")
 
     def _check_pairs(self) -> None:
         """Refuse pairs whose surfaces or interaction are not there."""
         seen: set[str] = set()
         for pair in self.content.pairs:
-            secondary_group(self.found, pair.secondary, pair.place)
-            self.made.faces(pair.primary, pair.place)
+            secondary_group(self.found, pair.secondary, pair.location)
+            self.made.faces(pair.primary, pair.location)
             if not pair.tied and folded(pair.interaction) not in self.content.interactions:
                 known = ", ".join(i.name for i in self.content.interactions.values()) or "none"
-                raise pair.place.refuse(
+                raise pair.location.refuse(
                     f"surface interaction '{pair.interaction}' is not defined; interactions: {known}"
                 )
             if folded(pair.name) in seen:
-                raise pair.place.refuse(f"the pair {pair.name} stands there twice")
+                raise pair.location.refuse(f"the pair {pair.name} stands there twice")
             seen.add(folded(pair.name))
 
     def _groups(self, conditions: Conditions) -> list[tuple[str, Table]]:
@@ -222,19 +222,17 @@ class Building:
             alike.setdefault((acting, conditions.supports.table(name)), []).append(name)
         for (acting, table), names in alike.items():
             ends = "" if acting.ends == np.inf else f" to {acting.ends:g}"
-            label = (
-                f"the support of {conditions.named(names[0])}, line {acting.place.line}, from {acting.begins:g}{ends}"
-            )
+            label = f"the support of {conditions.named(names[0])}, line {acting.location.line}, from {acting.begins:g}{ends}"
             rows = csr_array(vstack([self._support_row(conditions, name) for name in names]))
             self._relate_support(
-                TemporaryRelation(label, rows, 1.0, table, acting.begins, acting.ends, keeps=acting.keeps)
+                TemporaryConstraint(label, rows, 1.0, table, acting.begins, acting.ends, keeps=acting.keeps)
             )
 
     def _local_support(self, conditions: Conditions, name: Component, table: Table) -> None:
         label = f"the support of {conditions.named(name)} on local axes"
-        self._relate_support(Relation(label, self._support_row(conditions, name), 1.0, table))
+        self._relate_support(MultiPointConstraint(label, self._support_row(conditions, name), 1.0, table))
 
-    def _relate_support(self, made: Relation) -> None:
+    def _relate_support(self, made: MultiPointConstraint) -> None:
         self.local_supports.append(made)
         self.model.relations.append(made)
 
@@ -275,19 +273,19 @@ class Building:
             by_density: dict[float, list[Any]] = {}
             for element in name.elements:
                 if element.type is not None:
-                    by_density.setdefault(self._density(element, name, track.place), []).append(element)
+                    by_density.setdefault(self._density(element, name, track.location), []).append(element)
             for density, members in by_density.items():
                 group = self.found.add_solids(f"load {number} of density {density:g}", members)
                 self._name_solids(group)
                 values = _body_force(name, density, self.found.dim)
                 self.model.add_body_force(group, ramp=conditions.loads.table(name), **values)
 
-    def _density(self, element: Element, name: Distributed, place: Place) -> float:
+    def _density(self, element: Element, name: Distributed, location: Location) -> float:
         if name.kind[0] == "B":
             return 1.0
         material = self._material(element.given_section)
         if material.density is None:
-            raise place.refuse(f"material '{material.name}' has no *DENSITY, so {name.kind} is no force")
+            raise location.refuse(f"material '{material.name}' has no *DENSITY, so {name.kind} is no force")
         return material.density
 
     def _name_solids(self, group: str) -> None:
@@ -297,19 +295,19 @@ class Building:
         self.model.mesh = self.model.mesh.with_groups(cells={group: numbers})
 
     def _springs(self) -> None:
-        for name, (place, stiffness) in self.content.springs.items():
-            for element in self.made.elements_of(name, place):
+        for name, (location, stiffness) in self.content.springs.items():
+            for element in self.made.elements_of(name, location):
                 if element.cell.type != "SPRINGA":
-                    raise place.refuse(f"element {element.number} is no spring of type SPRINGA")
+                    raise location.refuse(f"element {element.number} is no spring of type SPRINGA")
                 self.model.add_spring(element.points[0], element.points[1], axial=stiffness / self.thickness)
         self._check_discrete("SPRINGA", self.content.springs, "*SPRING")
 
     def _check_discrete(self, kind: str, given: Mapping[str, Any], needed: str) -> None:
         """Refuse springs and gap elements without properties."""
-        with_one = {own for name, entry in given.items() for own in self.made.elements_of(name, entry[0])}
+        with_one = {member for name, entry in given.items() for member in self.made.elements_of(name, entry[0])}
         for element in self.made.discrete:
             if element.cell.type == kind and element not in with_one:
-                raise element.cell.place.refuse(f"element {element.number} of type {kind} has no {needed}")
+                raise element.cell.location.refuse(f"element {element.number} of type {kind} has no {needed}")
 
     def _contact(self) -> None:
         for pair in self.content.pairs:
@@ -320,7 +318,7 @@ class Building:
             try:
                 self.model.add_contact(f"{secondary}/{primary}", secondary=secondary, primary=primary, **options)
             except FastcontactError as error:
-                raise pair.place.refuse(str(error)) from error
+                raise pair.location.refuse(str(error)) from error
 
     def _at_nodes(self, pair: Pair, secondary: str) -> dict[str, Any]:
         """Return the options by which some nodes alone of the facets around them are in contact."""
@@ -328,7 +326,7 @@ class Building:
         if all(map(all_nodes_carry, self.found.groups[secondary])):
             options["formulation"] = "node_to_segment"
         self.content.note(
-            pair.place, f"the nodes of surface '{pair.secondary}' make up no whole faces: they alone of the facets around "
+            pair.location, f"the nodes of surface '{pair.secondary}' make up no whole faces: they alone of the facets around "
             "them are in contact"
         )  # fmt: skip
         return options
@@ -338,7 +336,7 @@ class Building:
         options: dict[str, Any] = {}
         if law.kind != "unilateral":
             if law.friction or law.changes:
-                raise law.place.refuse(f"friction with {law.kind} contact is not supported")
+                raise law.location.refuse(f"friction with {law.kind} contact is not supported")
             options["kind"] = law.kind
         if law.penalty is not None and law.kind != "tied":
             options["penalty"] = law.penalty
@@ -354,7 +352,7 @@ class Building:
         size = TOUCHING * float(np.ptp(self.model.mesh.points, axis=0).max())
         if pair.clearance is not None:
             if np.ptp(gaps) > size:
-                raise pair.place.refuse(
+                raise pair.location.refuse(
                     f"*CLEARANCE is supported between sides of one distance, these are {gaps.min():.6g} to "
                     f"{gaps.max():.6g} apart"
                 )
@@ -362,7 +360,7 @@ class Building:
         try:
             within = float(pair.adjust)
         except ValueError:
-            raise pair.place.refuse(f"ADJUST={pair.adjust[:40]}: only a distance is supported") from None
+            raise pair.location.refuse(f"ADJUST={pair.adjust[:40]}: only a distance is supported") from None
         moved = gaps[(gaps <= within) & (np.abs(gaps) > size)]
         if not len(moved):
             return {}
@@ -371,7 +369,7 @@ class Building:
             if np.ptp(gaps) <= size
             else f"of {moved.min():.6g} to {moved.max():.6g} at {len(moved)} nodes"
         )
-        self.content.note(pair.place, f"ADJUST: the distance {apart} of the sides counts as none")
+        self.content.note(pair.location, f"ADJUST: the distance {apart} of the sides counts as none")
         if np.ptp(gaps) <= size:
             return {"clearance": -float(gaps.mean())}
         nodes, closing = cKDTree(places), -np.where(gaps <= within, gaps, 0.0)
@@ -379,41 +377,43 @@ class Building:
 
     def _gap_groups(self) -> dict[str, tuple[str, list[tuple[int, int]]]]:
         """Make groups of the facets behind gap elements; return their names, with the points of each element."""
-        found = {}
+        groups = {}
         self._check_discrete("GAPUNI", self.content.gaps, "*GAP")
-        for name, (place, _, _) in self.content.gaps.items():
-            own = self.made.elements_of(name, place)
-            if any(element.cell.type != "GAPUNI" for element in own):
-                raise place.refuse("acts on elements of type GAPUNI only")
-            ends = [element.points for element in own]
+        for name, (location, _, _) in self.content.gaps.items():
+            elements = self.made.elements_of(name, location)
+            if any(element.cell.type != "GAPUNI" for element in elements):
+                raise location.refuse("acts on elements of type GAPUNI only")
+            ends = [element.points for element in elements]
             chosen = {pair[0] for pair in ends}
             faces = self.made.faces_within(chosen)
             shown = self.content.root.set_names.get(name, name)
             group = self.found.add_facets(f"{shown} facets", faces)
             covered = {p for face in faces for p in facet_points(*face)}
             if covered != chosen:
-                raise place.refuse(
+                raise location.refuse(
                     "gap elements are supported on all nodes of whole faces only, from the body to nodes that are held"
                 )
-            found[name] = (group, [(pair[0], pair[1]) for pair in ends])
-        return found
+            groups[name] = (group, [(pair[0], pair[1]) for pair in ends])
+        return groups
 
     def _gaps(self, groups: Mapping[str, Any], conditions: Conditions) -> dict[str, dict[int, int]]:
         """Make contact with a rigid plane from gap elements to nodes that are held at rest."""
         ends = {}
         dim = self.found.dim
         for name, (group, pairs) in groups.items():
-            place, clearance, vector = self.content.gaps[name]
+            location, clearance, vector = self.content.gaps[name]
             direction = np.array(vector)[:dim] / np.linalg.norm(vector)
             for _, end in pairs:
                 tracks = [
                     conditions.supports.tracks.get((end, axis, False)) for axis in np.flatnonzero(direction).tolist()
                 ]
                 if any(track is None or any(v for _, v in track.points) for track in tracks):
-                    raise place.refuse("gap elements are supported to nodes that are held at rest only")
+                    raise location.refuse("gap elements are supported to nodes that are held at rest only")
             places = self.model.mesh.points[[first for first, _ in pairs]] @ direction
             if np.ptp(places) > TOUCHING * float(np.ptp(self.model.mesh.points, axis=0).max()):
-                raise place.refuse("gap elements are supported where their nodes lie in a plane across their direction")
+                raise location.refuse(
+                    "gap elements are supported where their nodes lie in a plane across their direction"
+                )
             point = tuple((places.mean() + clearance) * direction)
             shown = self.content.root.set_names.get(name, name)
             wall = HalfSpace(point=point, normal=tuple(-direction))
@@ -432,7 +432,7 @@ class Building:
             for track in histories.distinct():
                 instants.update(round(time, 12) for time, _ in track.points if abs(time - round(time)) > 1e-6)
         if len(instants) > LONGEST_RAMP:
-            raise steps[0].place.refuse(f"the histories have {len(instants)} corners, more than {LONGEST_RAMP}")
+            raise steps[0].location.refuse(f"the histories have {len(instants)} corners, more than {LONGEST_RAMP}")
         return Ramp(tuple(sorted(instants)), ((0.0, 0.0), (float(len(steps)), 1.0)))
 
 
@@ -441,14 +441,14 @@ def _friction(law: Interaction, n_steps: int) -> dict[str, Any]:
     table, sticks = [(0.0, law.friction)], {law.stick} if law.friction else set()
     for before, changed in law.changes:
         if changed.friction < 0.0 or changed.penalty is not None or changed.kind != law.kind:
-            raise changed.place.refuse("one *FRICTION must follow, and nothing else of the interaction changes")
+            raise changed.location.refuse("one *FRICTION must follow, and nothing else of the interaction changes")
         table += [(float(before), table[-1][1]), (before + JUMP, changed.friction)]
         sticks |= {changed.stick} if changed.friction else set()
     largest = max(value for _, value in table)
     if not largest:
         return {}
     if len(sticks) > 1:
-        raise law.changes[0][1].place.refuse("a stick slope that changes is not supported: give the same one")
+        raise law.changes[0][1].location.refuse("a stick slope that changes is not supported: give the same one")
     options: dict[str, Any] = {"friction": largest, "tangential_penalty": sticks.pop()}
     if law.changes:
         points = {**dict(table), float(n_steps): table[-1][1]}
@@ -463,7 +463,7 @@ def _law(content: Content, material: Material, axes: Any, modes: bool) -> Any:
     if isinstance(law, NonlinearElastic):
         if modes:
             content.note(
-                material.place, f"material '{material.name}': incompatible modes are left out, since it is nonlinear"
+                material.location, f"material '{material.name}': incompatible modes are left out, since it is nonlinear"
             )
         law = copy.copy(law)
         object.__setattr__(law, "density", material.density)
@@ -472,10 +472,12 @@ def _law(content: Content, material: Material, axes: Any, modes: bool) -> Any:
     heated = any(given.block.keyword == "TEMPERATURE" for step in content.steps for given in step.given)
     if expansion is None:
         if heated:
-            content.note(material.place, f"material '{material.name}' has no *EXPANSION: temperatures do not strain it")
+            content.note(
+                material.location, f"material '{material.name}' has no *EXPANSION: temperatures do not strain it"
+            )
         return replace(law, expansion=0.0) if heated else law
     if not heated:
-        content.note(material.place, f"material '{material.name}': without temperatures the expansion has no effect")
+        content.note(material.location, f"material '{material.name}': without temperatures the expansion has no effect")
     if isinstance(law, LinearElastic) and isinstance(expansion, tuple):
         law = Orthotropic((law.E,) * 3, (law.nu,) * 3, (law.E / (2.0 * (1.0 + law.nu)),) * 3, axes)
     return replace(law, expansion=expansion)
@@ -516,10 +518,10 @@ def nodal_gaps(model: Model, secondary: str, primary: str, without: Sequence[int
     from fastcontact.model.contact_pair import ContactPair
 
     pair = ContactPair("gaps", secondary, primary, "continuous", {})
-    found, places = model.bind(pair), model.mesh.points
-    gaps, _ = found.nodal_gap(Configuration.undeformed(places))
-    faced = np.isfinite(gaps) & ~np.isin(found.secondary.points, without)
-    return (gaps[faced], places[found.secondary.points[faced]]) if faced.any() else (np.zeros(1), places[:1])
+    formulation, places = model.bind(pair), model.mesh.points
+    gaps, _ = formulation.nodal_gap(Configuration.undeformed(places))
+    faced = np.isfinite(gaps) & ~np.isin(formulation.secondary.points, without)
+    return (gaps[faced], places[formulation.secondary.points[faced]]) if faced.any() else (np.zeros(1), places[:1])
 
 
 def _by_shape(alike: Mapping[tuple[int, Table], list[int]]) -> Iterator[tuple[int, list[int], Any, Table]]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fastcontact.cases.decks.assembled import Element, Face
-from fastcontact.cases.decks.blocks import Place, Row
+from fastcontact.cases.decks.blocks import Location, Row
 from fastcontact.cases.decks.content import Given
 from fastcontact.cases.decks.histories import Histories
 from fastcontact.cases.decks.local_axes import local_directions
@@ -38,7 +38,7 @@ class Distributed:
 class Acting:
     """When a support acts, as load factors, and whether it keeps what it finds; its place where it begins."""
 
-    place: Place
+    location: Location
     begins: float
     ends: float = np.inf
     keeps: bool = False
@@ -98,13 +98,13 @@ class Conditions:
         self._act(changing, number - 1.0)
         self.keeping.clear()
 
-    def _act(self, names: Mapping[Component, tuple[float, str, Place]], begin: float) -> None:
+    def _act(self, names: Mapping[Component, tuple[float, str, Location]], begin: float) -> None:
         """Let supports act from the beginning of a step on, where they do not yet."""
-        begun: dict[tuple[Place, bool], Acting] = {}
-        for name, (_, _, place) in names.items():
+        begun: dict[tuple[Location, bool], Acting] = {}
+        for name, (_, _, location) in names.items():
             if name not in self.acting:
-                key = place, name in self.keeping
-                self.acting[name] = begun.setdefault(key, Acting(place, begin, keeps=key[1]))
+                key = location, name in self.keeping
+                self.acting[name] = begun.setdefault(key, Acting(location, begin, keeps=key[1]))
 
     def temporary(self) -> list[tuple[Component, Acting]]:
         """Return the supports that do not act in all steps, each with when it does."""
@@ -121,21 +121,21 @@ class Conditions:
         block = given.block
         kind = block.get("TYPE", "DISPLACEMENT").upper()
         if kind != "DISPLACEMENT":
-            raise block.place.refuse(f"TYPE={kind} is not supported, only DISPLACEMENT")
+            raise block.location.refuse(f"TYPE={kind} is not supported, only DISPLACEMENT")
         if given.new:
             self.supports.forget()
         for row in block.rows:
-            points = self.made.nodes(row.text(0), row.place)
+            points = self.made.nodes(row.text(0), row.location)
             named = NAMED.get(row.text(1).upper())
             if row.text(1).upper() in ("XASYMM", "YASYMM", "ZASYMM"):
-                raise row.place.refuse(f"{row.text(1)} is not supported: give the components")
+                raise row.location.refuse(f"{row.text(1)} is not supported: give the components")
             first = 1 if named else row.whole(1)
             last = first if named else row.whole(2, first)
             value = 0.0 if named else row.number(3, 0.0)
             if not 1 <= first <= last <= 6:
-                raise row.place.refuse(f"components {row.text(1)} to {row.text(2)} are none of 1 to 6")
+                raise row.location.refuse(f"components {row.text(1)} to {row.text(2)} are not within 1 to 6")
             if before and value:
-                self.made.content.note(row.place, "a displacement before the first step is reached in that step")
+                self.made.content.note(row.location, "a displacement before the first step is reached in that step")
             components = named or tuple(range(first, last + 1))
             for point in points:
                 for component in components:
@@ -145,7 +145,7 @@ class Conditions:
         name = self._component(point, component)
         if name is None:
             if value:
-                raise row.place.refuse(f"component {component} does not exist at nodes of this model")
+                raise row.location.refuse(f"component {component} does not exist at nodes of this model")
             return
         if self.locks.take(point, component, "FIXED" in given.block.parameters):
             return
@@ -155,9 +155,9 @@ class Conditions:
         if "FIXED" in given.block.parameters:
             self.keeping.add(name)
             if name in self.acting:
-                self.supports.hold(name, row.place)
+                self.supports.hold(name, row.location)
                 return
-        self.supports.give(name, sign * value, given.amplitude, row.place)
+        self.supports.give(name, sign * value, given.amplitude, row.location)
 
     def _component(self, point: int, component: int) -> Component | None:
         """Return the displacement component of a point, or of the point of its rotation; None where there is none."""
@@ -182,12 +182,12 @@ class Conditions:
             self.forces.forget()
         for row in given.block.rows:
             component, value = row.whole(1), row.number(2)
-            for point in self.made.nodes(row.text(0), row.place):
+            for point in self.made.nodes(row.text(0), row.location):
                 name = self._component(point, component) if 1 <= component <= 6 else None
                 if name is None:
-                    raise row.place.refuse(f"a force cannot act on component {component} of this node")
+                    raise row.location.refuse(f"a force cannot act on component {component} of this node")
                 self.forces.give(
-                    (*name[:2], point in self.directions and component <= 3), value, given.amplitude, row.place
+                    (*name[:2], point in self.directions and component <= 3), value, given.amplitude, row.location
                 )
 
     def _loads(self, given: Given) -> None:
@@ -196,25 +196,25 @@ class Conditions:
             self.loads.forget(lambda name: name.keyword == keyword)
         for row in given.block.rows:
             for name, value in self._distributed(keyword, row):
-                self.loads.give(name, value, given.amplitude, row.place)
+                self.loads.give(name, value, given.amplitude, row.location)
 
     def _distributed(self, keyword: str, row: Row) -> list[tuple[Distributed, float]]:
         label = row.text(1).upper()
         if keyword == "DSLOAD":
             if label != "P":
-                raise row.place.refuse(f"load {label[:40]} on a surface is not supported, only P")
-            faces, value = self.made.faces(row.text(0), row.place), row.number(2)
+                raise row.location.refuse(f"load {label[:40]} on a surface is not supported, only P")
+            faces, value = self.made.faces(row.text(0), row.location), row.number(2)
             return [(Distributed(keyword, "P", face), value) for face in faces]
-        own = self.made.elements_of(row.text(0), row.place) if row.text(0) else self.made.solids
+        elements = self.made.elements_of(row.text(0), row.location) if row.text(0) else self.made.solids
         if label[:1] == "P" and label[1:].isdigit():
-            facets = [(element, self.made.facet(element, int(label[1:]), row.place)) for element in own]
+            facets = [(element, self.made.facet(element, int(label[1:]), row.location)) for element in elements]
             return [(Distributed(keyword, "P", face), row.number(2)) for face in facets]
         size = {"GRAV": 3, "CENTRIF": 6, "BX": 0, "BY": 0, "BZ": 0}.get(label)
         if size is None:
-            raise row.place.refuse(
+            raise row.location.refuse(
                 f"load {label[:40]} is not supported; known are P1, P2, ..., GRAV, CENTRIF, BX, BY, BZ"
             )
         vector = tuple(row.number(3 + i, 0.0) for i in range(size))
         if size and not any(vector[-3:]):
-            raise row.place.refuse(f"the direction of {label} is missing")
-        return [(Distributed(keyword, label, None, tuple(own), vector), row.number(2))]
+            raise row.location.refuse(f"the direction of {label} is missing")
+        return [(Distributed(keyword, label, None, tuple(elements), vector), row.number(2))]

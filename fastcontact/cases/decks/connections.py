@@ -16,28 +16,28 @@ def contact_pair(content: Content, block: Block) -> None:
     kinds = ("NODE TO SURFACE", "SURFACE TO SURFACE", "MORTAR", "LINMORTAR", "PGLINMORTAR")
     if block.choice("TYPE", kinds) == "NODE TO SURFACE":
         content.note(
-            block.place, "NODE TO SURFACE: mortar contact is solved, which passes uniform pressures on any meshes"
+            block.location, "NODE TO SURFACE: mortar contact is solved, which passes uniform pressures on any meshes"
         )
     if "SMALL SLIDING" in block.parameters:
-        content.note(block.place, "SMALL SLIDING: sides are paired on the deformed shape all the same")
+        content.note(block.location, "SMALL SLIDING: sides are paired on the deformed shape all the same")
     adjust = block.get("ADJUST") if "ADJUST" in block.parameters else ""
     for row in block.rows:
         if len([entry for entry in row.entries if entry]) != 2:
-            raise row.place.refuse("a contact pair needs two surfaces, the secondary and the primary one")
+            raise row.location.refuse("a contact pair needs two surfaces, the secondary and the primary one")
         secondary, primary = unquoted(row.text(0)), unquoted(row.text(1))
-        content.pairs.append(Pair(row.place, secondary, primary, block.required("INTERACTION"), adjust=adjust))
+        content.pairs.append(Pair(row.location, secondary, primary, block.required("INTERACTION"), adjust=adjust))
 
 
 def clearance(content: Content, block: Block) -> None:
     """*CLEARANCE: the initial distance of the sides of a pair, whatever the coordinates say."""
     secondary = block.get("SLAVE") or block.get("SECONDARY")
     primary = block.get("MASTER") or block.get("MAIN")
-    value = as_number(block.place, block.required("VALUE"))
+    value = as_number(block.location, block.required("VALUE"))
     for pair in content.pairs:
         if (pair.secondary.upper(), pair.primary.upper()) == (secondary.upper(), primary.upper()):
             pair.clearance = value
             return
-    raise block.place.refuse(f"there is no contact pair of '{secondary}' and '{primary}' above this line")
+    raise block.location.refuse(f"there is no contact pair of '{secondary}' and '{primary}' above this line")
 
 
 def tie(content: Content, block: Block) -> None:
@@ -46,23 +46,23 @@ def tie(content: Content, block: Block) -> None:
         content.sector_ends.append(sector_ends(block))
         return
     tolerance = block.get("POSITION TOLERANCE")
-    value = as_number(block.place, tolerance) if tolerance else None
+    value = as_number(block.location, tolerance) if tolerance else None
     adjust = block.choice("ADJUST", ("YES", "NO"))
     if value is not None:
         if value < 0.0:
-            raise block.place.refuse(f"POSITION TOLERANCE={value:g} is negative")
+            raise block.location.refuse(f"POSITION TOLERANCE={value:g} is negative")
         content.note(
-            block.place,
+            block.location,
             f"POSITION TOLERANCE={value:g}: no effect, the surfaces are tied where they face each other, at any distance, "
             "not node by node",
         )
     if adjust == "YES" and "ADJUST" in block.parameters:
-        content.note(block.place, "ADJUST=YES: nodes are not moved, distances of the sides are kept")
+        content.note(block.location, "ADJUST=YES: nodes are not moved, distances of the sides are kept")
     for row in block.rows:
         if len([entry for entry in row.entries if entry]) != 2:
-            raise row.place.refuse("a tie needs two surfaces, the secondary and the primary one")
+            raise row.location.refuse("a tie needs two surfaces, the secondary and the primary one")
         secondary, primary = unquoted(row.text(0)), unquoted(row.text(1))
-        content.pairs.append(Pair(row.place, secondary, primary, tied=True, adjust=adjust, tolerance=value))
+        content.pairs.append(Pair(row.location, secondary, primary, tied=True, adjust=adjust, tolerance=value))
 
 
 def equation(content: Content, block: Block) -> None:
@@ -72,15 +72,15 @@ def equation(content: Content, block: Block) -> None:
         count = head.whole(0)
         terms: list[tuple[str, int, float]] = []
         if not 1 <= count <= MOST_TERMS:
-            raise head.place.refuse(f"an equation cannot have {count} terms")
+            raise head.location.refuse(f"an equation cannot have {count} terms")
         while len(terms) < count:
             row = next(rows, None)
             if row is None:
-                raise head.place.refuse(f"the equation has {len(terms)} terms, {count} are announced")
+                raise head.location.refuse(f"the equation has {len(terms)} terms, {count} are announced")
             terms += [_term(row, start) for start in range(0, len(row.entries), 3) if row.text(start)]
         if len(terms) > count:
-            raise head.place.refuse(f"the equation has {len(terms)} terms, {count} are announced")
-        content.equations.append(Equation(head.place, tuple(terms)))
+            raise head.location.refuse(f"the equation has {len(terms)} terms, {count} are announced")
+        content.equations.append(Equation(head.location, tuple(terms)))
 
 
 def _term(row: Row, start: int) -> tuple[str, int, float]:
@@ -101,21 +101,21 @@ def multi_point(content: Content, block: Block) -> None:
             several.append((row, kind, nodes))
         elif kind not in ("PIN", "TIE", "BEAM"):
             known = ", ".join(("PIN", "TIE", "BEAM", *LEAST))
-            raise row.place.refuse(f"an MPC of type {kind[:40]} is not supported, only {known}")
+            raise row.location.refuse(f"an MPC of type {kind[:40]} is not supported, only {known}")
         elif len(nodes) != 2:
-            raise row.place.refuse(f"{kind} needs two nodes, the one that follows and the one that leads")
+            raise row.location.refuse(f"{kind} needs two nodes, the one that follows and the one that leads")
         elif kind == "BEAM":
-            content.links.append(Link(row.place, nodes[1], nodes[0], "nodes"))
+            content.links.append(Link(row.location, nodes[1], nodes[0], "nodes"))
         else:
-            content.pins.append(Pin(row.place, nodes[0], nodes[1]))
-    content.multi_points += [MultiPoint(row.place, kind, tuple(nodes)) for row, kind, nodes in several]
+            content.pins.append(Pin(row.location, nodes[0], nodes[1]))
+    content.multi_points += [MultiPoint(row.location, kind, tuple(nodes)) for row, kind, nodes in several]
 
 
 def rigid_body(content: Content, block: Block) -> None:
     """*RIGID BODY: nodes that move with a reference node as a whole."""
     kind = "elements" if block.get("ELSET") else "nodes"
     group = block.get("ELSET") or block.required("NSET")
-    content.links.append(Link(block.place, block.required("REF NODE"), group, kind, rotation=block.get("ROT NODE")))
+    content.links.append(Link(block.location, block.required("REF NODE"), group, kind, rotation=block.get("ROT NODE")))
 
 
 def coupling(content: Content, block: Block, inner: Block) -> None:
@@ -124,13 +124,13 @@ def coupling(content: Content, block: Block, inner: Block) -> None:
     for row in inner.rows:
         first, last = row.whole(0), row.whole(1, row.whole(0))
         if not 1 <= first <= last <= 6:
-            raise row.place.refuse(f"the components {first} to {last} are none of 1 to 6")
+            raise row.location.refuse(f"the components {first} to {last} are not within 1 to 6")
         components.update(range(first, last + 1))
     chosen = tuple(sorted(components)) or (1, 2, 3, 4, 5, 6)
     distributing = inner.keyword == "DISTRIBUTING"
     content.links.append(
         Link(
-            block.place, block.required("REF NODE"), block.required("SURFACE"), "surface", chosen, distributing,
+            block.location, block.required("REF NODE"), block.required("SURFACE"), "surface", chosen, distributing,
             orientation=block.get("ORIENTATION"),
         )
     )  # fmt: skip
@@ -140,6 +140,6 @@ def transform(content: Content, block: Block) -> None:
     """*TRANSFORM: local axes of nodes."""
     cylindrical = block.choice("TYPE", ("R", "C")) == "C"
     if len(block.rows) != 1:
-        raise block.place.refuse("one data line with six coordinates is needed")
+        raise block.location.refuse("one data line with six coordinates is needed")
     points = tuple(block.rows[0].number(i) for i in range(6))
-    content.axes.append(Axes(block.place, block.required("NSET"), cylindrical, points))
+    content.axes.append(Axes(block.location, block.required("NSET"), cylindrical, points))

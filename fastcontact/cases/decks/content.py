@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from fastcontact.cases.decks.blocks import Block, Place, folded
+from fastcontact.cases.decks.blocks import Block, Location, folded
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,12 +15,12 @@ class Cell:
 
     type: str
     nodes: Sequence[int]
-    within: Place
+    within: Location
     line: int
     set: str = ""
 
     @property
-    def place(self) -> Place:
+    def location(self) -> Location:
         """Its place."""
         return replace(self.within, line=self.line)
 
@@ -29,7 +29,7 @@ class Cell:
 class Members:
     """Entries of a set: numbers, or the name of another set, in an instance (empty: where it is defined)."""
 
-    place: Place
+    location: Location
     numbers: Sequence[int] = ()
     name: str = ""
     instance: str = ""
@@ -39,7 +39,7 @@ class Members:
 class Face:
     """One entry of a surface: an element set or number, or for nodes a node set or number, and the label of the face."""
 
-    place: Place
+    location: Location
     of: str
     label: str = ""
 
@@ -49,7 +49,7 @@ class SurfaceDefinition:
     """A surface as the deck has it."""
 
     name: str
-    place: Place
+    location: Location
     of_nodes: bool
     faces: list[Face] = field(default_factory=list)
 
@@ -58,7 +58,7 @@ class SurfaceDefinition:
 class Section:
     """Which material the elements of a set have, and how thick they are (None: not given)."""
 
-    place: Place
+    location: Location
     elements: str
     material: str
     thickness: float | None = None
@@ -101,7 +101,7 @@ class Material:
     """A material of the deck; `law` makes one of the model from axes, None for those of the mesh."""
 
     name: str
-    place: Place
+    location: Location
     law: Callable[[Any], Any] | None = None
     density: float | None = None
     expansion: float | tuple[float, ...] | None = None
@@ -112,7 +112,7 @@ class Interaction:
     """How surfaces touch."""
 
     name: str
-    place: Place
+    location: Location
     penalty: float | list[tuple[float, float]] | None = None
     friction: float = 0.0
     stick: float | None = None
@@ -124,7 +124,7 @@ class Interaction:
 class Pair:
     """A contact pair or a tie."""
 
-    place: Place
+    location: Location
     secondary: str
     primary: str
     interaction: str = ""
@@ -143,7 +143,7 @@ class Pair:
 class SectorEnds:
     """The two ends of a sector that repeats itself round an axis: their surfaces, by the name of the tie."""
 
-    place: Place
+    location: Location
     name: str
     surfaces: tuple[str, str]
 
@@ -152,7 +152,7 @@ class SectorEnds:
 class Sectors:
     """How many sectors make the whole round an axis, by two of its points, and the name of the tie of their ends."""
 
-    place: Place
+    location: Location
     count: int
     tie: str
     points: tuple[float, ...]
@@ -162,7 +162,7 @@ class Sectors:
 class Equation:
     """A linear equation: node, component and coefficient of each term."""
 
-    place: Place
+    location: Location
     terms: tuple[tuple[str, int, float], ...]
 
 
@@ -170,7 +170,7 @@ class Equation:
 class Pin:
     """Nodes, one or those of a set, that have the displacement of a further one, or each that of one of a further set."""
 
-    place: Place
+    location: Location
     first: str
     second: str
 
@@ -179,7 +179,7 @@ class Pin:
 class MultiPoint:
     """Nodes that stay in a plane or on a line, or, with a last one for it, have a mean rotation."""
 
-    place: Place
+    location: Location
     kind: str
     nodes: tuple[str, ...]
 
@@ -188,7 +188,7 @@ class MultiPoint:
 class Link:
     """A reference node with nodes that follow it (rigid, kinematic) or whose mean motion it follows (distributing)."""
 
-    place: Place
+    location: Location
     reference: str
     group: str
     kind: str  # nodes, elements or surface
@@ -202,7 +202,7 @@ class Link:
 class PretensionSection:
     """A section through a bolt: its surface, the node that has its shortening and its force, and its normal."""
 
-    place: Place
+    location: Location
     surface: str
     node: str
     normal: tuple[float, ...] | None
@@ -212,7 +212,7 @@ class PretensionSection:
 class Axes:
     """Local axes of nodes or materials: rectangular by points of the first axis and plane, or cylindrical about a line."""
 
-    place: Place
+    location: Location
     nodes: str
     cylindrical: bool
     points: tuple[float, ...]
@@ -222,7 +222,7 @@ class Axes:
 class Amplitude:
     """Points (time, multiplier), in the time of the step or of the analysis."""
 
-    place: Place
+    location: Location
     times: tuple[float, ...]
     values: tuple[float, ...]
     total: bool
@@ -241,7 +241,7 @@ class Given:
 class Step:
     """A load step of the deck."""
 
-    place: Place
+    location: Location
     nonlinear: bool = False
     period: float = 1.0
     increment: float = 1.0
@@ -272,16 +272,16 @@ class Content:
     pretensions: list[PretensionSection] = field(default_factory=list)
     orientations: dict[str, Axes] = field(default_factory=dict)
     amplitudes: dict[str, Amplitude] = field(default_factory=dict)
-    gaps: dict[str, tuple[Place, float, tuple[float, ...]]] = field(default_factory=dict)
-    springs: dict[str, tuple[Place, float]] = field(default_factory=dict)
+    gaps: dict[str, tuple[Location, float, tuple[float, ...]]] = field(default_factory=dict)
+    springs: dict[str, tuple[Location, float]] = field(default_factory=dict)
     supports: list[Given] = field(default_factory=list)
     initial: list[Block] = field(default_factory=list)
     stresses: list[Block] = field(default_factory=list)
     steps: list[Step] = field(default_factory=list)
     modes: dict[str, Any] | None = None
     notes: list[str] = field(default_factory=list)
-    outputs: list[Place] = field(default_factory=list)
+    outputs: list[Location] = field(default_factory=list)
 
-    def note(self, place: Place, text: str) -> None:
+    def note(self, location: Location, text: str) -> None:
         """Remember what a line means here, where that is not plain."""
-        self.notes.append(f"{place}: {text}")
+        self.notes.append(f"{location}: {text}")

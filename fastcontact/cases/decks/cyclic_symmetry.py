@@ -7,36 +7,36 @@ import numpy as np
 from fastcontact.cases.decks.blocks import Block, folded, unquoted
 from fastcontact.cases.decks.content import Content, SectorEnds, Sectors
 from fastcontact.cases.decks.meshing import DeckMesh, group_of_surface
-from fastcontact.elasticity.relations import Relation
+from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.errors import ModelError
 from fastcontact.model.model import Model
 
-# A sector of more than this many is next to nothing of the whole.
+# Most sectors: beyond, one is a negligible part of the whole.
 MOST_SECTORS = 100_000
 
 
 def sector_ends(block: Block) -> SectorEnds:
     """*TIE, CYCLIC SYMMETRY: the surfaces at the two ends of a sector."""
     if len(block.rows) != 1 or len([entry for entry in block.rows[0].entries if entry]) != 2:
-        raise block.place.refuse("cyclic symmetry needs one data line with two surfaces, the ends of the sector")
+        raise block.location.refuse("cyclic symmetry needs one data line with two surfaces, the ends of the sector")
     row = block.rows[0]
-    return SectorEnds(block.place, block.get("NAME"), (unquoted(row.text(0)), unquoted(row.text(1))))
+    return SectorEnds(block.location, block.get("NAME"), (unquoted(row.text(0)), unquoted(row.text(1))))
 
 
 def cyclic_symmetry_model(content: Content, block: Block) -> None:
     """*CYCLIC SYMMETRY MODEL: the number of sectors, and two points of the axis."""
     text = block.required("N")
     if not text.isdecimal() or not 2 <= int(text) <= MOST_SECTORS:
-        raise block.place.refuse(f"N={text[:40]}: a whole number of sectors, 2 to {MOST_SECTORS}, is needed")
+        raise block.location.refuse(f"N={text[:40]}: a whole number of sectors, 2 to {MOST_SECTORS}, is needed")
     if len(block.rows) != 1:
-        raise block.place.refuse("one data line with two points of the axis is needed")
+        raise block.location.refuse("one data line with two points of the axis is needed")
     points = tuple(block.rows[0].number(i) for i in range(6))
     if points[:3] == points[3:]:
-        raise block.place.refuse("the two points of the axis are the same")
-    content.sectors.append(Sectors(block.place, int(text), block.get("TIE"), points))
+        raise block.location.refuse("the two points of the axis are the same")
+    content.sectors.append(Sectors(block.location, int(text), block.get("TIE"), points))
 
 
-def add_sectors(model: Model, found: DeckMesh) -> list[Relation]:
+def add_sectors(model: Model, found: DeckMesh) -> list[MultiPointConstraint]:
     """Add the cyclic symmetries of the deck to the model; return their relations."""
     content, before = found.made.content, len(model.relations)
     used: set[int] = set()
@@ -46,9 +46,9 @@ def add_sectors(model: Model, found: DeckMesh) -> list[Relation]:
         first, second = np.array(sectors.points[:3]), np.array(sectors.points[3:])
         direction = (second - first) / np.linalg.norm(second - first)
         if model.mesh.dim == 2 and np.abs(direction[:2]).max() > 1e-9:
-            raise sectors.place.refuse("the axis of a plane model is along z: give two points above each other")
+            raise sectors.location.refuse("the axis of a plane model is along z: give two points above each other")
         for name in ends.surfaces:
-            found.made.faces(name, ends.place)
+            found.made.faces(name, ends.location)
         groups = [group_of_surface(found, name) for name in ends.surfaces]
         try:
             model.add_cyclic_symmetry(
@@ -56,10 +56,12 @@ def add_sectors(model: Model, found: DeckMesh) -> list[Relation]:
                 direction=tuple(direction.tolist()),
             )  # fmt: skip
         except ModelError as error:
-            raise sectors.place.refuse(str(error)) from error
+            raise sectors.location.refuse(str(error)) from error
     for ends in content.sector_ends:
         if id(ends) not in used:
-            raise ends.place.refuse("no *CYCLIC SYMMETRY MODEL says how many sectors there are, and round which axis")
+            raise ends.location.refuse(
+                "no *CYCLIC SYMMETRY MODEL says how many sectors there are, and round which axis"
+            )
     return model.relations[before:]
 
 
@@ -67,7 +69,7 @@ def _ends(content: Content, sectors: Sectors) -> SectorEnds:
     """Return the ends that a *CYCLIC SYMMETRY MODEL means: those of its tie, or the only ones."""
     named = [ends for ends in content.sector_ends if not sectors.tie or folded(ends.name) == folded(sectors.tie)]
     if len(named) != 1:
-        known = ", ".join(ends.name or f"that of line {ends.place.line}" for ends in content.sector_ends) or "none"
+        known = ", ".join(ends.name or f"that of line {ends.location.line}" for ends in content.sector_ends) or "none"
         which = f"TIE={sectors.tie[:80]}" if sectors.tie else "TIE is not given"
-        raise sectors.place.refuse(f"{which}, and the ties with CYCLIC SYMMETRY are: {known}")
+        raise sectors.location.refuse(f"{which}, and the ties with CYCLIC SYMMETRY are: {known}")
     return named[0]

@@ -14,12 +14,12 @@ from fastcontact.analysis.result_warnings import largest_rotation
 from fastcontact.analysis.run import solve_steps
 from fastcontact.analysis.support_forces import multipliers
 from fastcontact.arrays import Array, Numbers
-from fastcontact.cases.decks.blocks import Place, read_blocks
+from fastcontact.cases.decks.blocks import Location, read_blocks
 from fastcontact.cases.decks.building import Building
 from fastcontact.cases.decks.content import Content
 from fastcontact.cases.decks.reading import read_content
 from fastcontact.elasticity import recovery
-from fastcontact.elasticity.relations import TemporaryRelation
+from fastcontact.elasticity.multipoint_constraints import TemporaryConstraint
 from fastcontact.errors import ContactError, FileError, MeshError, ModelError, warn
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.files.paths import PathLike, existing_file
@@ -142,7 +142,7 @@ class Deck:
             return reaction.copy()
         held = self.model.prescribed()[0].ravel()
         for support in self.building.local_supports:
-            if not isinstance(support, TemporaryRelation) or support.acts_from(instant):
+            if not isinstance(support, TemporaryConstraint) or support.acts_from(instant):
                 held[support.rows.indices[support.rows.data != 0.0]] = True
         rows = [link.rows for link in links]
         forces = multipliers(reaction.ravel(), rows, held)
@@ -151,13 +151,13 @@ class Deck:
 
     def _largest_strain(self, step: StepResult) -> float:
         """Return the largest equivalent strain of the solid cells, from their nodal stresses [-]."""
-        field, found = self.model.material_field(), 0.0
+        field, largest = self.model.material_field(), 0.0
         for name, block in self.model.mesh.solids.items():
             strains = np.einsum("cij,cnj->cni", field.compliance[field.rows[name]], step.stress[block])
-            found = max(
-                found, float(recovery.equivalent_strain(strains.reshape(-1, strains.shape[2])).max(initial=0.0))
+            largest = max(
+                largest, float(recovery.equivalent_strain(strains.reshape(-1, strains.shape[2])).max(initial=0.0))
             )
-        return found
+        return largest
 
     def _tell_nonlinear(self, step: StepResult) -> None:
         """Warn with the largest strain and rotation where the deck asks for large ones."""
@@ -165,7 +165,7 @@ class Deck:
             strain = self._largest_strain(step)
             angle, _ = largest_rotation(self.model.mesh, step.displacement)
             warn(
-                f"{asked.place}: NLGEOM, but small strains and rotations were solved; found an equivalent strain up to "
+                f"{asked.location}: NLGEOM, but small strains and rotations were solved; found an equivalent strain up to "
                 f"{strain:.3g} and a rotation up to {angle:.3g} radian, of which linear kinematics leave out the squares"
             )
             return
@@ -206,23 +206,23 @@ def read_deck(path: PathLike) -> Deck:
     >>> steps = deck.solve()                                   # doctest: +SKIP
     >>> steps[-1].reaction[deck.points_of("FLOOR")].sum(axis=0)  # doctest: +SKIP
     """
-    found = existing_file(path)
-    content = read_content(read_blocks(found))
+    file = existing_file(path)
+    content = read_content(read_blocks(file))
     if not content.steps:
-        raise Place(found.name, 1, "STEP").refuse("the deck has no step, so nothing is loaded")
+        raise Location(file.name, 1, "STEP").refuse("the deck has no step, so nothing is loaded")
     try:
-        building = Building(content, _text(found))
+        building = Building(content, _text(file))
     except (ModelError, MeshError, ContactError) as error:
-        raise type(error)(f"{found.name}: {error}") from error
+        raise type(error)(f"{file.name}: {error}") from error
     if building.linearised:
         step = next(step for step in content.steps if step.nonlinear)
         warn(
-            f"{step.place}: NLGEOM: with {building.linearised} small strains and rotations are solved; the result is valid "
-            "only while they stay small, and a warning after the solution tells how large they are"
+            f"{step.location}: NLGEOM: with {building.linearised} small strains and rotations are solved; the result is "
+            "valid only while they stay small, and a warning after the solution tells how large they are"
         )
     return Deck(
-        path=found,
-        title=content.title or found.stem,
+        path=file,
+        title=content.title or file.stem,
         model=building.model,
         ramp=building.ramp,
         criteria=Criteria(),
@@ -240,7 +240,7 @@ def _text(path: Path) -> str:
 
 def _notes(content: Content, thickness: float) -> tuple[str, ...]:
     notes = list(dict.fromkeys(content.notes))
-    requests = {place.keyword for place in content.outputs}
+    requests = {location.keyword for location in content.outputs}
     if output := sorted(requests - {"CONTROLS"}):
         kinds = ", ".join(f"*{keyword}" for keyword in output)
         notes.append(f"{kinds}: no effect, the result file holds all output of all steps")

@@ -20,46 +20,50 @@ LONG = 15
 def nodes(content: Content, part: Part, block: Block) -> None:
     """*NODE: numbers and coordinates."""
     if block.get("SYSTEM", "R").upper() != "R":
-        raise block.place.refuse(f"SYSTEM={block.get('SYSTEM')} is not supported: give rectangular coordinates")
+        raise block.location.refuse(f"SYSTEM={block.get('SYSTEM')} is not supported: give rectangular coordinates")
     numbers = array("q")
     for row in block.each():
         number = row.whole(0)
         if len(row.entries) > 4 and any(row.entries[4:]):
-            raise row.place.refuse(f"node {number} has more than three coordinates")
+            raise row.location.refuse(f"node {number} has more than three coordinates")
         where = (row.number(1, 0.0), row.number(2, 0.0), row.number(3, 0.0))
         if part.nodes.setdefault(number, where) != where:
-            raise row.place.refuse(f"node {number} is defined twice, at different places")
+            raise row.location.refuse(f"node {number} is defined twice, at different places")
         numbers.append(number)
     if block.get("NSET"):
-        part.add("node", block.get("NSET"), [Members(block.place, numbers)])
+        part.add("node", block.get("NSET"), [Members(block.location, numbers)])
 
 
 def cells(content: Content, part: Part, block: Block) -> None:
     """*ELEMENT: numbers and nodes of elements of one type."""
-    name, own = block.required("TYPE").upper(), block.get("ELSET")
+    name, element_set = block.required("TYPE").upper(), block.get("ELSET")
     kind = element_type(name)
     if kind is None and name not in DISCRETE:
-        where = f" in set '{own}'" if own else ""
+        where = f" in set '{element_set}'" if element_set else ""
         count = sum(1 for _ in _joined(block, 0))
-        raise block.place.refuse(
+        raise block.location.refuse(
             f"element type {name[:40]}{described(name)} is not supported; {count} element{'s' * (count != 1)}{where}"
         )
     needed = DISCRETE[name] if kind is None else elements.get(kind.element).n_nodes
     if kind is not None and kind.note and f"{name}: " not in "".join(content.notes):
-        content.note(block.place, f"{name}: {kind.note}")
+        content.note(block.location, f"{name}: {kind.note}")
     members = array("q")
     for row, entries in _joined(block, needed):
         number = row.whole(0)
-        whole = Row(row.place, entries)
-        found = array("q", (whole.whole(i) for i in range(1, len(entries)) if entries[i]))
-        if len(found) != needed:
-            raise row.place.refuse(f"element {number} of type {name} has {len(found)} nodes, {needed} are needed")
+        whole = Row(row.location, entries)
+        connectivity = array("q", (whole.whole(i) for i in range(1, len(entries)) if entries[i]))
+        if len(connectivity) != needed:
+            raise row.location.refuse(
+                f"element {number} of type {name} has {len(connectivity)} nodes, {needed} are needed"
+            )
         if number in part.cells:
-            raise row.place.refuse(f"element {number} is defined twice, first in line {part.cells[number].place.line}")
-        part.cells[number] = Cell(name, found, block.place, row.place.line, own)
+            raise row.location.refuse(
+                f"element {number} is defined twice, first in line {part.cells[number].location.line}"
+            )
+        part.cells[number] = Cell(name, connectivity, block.location, row.location.line, element_set)
         members.append(number)
-    if own:
-        part.add("element", own, [Members(block.place, members)])
+    if element_set:
+        part.add("element", element_set, [Members(block.location, members)])
 
 
 def _joined(block: Block, needed: int) -> Iterator[tuple[Row, tuple[str, ...]]]:
@@ -92,33 +96,33 @@ def element_set(content: Content, part: Part, block: Block) -> None:
 def _members(block: Block) -> list[Members]:
     """Return the entries of a set."""
     instance = folded(block.get("INSTANCE"))
-    found = []
+    members = []
     for row in block.each():
         if "GENERATE" in block.parameters:
             first, last, increment = row.whole(0), row.whole(1), row.whole(2, 1)
             if increment < 1 or last < first:
-                raise row.place.refuse(f"the range {first} to {last} by {increment} is empty: it must ascend")
-            found.append(Members(row.place, range(first, last + 1, increment), instance=instance))
+                raise row.location.refuse(f"the range {first} to {last} by {increment} is empty: it must ascend")
+            members.append(Members(row.location, range(first, last + 1, increment), instance=instance))
             continue
         for numbers, group in groupby(row.entries, lambda entry: entry.isdecimal() and len(entry) < 19):
             if numbers:
-                found.append(Members(row.place, array("q", map(int, group)), instance=instance))
+                members.append(Members(row.location, array("q", map(int, group)), instance=instance))
             else:
-                found += [Members(row.place, name=entry, instance=instance) for entry in group if entry]
-    return found
+                members += [Members(row.location, name=entry, instance=instance) for entry in group if entry]
+    return members
 
 
 def surface(content: Content, part: Part, block: Block) -> None:
     """*SURFACE: faces of elements, or nodes."""
     name, kind = block.required("NAME"), block.choice("TYPE", ("ELEMENT", "NODE"))
     if folded(name) in part.surfaces:
-        raise block.place.refuse(f"surface '{name}' is defined twice")
-    made = SurfaceDefinition(name, block.place, kind == "NODE")
+        raise block.location.refuse(f"surface '{name}' is defined twice")
+    made = SurfaceDefinition(name, block.location, kind == "NODE")
     for row in block.each():
         label = row.text(1).upper()
         if not made.of_nodes and label and not (label[0] == "S" and label[1:].isdigit()):
-            raise row.place.refuse(f"face '{row.text(1)[:40]}' is not supported: faces of solids are S1, S2, ...")
-        made.faces.append(Face(row.place, row.text(0), "" if made.of_nodes else label))
+            raise row.location.refuse(f"face '{row.text(1)[:40]}' is not supported: faces of solids are S1, S2, ...")
+        made.faces.append(Face(row.location, row.text(0), "" if made.of_nodes else label))
     part.surfaces[folded(name)] = made
 
 
@@ -127,9 +131,9 @@ def instance(content: Content, block: Block) -> Instance:
     name, of = block.required("NAME"), block.required("PART")
     if folded(of) not in content.parts:
         known = ", ".join(part.name for part in content.parts.values()) or "none"
-        raise block.place.refuse(f"part '{of}' is not defined; parts: {known}")
+        raise block.location.refuse(f"part '{of}' is not defined; parts: {known}")
     if folded(name) in content.instances:
-        raise block.place.refuse(f"instance '{name}' is defined twice")
+        raise block.location.refuse(f"instance '{name}' is defined twice")
     made = Instance(name, content.parts[folded(of)])
     rows = block.rows
     if rows:
@@ -137,7 +141,7 @@ def instance(content: Content, block: Block) -> Instance:
     if len(rows) > 1:
         made.rotation = tuple(rows[1].number(i) for i in range(7))
     if len(rows) > 2:
-        raise rows[2].place.refuse("an instance has at most two data lines: a translation and a rotation")
+        raise rows[2].location.refuse("an instance has at most two data lines: a translation and a rotation")
     content.instances[folded(name)] = made
     return made
 
@@ -146,6 +150,6 @@ def new_part(content: Content, block: Block) -> Part:
     """*PART."""
     name = block.required("NAME")
     if folded(name) in content.parts:
-        raise block.place.refuse(f"part '{name}' is defined twice")
+        raise block.location.refuse(f"part '{name}' is defined twice")
     content.parts[folded(name)] = Part(unquoted(name))
     return content.parts[folded(name)]

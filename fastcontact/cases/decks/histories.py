@@ -9,7 +9,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from fastcontact.cases.decks.blocks import Place, folded
+from fastcontact.cases.decks.blocks import Location, folded
 from fastcontact.cases.decks.content import Amplitude, Content, Step
 from fastcontact.model.ramp import Table
 
@@ -25,7 +25,7 @@ class Track:
     """The value of quantities that were always given together, through the steps, as points (load factor, value)."""
 
     points: list[tuple[float, float]]
-    place: Place
+    location: Location
     size: int
     alive: bool = True
     shape: tuple[float, Amplitude] | None = None
@@ -58,33 +58,33 @@ class Histories(Generic[Name]):
 
     content: Content
     tracks: dict[Name, Track] = field(default_factory=dict)
-    changing: dict[Name, tuple[float, str, Place]] = field(default_factory=dict)
+    changing: dict[Name, tuple[float, str, Location]] = field(default_factory=dict)
     dying: dict[Name, None] = field(default_factory=dict)
     rest: Mapping[Name, float] = field(default_factory=dict)
-    first: dict[Name, tuple[float, str, Place]] = field(default_factory=dict)
+    first: dict[Name, tuple[float, str, Location]] = field(default_factory=dict)
     time: float = 0.0
     lasting: dict[int, Track] = field(default_factory=dict)
 
-    def give(self, name: Name, value: float, amplitude: str, place: Place) -> None:
+    def give(self, name: Name, value: float, amplitude: str, location: Location) -> None:
         """Give a value for the current step; CaseError if the step has another one for the same."""
         if name in self.changing and self.changing[name][:2] != (value, amplitude):
-            raise place.refuse(
+            raise location.refuse(
                 f"{value:g} is the second value here in one step, after {self.changing[name][0]:g} in line "
                 f"{self.changing[name][2].line}: programs differ in what that means, so give it once"
             )
-        self.changing[name] = (value, amplitude, place)
+        self.changing[name] = (value, amplitude, location)
         self.dying.pop(name, None)
 
-    def hold(self, name: Name, place: Place) -> None:
+    def hold(self, name: Name, location: Location) -> None:
         """Keep the value that the last step ended with."""
         if name in self.tracks:
-            self.changing[name] = (self.tracks[name].last, "", place)
+            self.changing[name] = (self.tracks[name].last, "", location)
             self.dying.pop(name, None)
 
     def begin(self) -> None:
         """Take what was given before all steps as there from the beginning, at zero, and reached in the first step."""
-        for _, _, place in [*self.changing.values()][:1]:
-            self.tracks = dict.fromkeys(self.changing, Track([(0.0, 0.0)], place, len(self.changing)))
+        for _, _, location in [*self.changing.values()][:1]:
+            self.tracks = dict.fromkeys(self.changing, Track([(0.0, 0.0)], location, len(self.changing)))
         self.first, self.changing = self.changing, {}
 
     def forget(self, which: Callable[[Name], bool] = lambda name: True) -> None:
@@ -125,7 +125,7 @@ class Histories(Generic[Name]):
                 track.add(_shaped(*track.shape, begin, start, step.period))
         self.changing, self.first, self.dying = {}, {}, {}
 
-    def _track(self, names: list[Name], rest: float, given: tuple[float, str, Place] | None) -> Track:
+    def _track(self, names: list[Name], rest: float, given: tuple[float, str, Location] | None) -> Track:
         """Return the track that these names alone have: theirs, a new one, or one apart from others that had the same."""
         track = self.tracks.get(names[0])
         if track is not None and track.size == len(names):

@@ -128,20 +128,20 @@ def spelled(block: Block) -> Block:
     known = TRANSLATED.get(keyword, Keyword())
     names = {name.replace(" ", ""): name for name in known.used | known.harmless}
     parameters = {names.get(name.replace(" ", ""), name): value for name, value in block.parameters.items()}
-    return replace(block, place=replace(block.place, keyword=keyword), parameters=parameters)
+    return replace(block, location=replace(block.location, keyword=keyword), parameters=parameters)
 
 
 def check(block: Block, about: str) -> None:
     """Refuse a keyword that is unknown or outside of fastcontact, and parameters that are; `about` names a material."""
     keyword = block.keyword
     if keyword in REFUSED:
-        raise block.place.refuse(f"{about}*{keyword} {REFUSED[keyword]}")
+        raise block.location.refuse(f"{about}*{keyword} {REFUSED[keyword]}")
     known = TRANSLATED.get(keyword)
     if known is None:
         near = difflib.get_close_matches(keyword, [*TRANSLATED, *OUTPUT, *REFUSED, "INCLUDE"], n=1, cutoff=0.6)
         meant = f"; is *{near[0]} meant?" if near else ""
-        raise block.place.refuse(f"unknown keyword *{keyword}{meant}")
+        raise block.location.refuse(f"unknown keyword *{keyword}{meant}")
     for name in block.parameters:
         if not known.anything and name not in known.used | known.harmless:
             takes = ", ".join(sorted(known.used | known.harmless)) or "none"
-            raise block.place.refuse(f"the parameter {name[:40]} of *{keyword} is not supported; it takes {takes}")
+            raise block.location.refuse(f"the parameter {name[:40]} of *{keyword} is not supported; it takes {takes}")

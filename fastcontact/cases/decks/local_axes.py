@@ -6,7 +6,7 @@ import numpy as np
 
 from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import Assembled
-from fastcontact.cases.decks.blocks import Place, folded
+from fastcontact.cases.decks.blocks import Location, folded
 from fastcontact.cases.decks.content import Axes, Content
 
 ROUND_OFF = 1e-9
@@ -17,16 +17,16 @@ def local_directions(made: Assembled) -> dict[int, Array]:
     return {
         point: local_axes(axes, made.points[point])
         for axes in made.content.axes
-        for point in made.nodes(axes.nodes, axes.place)
+        for point in made.nodes(axes.nodes, axes.location)
     }
 
 
-def orientation_of(content: Content, name: str, place: Place) -> Axes:
+def orientation_of(content: Content, name: str, location: Location) -> Axes:
     """Return the axes of an *ORIENTATION; CaseError if there is none of that name."""
     axes = content.orientations.get(folded(name))
     if axes is None:
         known = ", ".join(content.orientations).lower() or "none"
-        raise place.refuse(f"orientation '{name}' is not defined; orientations: {known}")
+        raise location.refuse(f"orientation '{name}' is not defined; orientations: {known}")
     return axes
 
 
@@ -41,6 +41,6 @@ def local_axes(axes: Axes, point: Array) -> Array:
         first, third = a, np.cross(a, b)
     lengths = np.linalg.norm(first), np.linalg.norm(third)
     if min(lengths) <= ROUND_OFF * max(1.0, float(np.abs(axes.points).max()) if not axes.cylindrical else 0.0):
-        raise axes.place.refuse(f"the local axes are not defined at the point {point.tolist()}")
+        raise axes.location.refuse(f"the local axes are not defined at the point {point.tolist()}")
     first, third = first / lengths[0], third / lengths[1]
     return np.array([first, np.cross(third, first), third])

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fastcontact.cases.decks.assembled import Assembled, Element, Face, facet_points
-from fastcontact.cases.decks.blocks import Place, folded
+from fastcontact.cases.decks.blocks import Location, folded
 from fastcontact.cases.decks.content import SurfaceDefinition
 from fastcontact.errors import CaseError
 from fastcontact.mesh import topology
@@ -120,12 +120,12 @@ def begun(made: Assembled) -> DeckMesh:
     first = made.solids[0].solid
     for element in made.solids:
         if element.solid.kinematics != first.kinematics:
-            raise element.cell.place.refuse(
+            raise element.cell.location.refuse(
                 f"elements of type {element.solid.name} and {first.name} ({first.kinematics}) cannot be in one model"
             )
     dim, points = 3 if first.kinematics == "3d" else 2, made.points
     if dim == 2 and np.ptp(points[:, 2]) > FLAT * np.ptp(points[:, :2]):
-        raise made.solids[0].cell.place.refuse(
+        raise made.solids[0].cell.location.refuse(
             f"elements of type {first.name} lie in the plane z = const, but z differs"
         )
     found = DeckMesh(made, first.kinematics, dim)
@@ -140,18 +140,18 @@ def _name_sets(found: DeckMesh) -> None:
         part = made.part(scope)
         prefix = f"{made.content.instances[scope].name}." if scope else ""
         for name, members in part.node_sets.items():
-            points = made.members_of("node", scope, name, members[0].place) if members else []
+            points = made.members_of("node", scope, name, members[0].location) if members else []
             found.point_groups[prefix + part.set_names[name]] = sorted(set(points))
         for name, definition in part.surfaces.items():
             if definition.of_nodes and definition.faces:
                 _name_nodes(found, prefix + definition.name, definition, scope)
             elif definition.faces:  # one that nothing uses may be empty
-                faces = made.faces(f"{scope}.{name}" if scope else name, definition.place)
+                faces = made.faces(f"{scope}.{name}" if scope else name, definition.location)
                 found.add_facets(prefix + definition.name, faces)
         for name, members in part.element_sets.items():
             if name not in part.surfaces and members:
                 found.add_solids(
-                    prefix + part.set_names[name], made.members_of("element", scope, name, members[0].place)
+                    prefix + part.set_names[name], made.members_of("element", scope, name, members[0].location)
                 )
 
 
@@ -166,16 +166,16 @@ def _name_nodes(found: DeckMesh, group: str, definition: SurfaceDefinition, scop
         found.loose[group] = sorted(points.difference(found.made.surface_nodes(definition, scope)))
 
 
-def secondary_group(found: DeckMesh, name: str, place: Place) -> str:
+def secondary_group(found: DeckMesh, name: str, location: Location) -> str:
     """Return the group of a surface as the secondary side of a pair, which may be one of nodes; CaseError for lone nodes."""
-    definition, scope = found.made.surface(name, place)
+    definition, scope = found.made.surface(name, location)
     if not definition.of_nodes:
         return group_of_surface(found, name)
     whole, further, _ = found.made.faces_of_nodes(definition, scope)
     carried = {point for face in (*whole, *further) for point in facet_points(*face)}
     for point in found.made.surface_nodes(definition, scope):
         if point not in carried:
-            raise definition.place.refuse(
+            raise definition.location.refuse(
                 f"node {found.made.number_of(point)} of surface '{definition.name}' is on no outer face of a solid: contact "
                 "needs nodes of bodies, so leave it out"
             )

@@ -15,25 +15,27 @@ LEAST = {"PLANE": 4, "STRAIGHT": 3, "MEANROT": 3}
 FLAT = 1e-9
 
 
-def multi_point_rows(found: DeckMesh, own: MultiPoint) -> list[list[Term]]:
+def multi_point_rows(found: DeckMesh, constraint: MultiPoint) -> list[list[Term]]:
     """Return the equations of a multi-point constraint; CaseError where its nodes do not determine it."""
-    nodes = [point for name in own.nodes for point in found.made.nodes(name, own.place)]
-    nodes = [*dict.fromkeys(nodes[:-1] if own.kind == "MEANROT" else nodes), *nodes[-1:]]
-    nodes = nodes if own.kind == "MEANROT" else nodes[:-1]
-    if len(nodes) < LEAST[own.kind] or found.dim == 2:
-        raise own.place.refuse(f"{own.kind} needs {LEAST[own.kind]} different nodes or more, in space")
+    nodes = [point for name in constraint.nodes for point in found.made.nodes(name, constraint.location)]
+    nodes = [*dict.fromkeys(nodes[:-1] if constraint.kind == "MEANROT" else nodes), *nodes[-1:]]
+    nodes = nodes if constraint.kind == "MEANROT" else nodes[:-1]
+    if len(nodes) < LEAST[constraint.kind] or found.dim == 2:
+        raise constraint.location.refuse(
+            f"{constraint.kind} needs {LEAST[constraint.kind]} different nodes or more, in space"
+        )
     where = found.made.points[nodes]
-    if own.kind == "MEANROT":
-        return [_mean_rotation(own, nodes, where)]
+    if constraint.kind == "MEANROT":
+        return [_mean_rotation(constraint, nodes, where)]
     first = where[1] - where[0]
-    if own.kind == "STRAIGHT":
-        across = _directions(own, first)
+    if constraint.kind == "STRAIGHT":
+        across = _directions(constraint, first)
         along = (where - where[0]) @ first / (first @ first)
         weights = np.column_stack([1.0 - along, along])
     else:
         across = np.cross(first, where[2] - where[0])[None]
         if np.linalg.norm(across) <= FLAT * (first @ first):
-            raise own.place.refuse("the first three nodes of PLANE lie on a line")
+            raise constraint.location.refuse("the first three nodes of PLANE lie on a line")
         edges = np.array([first, where[2] - where[0]])
         inside = np.linalg.lstsq(edges.T, (where - where[0]).T, rcond=None)[0].T
         weights = np.column_stack([1.0 - inside.sum(axis=1), inside])
@@ -46,14 +48,14 @@ def multi_point_rows(found: DeckMesh, own: MultiPoint) -> list[list[Term]]:
     ]
 
 
-def _directions(own: MultiPoint, line: Array) -> Array:
+def _directions(constraint: MultiPoint, line: Array) -> Array:
     """Return two directions (2, 3) across a line [-]."""
     if not line.any():
-        raise own.place.refuse("the first two nodes of STRAIGHT are at one place")
+        raise constraint.location.refuse("the first two nodes of STRAIGHT are at one place")
     return np.asarray(np.linalg.svd(line[None])[2][1:])
 
 
-def _mean_rotation(own: MultiPoint, nodes: list[int], where: Array) -> list[Term]:
+def _mean_rotation(constraint: MultiPoint, nodes: list[int], where: Array) -> list[Term]:
     """Return the equation between nodes and the first component of the last one, their mean rotation about its direction.
 
     That is the mean of the angles by which they turn about their centre, as in CalculiX: with the axis a, offsets p from the
@@ -62,14 +64,14 @@ def _mean_rotation(own: MultiPoint, nodes: list[int], where: Array) -> list[Term
     axis, places = where[-1], where[:-1] - where[:-1].mean(axis=0)
     length = np.linalg.norm(axis)
     if length == 0.0:
-        raise own.place.refuse(
+        raise constraint.location.refuse(
             "the coordinates of the last node of MEANROT are the direction of the axis, and all zero"
         )
     axis = axis / length
     offset = places - np.outer(places @ axis, axis)
     squared = np.einsum("nd,nd->n", offset, offset)
     if squared.min() <= FLAT * squared.max():
-        raise own.place.refuse("a node of MEANROT lies in the middle of the others, where it has no angle")
+        raise constraint.location.refuse("a node of MEANROT lies in the middle of the others, where it has no angle")
     arms = np.cross(axis, offset) / squared[:, None] / len(offset)
     arms -= arms.mean(axis=0)
     return [*_terms(nodes[:-1], arms), (nodes[-1], 0, -1.0)]

@@ -9,7 +9,7 @@ from fastcontact.cases.decks.assembled import Assembled, facet_points
 from fastcontact.cases.decks.blocks import Block
 from fastcontact.cases.decks.content import Content, Given, PretensionSection
 from fastcontact.cases.decks.meshing import DeckMesh, group_of_surface
-from fastcontact.elasticity.relations import Relation
+from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.errors import MeshError
 from fastcontact.mesh.generate.cut import cut
 from fastcontact.mesh.mesh import Mesh
@@ -19,28 +19,30 @@ from fastcontact.model.model import Model
 def pretension_section(content: Content, block: Block) -> None:
     """*PRE-TENSION SECTION: a surface through a bolt, and the node that has its shortening and its force."""
     if len(block.rows) > 1:
-        raise block.place.refuse(f"{len(block.rows)} data lines where one is needed, the normal")
+        raise block.location.refuse(f"{len(block.rows)} data lines where one is needed, the normal")
     row = block.rows[0] if block.rows else None
     normal = None if row is None else (row.number(0), row.number(1, 0.0), row.number(2, 0.0))
     if normal is not None and not any(normal):
-        raise block.place.refuse("the normal has no length")
+        raise block.location.refuse("the normal has no length")
     content.pretensions.append(
-        PretensionSection(block.place, block.required("SURFACE"), block.required("NODE"), normal)
+        PretensionSection(block.location, block.required("SURFACE"), block.required("NODE"), normal)
     )
 
 
 def section_points(made: Assembled) -> dict[int, PretensionSection]:
     """Return the sections by the points of their nodes; CaseError where such a point belongs to a body or to another one."""
     used = {point for solid in made.solids for point in solid.points}
-    found: dict[int, PretensionSection] = {}
+    sections: dict[int, PretensionSection] = {}
     for section in made.content.pretensions:
-        point = made.node(section.node, section.place)
+        point = made.node(section.node, section.location)
         if point in used:
-            raise section.place.refuse(f"node {section.node} belongs to an element: a section needs one of its own")
-        if point in found:
-            raise section.place.refuse(f"node {section.node} has a section already, in line {found[point].place.line}")
-        found[point] = section
-    return found
+            raise section.location.refuse(f"node {section.node} belongs to an element: a section needs one of its own")
+        if point in sections:
+            raise section.location.refuse(
+                f"node {section.node} has a section already, in line {sections[point].location.line}"
+            )
+        sections[point] = section
+    return sections
 
 
 class Locks:
@@ -56,11 +58,11 @@ class Locks:
         self.number = number
         if not any(given.new for given in supports):
             return
-        named = {p for given in supports for row in given.block.rows for p in made.nodes(row.text(0), row.place)}
+        named = {p for given in supports for row in given.block.rows for p in made.nodes(row.text(0), row.location)}
         for point in self.begins:
             if point not in named:
-                place = next(given.block.place for given in supports if given.new)
-                raise place.refuse(
+                location = next(given.block.location for given in supports if given.new)
+                raise location.refuse(
                     f"node {self.points[point].node} of a pretension section is let go here: once locked it stays so"
                 )
 
@@ -76,31 +78,31 @@ def cut_sections(found: DeckMesh, mesh: Mesh) -> Mesh:
     """Return the mesh cut along all pretension sections."""
     sections: set[str] = set()
     for section in found.made.content.pretensions:
-        found.made.faces(section.surface, section.place)
+        found.made.faces(section.surface, section.location)
         group = group_of_surface(found, section.surface)
         if group in sections:
-            raise section.place.refuse(f"surface '{group}' has a pretension section already")
+            raise section.location.refuse(f"surface '{group}' has a pretension section already")
         sections.add(group)
         normal = None if section.normal is None else section.normal[: found.dim]
         try:
             mesh = cut(mesh, group, normal)
         except MeshError as error:
-            raise section.place.refuse(str(error)) from error
+            raise section.location.refuse(str(error)) from error
     return mesh
 
 
-def add_sections(model: Model, found: DeckMesh, locks: Locks) -> list[Relation]:
+def add_sections(model: Model, found: DeckMesh, locks: Locks) -> list[MultiPointConstraint]:
     """Add the pretension sections to a model; return all relations that they have at any time, and those to their nodes."""
     before, links, locked = len(model.relations), [], []
     for point, section in locks.points.items():
-        group, place = group_of_surface(found, section.surface), section.place
+        group, location = group_of_surface(found, section.surface), section.location
         normal = None if section.normal is None else section.normal[: found.dim]
         model.add_pretension(group, group, force=0.0, locked_from=locks.begins.get(point), normal=normal)
         row = _side(found, section) * model.pretensions[-1].row(model.n_dofs)
         node = csr_array((np.ones(1), ([0], [point * found.dim])), shape=row.shape)
-        links.append(Relation(f"*{place.keyword} of line {place.line}", csr_array(row - node)))
+        links.append(MultiPointConstraint(f"*{location.keyword} of line {location.line}", csr_array(row - node)))
         if point in locks.begins:
-            locked.append(Relation(f"the locked length of line {place.line}", row))
+            locked.append(MultiPointConstraint(f"the locked length of line {location.line}", row))
     model.relations.extend(links)
     return [*model.relations[before:], *locked]
 
@@ -113,6 +115,6 @@ def _side(found: DeckMesh, section: PretensionSection) -> float:
     if section.normal is None:
         return 1.0
     points, outward = found.made.points, np.zeros(3)
-    for solid, facet in found.made.faces(section.surface, section.place):
+    for solid, facet in found.made.faces(section.surface, section.location):
         outward += points[list(facet_points(solid, facet))].mean(axis=0) - points[list(solid.points)].mean(axis=0)
     return float(np.copysign(1.0, outward @ np.array(section.normal)))

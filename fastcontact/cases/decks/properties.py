@@ -25,29 +25,29 @@ def material(content: Content, block: Block) -> Material:
     """*MATERIAL: begins a material."""
     name = block.required("NAME")
     if folded(name) in content.materials:
-        raise block.place.refuse(f"material '{name}' is defined twice")
-    content.materials[folded(name)] = Material(name, block.place)
+        raise block.location.refuse(f"material '{name}' is defined twice")
+    content.materials[folded(name)] = Material(name, block.location)
     return content.materials[folded(name)]
 
 
 def elastic(content: Content, current: Material, block: Block) -> None:
     """*ELASTIC: constants of one temperature."""
     kind = " ".join(block.get("TYPE", "ISOTROPIC").upper().split())
-    found = [known for known in CONSTANTS if len(kind) >= 3 and known.startswith(kind)]
-    if not found:
+    kinds = [known for known in CONSTANTS if len(kind) >= 3 and known.startswith(kind)]
+    if not kinds:
         known = ", ".join(CONSTANTS)
-        raise block.place.refuse(f"material '{current.name}': TYPE={kind[:40]} is not supported; known are {known}")
-    if found[0] != "ISOTROPIC":
-        _with_axes(current, block, found[0])
+        raise block.location.refuse(f"material '{current.name}': TYPE={kind[:40]} is not supported; known are {known}")
+    if kinds[0] != "ISOTROPIC":
+        _with_axes(current, block, kinds[0])
         return
     row = _only(block, "temperatures" if len(block.rows) > 1 else "")
     E, nu = row.number(0), row.number(1, 0.0)
     if row.text(2):
-        content.note(row.place, "the temperature of the constants has no effect: there is one set of them")
+        content.note(row.location, "the temperature of the constants has no effect: there is one set of them")
     try:
         law = LinearElastic(E=E, nu=nu)
     except ModelError as error:
-        raise row.place.refuse(f"material '{current.name}': {error}") from None
+        raise row.location.refuse(f"material '{current.name}': {error}") from None
 
     current.law = lambda axes: law
 
@@ -57,7 +57,7 @@ def _with_axes(current: Material, block: Block, kind: str) -> None:
     numbers = [row.number(i) for row in block.rows for i in range(len(row.entries)) if row.entries[i]]
     count = CONSTANTS[kind]
     if not count <= len(numbers) <= count + 1:
-        raise block.place.refuse(
+        raise block.location.refuse(
             f"material '{current.name}': {len(numbers)} constants where {kind} has {count}, at one temperature"
         )
     values = numbers[:count]
@@ -70,7 +70,7 @@ def _with_axes(current: Material, block: Block, kind: str) -> None:
     try:
         law(None)
     except ModelError as error:
-        raise block.place.refuse(f"material '{current.name}': {error}") from None
+        raise block.location.refuse(f"material '{current.name}': {error}") from None
     current.law = law
 
 
@@ -91,20 +91,22 @@ def orientation(content: Content, block: Block) -> None:
     name, system = block.required("NAME"), block.choice("SYSTEM", ("RECTANGULAR", "CYLINDRICAL"))
     rows = block.rows
     if not rows:
-        raise block.place.refuse("a data line with six coordinates is needed")
+        raise block.location.refuse("a data line with six coordinates is needed")
     points = tuple(rows[0].number(i) for i in range(6))
     if any(rows[0].entries[6:]) and any(rows[0].number(6 + i, 0.0) for i in range(3)):
-        raise rows[0].place.refuse("an origin of the axes is not supported: give points seen from 0, 0, 0")
+        raise rows[0].location.refuse("an origin of the axes is not supported: give points seen from 0, 0, 0")
     if len(rows) > 1 and rows[1].number(1, 0.0):
-        raise rows[1].place.refuse("a further rotation of the axes is not supported: turn the points of the first line")
-    content.orientations[folded(name)] = Axes(block.place, "", system == "CYLINDRICAL", points)
+        raise rows[1].location.refuse(
+            "a further rotation of the axes is not supported: turn the points of the first line"
+        )
+    content.orientations[folded(name)] = Axes(block.location, "", system == "CYLINDRICAL", points)
 
 
 def density(content: Content, current: Material, block: Block) -> None:
     """*DENSITY."""
     current.density = _only(block).number(0)
     if not current.density > 0:
-        raise block.place.refuse(f"material '{current.name}': the density {current.density:g} must be positive")
+        raise block.location.refuse(f"material '{current.name}': the density {current.density:g} must be positive")
 
 
 def section(content: Content, part: Part, block: Block) -> None:
@@ -113,10 +115,10 @@ def section(content: Content, part: Part, block: Block) -> None:
     for row in block.rows[:1]:
         thickness = row.number(0, 1.0)
         if not thickness > 0:
-            raise row.place.refuse(f"the thickness {thickness:g} must be positive")
+            raise row.location.refuse(f"the thickness {thickness:g} must be positive")
     orientation = block.get("ORIENTATION")
     part.sections.append(
-        Section(block.place, block.required("ELSET"), block.required("MATERIAL"), thickness, orientation)
+        Section(block.location, block.required("ELSET"), block.required("MATERIAL"), thickness, orientation)
     )
 
 
@@ -124,11 +126,13 @@ def interaction(content: Content, block: Block) -> Interaction:
     """*SURFACE INTERACTION: begins the properties of contact pairs."""
     name = block.required("NAME")
     if folded(name) in content.interactions:
-        raise block.place.refuse(f"surface interaction '{name}' is defined twice")
-    content.interactions[folded(name)] = Interaction(name, block.place)
+        raise block.location.refuse(f"surface interaction '{name}' is defined twice")
+    content.interactions[folded(name)] = Interaction(name, block.location)
     if block.rows:
         block.rows[0].number(0, 1.0)
-        content.note(block.rows[0].place, "the thickness of the interaction has no effect: that of the sections counts")
+        content.note(
+            block.rows[0].location, "the thickness of the interaction has no effect: that of the sections counts"
+        )
     return content.interactions[folded(name)]
 
 
@@ -136,9 +140,9 @@ def changed_interaction(content: Content, block: Block) -> Interaction:
     """*CHANGE FRICTION: begins what holds from the current step on, by the *FRICTION below it."""
     name = block.required("INTERACTION")
     if folded(name) not in content.interactions:
-        known = ", ".join(own.name for own in content.interactions.values()) or "none"
-        raise block.place.refuse(f"surface interaction '{name}' is not defined; interactions: {known}")
-    changed = Interaction(name, block.place, friction=-1.0)  # which it has to say
+        known = ", ".join(interaction.name for interaction in content.interactions.values()) or "none"
+        raise block.location.refuse(f"surface interaction '{name}' is not defined; interactions: {known}")
+    changed = Interaction(name, block.location, friction=-1.0)  # which it has to say
     content.interactions[folded(name)].changes.append((len(content.steps) - 1, changed))
     return changed
 
@@ -164,7 +168,7 @@ def _table(block: Block) -> float | list[tuple[float, float]]:
     try:
         OverclosureLaw("", points)
     except ContactError:
-        raise block.place.refuse(
+        raise block.location.refuse(
             "TABULAR needs pressures and overclosures that both ascend, the first pressure zero"
         ) from None
     return points[1][1] / points[1][0] if len(points) == 2 and points[0][0] == 0.0 else points
@@ -183,12 +187,12 @@ def friction(content: Content, current: Interaction, block: Block) -> None:
     row = _only(block)
     current.friction = row.number(0)
     if current.friction < 0:
-        raise row.place.refuse(f"the coefficient of friction {current.friction:g} is negative")
+        raise row.location.refuse(f"the coefficient of friction {current.friction:g} is negative")
     if row.text(1) and row.number(1):
         current.stick = _positive(row, 1, "stick slope")
-        content.note(row.place, f"{current.stick:g} is taken for the stick slope, as in CalculiX (shear by slip)")
+        content.note(row.location, f"{current.stick:g} is taken for the stick slope, as in CalculiX (shear by slip)")
     if len(row.entries) > 2 and any(row.entries[2:]):
-        raise row.place.refuse(
+        raise row.location.refuse(
             "friction that depends on pressure or temperature is not supported: give one coefficient"
         )
 
@@ -202,8 +206,8 @@ def amplitude(content: Content, block: Block) -> None:
     numbers = [row.number(i) for row in block.rows for i in range(len(row.entries)) if row.entries[i]]
     times, values = numbers[::2], numbers[1::2]
     if not times or len(times) != len(values) or any(b <= a for a, b in pairwise(times)):
-        raise block.place.refuse(f"amplitude '{name}' needs pairs of ascending times and multipliers")
-    content.amplitudes[folded(name)] = Amplitude(block.place, tuple(times), tuple(values), total)
+        raise block.location.refuse(f"amplitude '{name}' needs pairs of ascending times and multipliers")
+    content.amplitudes[folded(name)] = Amplitude(block.location, tuple(times), tuple(values), total)
 
 
 def gap(content: Content, block: Block) -> None:
@@ -211,24 +215,26 @@ def gap(content: Content, block: Block) -> None:
     row = _only(block)
     direction = tuple(row.number(i, 0.0) for i in (1, 2, 3))
     if not any(direction):
-        raise row.place.refuse("the direction of the gap elements is missing")
-    content.gaps[folded(block.required("ELSET"))] = (block.place, row.number(0), direction)
+        raise row.location.refuse("the direction of the gap elements is missing")
+    content.gaps[folded(block.required("ELSET"))] = (block.location, row.number(0), direction)
 
 
 def spring(content: Content, block: Block) -> None:
     """*SPRING: stiffness of springs along their line."""
     rows = block.rows
     if len(rows) != 1:
-        raise block.place.refuse("linear springs along their line need an empty line and then one with the stiffness")
+        raise block.location.refuse(
+            "linear springs along their line need an empty line and then one with the stiffness"
+        )
     if rows[0].text(1):
-        raise rows[0].place.refuse("only linear springs are supported: one stiffness")
-    content.springs[folded(block.required("ELSET"))] = (block.place, _positive(rows[0], 0, "stiffness"))
+        raise rows[0].location.refuse("only linear springs are supported: one stiffness")
+    content.springs[folded(block.required("ELSET"))] = (block.location, _positive(rows[0], 0, "stiffness"))
 
 
-def _positive(row: Row, index: int, what: str) -> float:
+def _positive(row: Row, index: int, name: str) -> float:
     value = row.number(index)
     if not value > 0:
-        raise row.place.refuse(f"the {what} {value:g} must be positive")
+        raise row.location.refuse(f"the {name} {value:g} must be positive")
     return value
 
 
@@ -237,5 +243,5 @@ def _only(block: Block, why: str = "") -> Row:
     rows = block.rows
     if len(rows) != 1:
         text = f"{len(rows)} data lines where one is needed"
-        raise block.place.refuse(text + (f": constants that depend on {why} are not supported" if why else ""))
+        raise block.location.refuse(text + (f": constants that depend on {why} are not supported" if why else ""))
     return rows[0]

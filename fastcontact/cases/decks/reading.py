@@ -75,27 +75,29 @@ class Reader:
         """Read one block."""
         keyword, content = block.keyword, self.content
         if keyword in OUTPUT:
-            content.outputs.append(block.place)
+            content.outputs.append(block.location)
             return
         check(block, f"material '{self.material.name}': " if self.material else "")
         if self.coupling is not None and keyword not in ("KINEMATIC", "DISTRIBUTING"):
-            raise self.coupling.place.refuse("*KINEMATIC or *DISTRIBUTING must follow")
+            raise self.coupling.location.refuse("*KINEMATIC or *DISTRIBUTING must follow")
         if keyword in OF_MATERIALS:
             if self.material is None:
-                raise block.place.refuse("belongs below *MATERIAL")
+                raise block.location.refuse("belongs below *MATERIAL")
             OF_MATERIALS[keyword](content, self.material, block)
             return
         self.material = None
         if keyword in OF_INTERACTIONS:
             if self.interaction is None:
-                raise block.place.refuse("belongs below *SURFACE INTERACTION")
+                raise block.location.refuse("belongs below *SURFACE INTERACTION")
             OF_INTERACTIONS[keyword](content, self.interaction, block)
             return
         self.interaction = None
         if keyword in IN_PARTS:
             self._not_in_step(block)
             if self.instance is not None:
-                raise block.place.refuse("is not supported inside of an instance: put it into the part or the assembly")
+                raise block.location.refuse(
+                    "is not supported inside of an instance: put it into the part or the assembly"
+                )
             IN_PARTS[keyword](content, self._open_part(), block)
         elif keyword in OF_MODELS:
             if keyword != "AMPLITUDE":
@@ -113,11 +115,11 @@ class Reader:
 
     def _not_in_step(self, block: Block) -> None:
         if self.step is not None:
-            raise block.place.refuse("cannot stand inside of a step")
+            raise block.location.refuse("cannot stand inside of a step")
 
     def _not_in_part(self, block: Block) -> None:
         if self.part is not None or self.instance is not None:
-            raise block.place.refuse("is supported for the whole assembly only, not inside of a part or instance")
+            raise block.location.refuse("is supported for the whole assembly only, not inside of a part or instance")
 
     def _heading(self, block: Block) -> None:
         self.content.title = " ".join(" ".join(", ".join(row.entries) for row in block.rows[:1]).split())
@@ -150,7 +152,7 @@ class Reader:
 
     def _change_friction(self, block: Block) -> None:
         if self.step is None:
-            raise block.place.refuse("belongs into a step")
+            raise block.location.refuse("belongs into a step")
         self.interaction = properties.changed_interaction(self.content, block)
 
     def _coupling(self, block: Block) -> None:
@@ -159,7 +161,7 @@ class Reader:
 
     def _kinematic(self, block: Block) -> None:
         if self.coupling is None:
-            raise block.place.refuse("belongs below *COUPLING")
+            raise block.location.refuse("belongs below *COUPLING")
         connections.coupling(self.content, self.coupling, block)
         self.coupling = None
 
@@ -167,23 +169,23 @@ class Reader:
 
     def _step(self, block: Block) -> None:
         if self.step is not None:
-            raise block.place.refuse("the step before has no *END STEP")
+            raise block.location.refuse("the step before has no *END STEP")
         self._not_in_part(block)
         self.step = stepping.new_step(self.content, block)
 
     def _static(self, block: Block) -> None:
         if self.step is None:
-            raise block.place.refuse("belongs into a step")
+            raise block.location.refuse("belongs into a step")
         stepping.static(self.content, self.step, block)
 
     def _frequency(self, block: Block) -> None:
         if self.step is None:
-            raise block.place.refuse("belongs into a step")
+            raise block.location.refuse("belongs into a step")
         stepping.frequency(self.step, block)
 
     def _end_step(self, block: Block) -> None:
         if self.step is None:
-            raise block.place.refuse("there is no step to end")
+            raise block.location.refuse("there is no step to end")
         stepping.end_step(self.content, self.step)
         self.step = None
 
@@ -194,7 +196,7 @@ def read_content(blocks: Iterable[Block]) -> Content:
     for block in blocks:
         reader.take(spelled(block))
     if reader.step is not None:
-        raise reader.step.place.refuse("the step has no *END STEP: the deck is cut off, or the line is missing")
+        raise reader.step.location.refuse("the step has no *END STEP: the deck is cut off, or the line is missing")
     if reader.coupling is not None:
-        raise reader.coupling.place.refuse("*KINEMATIC or *DISTRIBUTING must follow")
+        raise reader.coupling.location.refuse("*KINEMATIC or *DISTRIBUTING must follow")
     return reader.content

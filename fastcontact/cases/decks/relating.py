@@ -13,7 +13,7 @@ from fastcontact.cases.decks.local_axes import local_axes, local_directions, ori
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.cases.decks.multi_points import multi_point_rows
 from fastcontact.elasticity.loads import Traction
-from fastcontact.elasticity.relations import Relation
+from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.errors import ModelError
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.couplings import ReferencePoint, Term, distributing_rows, relation, rigid_rows
@@ -22,26 +22,26 @@ from fastcontact.model.couplings import ReferencePoint, Term, distributing_rows,
 def make_rotations(found: DeckMesh) -> None:
     """Give every reference node a point for its rotation, before the mesh is made."""
     for link in found.made.content.links:
-        point = found.made.node(link.reference, link.place)
+        point = found.made.node(link.reference, link.location)
         if link.rotation:
-            found.rotations[point] = found.made.node(link.rotation, link.place)
+            found.rotations[point] = found.made.node(link.rotation, link.location)
         elif found.kinematics == "axisymmetric":
-            raise link.place.refuse("is not supported in axisymmetric models: relate the nodes by *EQUATION")
+            raise link.location.refuse("is not supported in axisymmetric models: relate the nodes by *EQUATION")
         else:
             found.rotation(point)
 
 
-def relations_of(found: DeckMesh, mesh: Mesh) -> list[Relation]:
+def relations_of(found: DeckMesh, mesh: Mesh) -> list[MultiPointConstraint]:
     """Return the relations of all equations, rigid bodies and couplings."""
     content = found.made.content
     axes = local_directions(found.made)
     rows = [_equation(found, equation, axes) for equation in content.equations]
     rows += [row for pin in content.pins for row in _pinned(found, pin)]
-    rows += [row for own in content.multi_points for row in multi_point_rows(found, own)]
+    rows += [row for constraint in content.multi_points for row in multi_point_rows(found, constraint)]
     made = [relation("the equations of the deck", rows, mesh.points.shape)] if rows else []
     for link in content.links:
         rows = _distributing(found, mesh, link) if link.distributing else _rigid(found, link)
-        made.append(relation(f"*{link.place.keyword} of line {link.place.line}", rows, mesh.points.shape))
+        made.append(relation(f"*{link.location.keyword} of line {link.location.line}", rows, mesh.points.shape))
     return made
 
 
@@ -49,23 +49,23 @@ def _equation(found: DeckMesh, equation: Equation, axes: Mapping[int, Array]) ->
     """Return the terms of an equation along the axes of space; components count along the local `axes` of points."""
     terms: list[Term] = []
     for name, component, coefficient in equation.terms:
-        point = found.made.node(name, equation.place)
+        point = found.made.node(name, equation.location)
         if not 1 <= component <= found.dim:
-            raise equation.place.refuse(f"component {component} of '{name}' is none of 1 to {found.dim}")
+            raise equation.location.refuse(f"component {component} of '{name}' is not within 1 to {found.dim}")
         along = axes.get(point, np.eye(3))[component - 1]
         terms += [(point, axis, coefficient * along[axis]) for axis in np.flatnonzero(along[: found.dim]).tolist()]
     if not any(coefficient for _, _, coefficient in terms):
-        raise equation.place.refuse("all coefficients of the equation are zero")
+        raise equation.location.refuse("all coefficients of the equation are zero")
     return terms
 
 
 def _pinned(found: DeckMesh, pin: Pin) -> list[list[Term]]:
     """Return the equations by which nodes have the displacements of others."""
-    first, second = (found.made.nodes(name, pin.place) for name in (pin.first, pin.second))
+    first, second = (found.made.nodes(name, pin.location) for name in (pin.first, pin.second))
     if len(second) == 1:
         second = second * len(first)
     if len(first) != len(second) or set(zip(first, second, strict=True)) & set(zip(second, first, strict=True)):
-        raise pin.place.refuse(
+        raise pin.location.refuse(
             f"'{pin.first}' and '{pin.second}' have {len(first)} and {len(second)} nodes: as many are needed, or one that "
             "leads, each another one"
         )
@@ -76,25 +76,25 @@ def _points(found: DeckMesh, link: Link) -> list[int]:
     """Return the points that follow a reference point, without itself."""
     made = found.made
     if link.kind == "nodes":
-        points = made.nodes(link.group, link.place)
+        points = made.nodes(link.group, link.location)
     elif link.kind == "elements":
-        own = made.elements_of(link.group, link.place)
-        points = [p for element in own if element.type is not None for p in element.points]
+        elements = made.elements_of(link.group, link.location)
+        points = [p for element in elements if element.type is not None for p in element.points]
     else:
-        definition, scope = made.surface(link.group, link.place)
+        definition, scope = made.surface(link.group, link.location)
         if definition.of_nodes:
             points = made.surface_nodes(definition, scope)
         else:
-            points = [p for face in made.faces(link.group, link.place) for p in facet_points(*face)]
-    reference = made.node(link.reference, link.place)
+            points = [p for face in made.faces(link.group, link.location) for p in facet_points(*face)]
+    reference = made.node(link.reference, link.location)
     kept = sorted(set(points) - {reference, found.rotations[reference]})
     if not kept:
-        raise link.place.refuse(f"'{link.group}' holds no nodes that could follow the reference node")
+        raise link.location.refuse(f"'{link.group}' holds no nodes that could follow the reference node")
     return kept
 
 
 def _reference(found: DeckMesh, link: Link) -> ReferencePoint:
-    point = found.made.node(link.reference, link.place)
+    point = found.made.node(link.reference, link.location)
     return ReferencePoint(point, found.rotations[point], tuple(found.made.points[point][: found.dim].tolist()))
 
 
@@ -110,7 +110,7 @@ def _directions(found: DeckMesh, link: Link, point: int) -> Array:
     """Return the directions (n, dim) of the components that a coupling relates at a point [-]."""
     axes = np.eye(3)
     if link.orientation:
-        axes = local_axes(orientation_of(found.made.content, link.orientation, link.place), found.made.points[point])
+        axes = local_axes(orientation_of(found.made.content, link.orientation, link.location), found.made.points[point])
     return axes[[component - 1 for component in link.components if component <= found.dim], : found.dim]
 
 
@@ -129,16 +129,16 @@ def _along(rows: Sequence[Sequence[Term]], directions: Array) -> list[list[Term]
 def _distributing(found: DeckMesh, mesh: Mesh, link: Link) -> list[list[Term]]:
     """Return the equations by which a reference point follows the mean motion of a surface, weighted by area."""
     made = found.made
-    group = found.add_facets(f"coupling of line {link.place.line}", made.faces(link.group, link.place))
+    group = found.add_facets(f"coupling of line {link.location.line}", made.faces(link.group, link.location))
     areas = Traction(_known(mesh, found, group), {0: 1.0}, None).vector(mesh, found.kinematics)[:, 0]
     points = np.array(_points(found, link), np.intp)
     weight = areas[points] / areas[points].sum()
     try:
         rows = distributing_rows(_reference(found, link), points, made.points[points, : found.dim], weight)
     except ModelError as error:
-        raise link.place.refuse(str(error)) from error
+        raise link.location.refuse(str(error)) from error
     turns = len(rows) - found.dim
-    return rows[:turns] + _along(rows[turns:], _directions(found, link, made.node(link.reference, link.place)))
+    return rows[:turns] + _along(rows[turns:], _directions(found, link, made.node(link.reference, link.location)))
 
 
 def _known(mesh: Mesh, found: DeckMesh, group: str) -> str:

@@ -21,31 +21,33 @@ def expansion(content: Content, current: Material, block: Block) -> None:
     """*EXPANSION: coefficients of one temperature, one for all directions or one along each axis."""
     kind = block.choice("TYPE", tuple(EXPANSIONS))
     if len(block.rows) != 1:
-        raise block.place.refuse(
+        raise block.location.refuse(
             f"material '{current.name}': {len(block.rows)} data lines where one is needed: coefficients that depend on "
             "temperatures are not supported"
         )
     row, count = block.rows[0], EXPANSIONS[kind]
     values = tuple(row.number(index) for index in range(count))
     if any(row.entries[count + 1 :]):
-        raise row.place.refuse(f"material '{current.name}': TYPE={kind} has {count} coefficients, at one temperature")
+        raise row.location.refuse(
+            f"material '{current.name}': TYPE={kind} has {count} coefficients, at one temperature"
+        )
     current.expansion = values[0] if kind == "ISO" else values
     if "ZERO" in block.parameters:
         content.note(
-            block.place, "ZERO has no effect: strains count from the initial temperatures, coefficients are constant"
+            block.location, "ZERO has no effect: strains count from the initial temperatures, coefficients are constant"
         )
 
 
 def without_effect(content: Content, current: Material, block: Block) -> None:
     """*CONDUCTIVITY, *SPECIFIC HEAT: properties that static steps do not use."""
-    content.note(block.place, f"material '{current.name}': no effect, temperatures are given, not computed")
+    content.note(block.location, f"material '{current.name}': no effect, temperatures are given, not computed")
 
 
 def initial_conditions(content: Content, block: Block) -> None:
     """*INITIAL CONDITIONS: temperatures of nodes, or stresses of elements, before the first step."""
     kind = " ".join(block.required("TYPE").upper().split())
     if kind not in ("TEMPERATURE", "STRESS"):
-        raise block.place.refuse(f"TYPE={kind[:40]} is not supported, only TEMPERATURE and STRESS")
+        raise block.location.refuse(f"TYPE={kind[:40]} is not supported, only TEMPERATURE and STRESS")
     (content.initial if kind == "TEMPERATURE" else content.stresses).append(block)
 
 
@@ -60,7 +62,7 @@ def give(made: Assembled, histories: Histories[int], given: Given) -> None:
         histories.forget()
     for row in given.block.rows:
         for point, value in _of_row(made, given.block, row):
-            histories.give(point, value, given.amplitude, row.place)
+            histories.give(point, value, given.amplitude, row.location)
 
 
 def _by_point(made: Assembled, block: Block) -> Iterable[tuple[int, float]]:
@@ -70,9 +72,9 @@ def _by_point(made: Assembled, block: Block) -> Iterable[tuple[int, float]]:
 
 def _of_row(made: Assembled, block: Block, row: Row) -> list[tuple[int, float]]:
     if any(row.entries[2:]):
-        raise row.place.refuse("gradients of the temperature are those of beams and shells: give one number")
+        raise row.location.refuse("gradients of the temperature are those of beams and shells: give one number")
     value = row.number(1)
-    return [(point, value) for point in made.nodes(row.text(0), row.place)]
+    return [(point, value) for point in made.nodes(row.text(0), row.location)]
 
 
 def add_temperatures(model: Model, histories: Histories[int]) -> None:
@@ -90,8 +92,8 @@ def add_temperatures(model: Model, histories: Histories[int]) -> None:
         for shape, members in by_shape.items():
             _add(model, members, shape)
         return
-    for place, time in enumerate(times):  # histories that differ from node to node: one field for each corner of them
-        around = sorted({times[0], *times[max(place - 1, 0) : place + 2], times[-1]})
+    for k, time in enumerate(times):  # histories that differ from node to node: one field for each corner of them
+        around = sorted({times[0], *times[max(k - 1, 0) : k + 2], times[-1]})
         hat = tuple((other, float(other == time)) for other in around)
         _add(model, [(point, value) for table, points in rises if (value := _at(table, time)) for point in points], hat)
 

@@ -20,8 +20,8 @@ class _Formulations(Mapping[str, type[Formulation]]):
     def __getitem__(self, name: str) -> type[Formulation]:
         if name not in self._names:
             raise KeyError(name)
-        found: type[Formulation] = importlib.import_module(f"{__name__}.{name}").FORMULATION
-        return found
+        formulation: type[Formulation] = importlib.import_module(f"{__name__}.{name}").FORMULATION
+        return formulation
 
     def __contains__(self, name: object) -> bool:
         return name in self._names

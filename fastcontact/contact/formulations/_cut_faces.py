@@ -64,9 +64,9 @@ def face_overlap(
             pairs = _facing(mine, other, reach)
             rows = slice(first, first + size), slice(first_other, first_other + len(other.nodes))
             heights = _heights(smoothing, pairs, rows, axes)
-            coupling, part, deep = _integrated(mine, other, pairs, reference, heights)
+            coupling, area, deep = _integrated(mine, other, pairs, reference, heights)
             couplings.append(coupling)
-            mass += part
+            mass += area
             depth += deep
             first_other += len(other.nodes)
         masses.append(mass)
@@ -86,8 +86,12 @@ def _heights(
         none = np.zeros((0, 0, 0))
         return none, none, np.zeros((len(pairs), 2))
     secondary, primary = smoothing.secondary.part(rows[0]), smoothing.primary.part(rows[1])
-    own = axes[0][rows[0]], axes[1][rows[1]]
-    return secondary.heights, primary.heights, Smoothing(secondary, primary).shared(pairs[:, 0], pairs[:, 1], own)
+    axes_of_facets = axes[0][rows[0]], axes[1][rows[1]]
+    return (
+        secondary.heights,
+        primary.heights,
+        Smoothing(secondary, primary).shared(pairs[:, 0], pairs[:, 1], axes_of_facets),
+    )
 
 
 @dataclass(frozen=True, eq=False)

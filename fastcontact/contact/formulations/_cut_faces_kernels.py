@@ -82,10 +82,10 @@ def _centroid(flat, count):
     for k in range(1, count - 1):
         ux, uy = flat[k, 0] - flat[0, 0], flat[k, 1] - flat[0, 1]
         vx, vy = flat[k + 1, 0] - flat[0, 0], flat[k + 1, 1] - flat[0, 1]
-        part = ux * vy - uy * vx
-        x += part * (ux + vx) / 3.0
-        y += part * (uy + vy) / 3.0
-        twice += part
+        area = ux * vy - uy * vx
+        x += area * (ux + vx) / 3.0
+        y += area * (uy + vy) / 3.0
+        twice += area
     return flat[0, 0] + x / twice, flat[0, 1] + y / twice
 
 
@@ -176,7 +176,7 @@ def facing_pairs(
         Number of pairs; larger than the room where that did not suffice, and then only the first are filled.
     """
     subject, window, spare = np.empty((MOST, 2)), np.empty((MOST, 2)), np.empty((MOST, 2))
-    stack, leaves, found = np.empty(DEPTH, np.int64), len(tree.low) // 2, 0
+    stack, leaves, count = np.empty(DEPTH, np.int64), len(tree.low) // 2, 0
     for s in range(secondary.shape[0]):
         normal = axes[s, 2]
         stack[0], top = 1, 1
@@ -194,10 +194,10 @@ def facing_pairs(
             if cosine <= facing and _common(
                 secondary[s], n_secondary, primary[p], n_primary, origin[s], axes[s], subject, window, spare
             ):
-                if found < pairs.shape[0]:
-                    pairs[found, 0], pairs[found, 1] = s, p
-                found += 1
-    return found
+                if count < pairs.shape[0]:
+                    pairs[count, 0], pairs[count, 1] = s, p
+                count += 1
+    return count
 
 
 @innermost_kernel

@@ -74,9 +74,9 @@ def _cuts(
     n = len(block.facets)
     normals = nodal_normals(primary, deformed)
     between, along = _opposite_nodes(block, primary, deformed, normals)
-    ending, place = _opposite_ends(block, primary, deformed, normals, tolerance)
+    ending, xi_of_end = _opposite_ends(block, primary, deformed, normals, tolerance)
     facet = np.concatenate([np.arange(n), np.arange(n), between, borders[0], ending])
-    xi = np.concatenate([np.full(n, -1.0), np.full(n, 1.0), along, borders[1], place])
+    xi = np.concatenate([np.full(n, -1.0), np.full(n, 1.0), along, borders[1], xi_of_end])
     order = np.lexsort((xi, facet))
     facet, xi = facet[order], xi[order]
     piece = (facet[1:] == facet[:-1]) & (np.diff(xi) > SLIVER)
@@ -98,11 +98,11 @@ def _opposite_nodes(block: FacetBlock, primary: Surface, deformed: Array, normal
     apart, or overlap by an interference, it leaps from one facet to the next as the bodies move. It is where the primary side
     ends, and at its corners, beside which the flank is not faced.
     """
-    ends, own = np.unique(np.concatenate([other.local[:, :2].ravel() for other in primary.blocks]), return_index=True)
+    ends, first = np.unique(np.concatenate([other.local[:, :2].ravel() for other in primary.blocks]), return_index=True)
     foot, normal = deformed[primary.points[ends]], normals[ends]
     opposite = closest(foot, deformed[block.facets])
     along = opposite.xi[:, 0]
-    inner = primary.inner_ends.ravel()[own]
+    inner = primary.inner_ends.ravel()[first]
     smooth = inner & ~_corners(primary, deformed, normals)[ends]
     inside = np.flatnonzero((opposite.overhang == 0.0) & (np.abs(along) < 1.0 - SLIVER) & ~smooth)
     rows = np.flatnonzero(inner)
@@ -117,8 +117,8 @@ def _corners(side: Surface, coordinates: Array, normals: Array) -> Mask:
     """Return which nodes (m,) of a side are corners, where a facet leans much from the nodal `normals` (m, 2)."""
     lean = np.ones(len(side.points))
     for block in side.blocks:
-        own = facet_normals(block, coordinates)
-        np.minimum.at(lean, block.local, np.einsum("fad,fad->fa", own, normals[block.local]))
+        facet_normal = facet_normals(block, coordinates)
+        np.minimum.at(lean, block.local, np.einsum("fad,fad->fa", facet_normal, normals[block.local]))
     return np.asarray(lean < np.cos(np.radians(0.5 * CORNER)))
 
 
@@ -217,8 +217,8 @@ def line_overlap(
             shape = elements.get(other.element).shape(facing.xi[rows])
             products = area[rows, None, None] * points.shape[rows, :, None] * shape[:, None, :]
             ends = np.column_stack([points.facet[rows], facing.facet[rows] - first[number]])
-            pairs, place = np.unique(ends, axis=0, return_inverse=True)
+            pairs, pair_of_end = np.unique(ends, axis=0, return_inverse=True)
             integrals = np.zeros((len(pairs), *products.shape[1:]))
-            np.add.at(integrals, place.ravel(), products)
+            np.add.at(integrals, pair_of_end.ravel(), products)
             couplings.append(Coupling(block, other, pairs, integrals))
     return Overlap(masses, couplings, closer)

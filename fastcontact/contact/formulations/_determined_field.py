@@ -1,6 +1,6 @@
 r"""Pressure fields that remain determined by their integration points on partly covered facets.
 
-The points of a facet that faces the other side with a strip of itself determine next to nothing of a field over all of
+The points of a facet that faces the other side with a strip of itself hardly determine a field over all of
 it: on a strip of a fraction :math:`\theta` at the end of a line, what a polynomial of degree k is at the other end weighs
 :math:`\theta^{2k+1}`. How well a facet determines its field says the smallest eigenvalue of its mass matrix over what takes
 part, relative to that over the whole facet. Where it is too small the field is a simpler one there: linear between the
@@ -59,20 +59,20 @@ class WholeFacets:
 
         2 all of it, 1 one that is linear between the corners, 0 none, -1 where nothing takes part.
         """
-        found = np.full(len(mass), 2)
-        found[~mass.any(axis=(1, 2))] = -1
+        degrees = np.full(len(mass), 2)
+        degrees[~mass.any(axis=(1, 2))] = -1
         size = np.einsum("fkk->f", self.mass)
-        partly = np.flatnonzero((found == 2) & (np.abs(mass - self.mass).max(axis=(1, 2)) > WHOLE * size))
-        whole, part, T = self.mass[partly], mass[partly], self.to_corners
-        linear = _smallest(T @ whole @ T.T, T @ part @ T.T) > DETERMINED
-        found[partly] = np.where(_smallest(whole, part) > DETERMINED, 2, np.where(linear, 1, 0))
-        return found
+        partly = np.flatnonzero((degrees == 2) & (np.abs(mass - self.mass).max(axis=(1, 2)) > WHOLE * size))
+        whole, partial, T = self.mass[partly], mass[partly], self.to_corners
+        linear = _smallest(T @ whole @ T.T, T @ partial @ T.T) > DETERMINED
+        degrees[partly] = np.where(_smallest(whole, partial) > DETERMINED, 2, np.where(linear, 1, 0))
+        return degrees
 
 
-def _smallest(whole: Array, part: Array) -> Array:
+def _smallest(whole: Array, mass: Array) -> Array:
     """Return the smallest eigenvalues (n_facets,) of mass matrices relative to those of whole facets."""
     inverse = np.linalg.inv(np.linalg.cholesky(whole))
-    return np.asarray(np.linalg.eigvalsh(inverse @ part @ inverse.transpose(0, 2, 1))[:, 0])
+    return np.asarray(np.linalg.eigvalsh(inverse @ mass @ inverse.transpose(0, 2, 1))[:, 0])
 
 
 def determined(
@@ -91,48 +91,48 @@ def determined(
         Nodes that have no value of their own.
     """
     degrees = [one.degrees(mass) for one, mass in zip(whole, masses, strict=True)]
-    own = np.zeros(len(side.points), bool)
+    kept = np.zeros(len(side.points), bool)
     for one, degree in zip(whole, degrees, strict=True):
-        own[one.block.local[degree == 2]] = True
-        own[one.block.local[degree == 1][:, : len(one.to_corners)]] = True
-    own &= ~excluded
+        kept[one.block.local[degree == 2]] = True
+        kept[one.block.local[degree == 1][:, : len(one.to_corners)]] = True
+    kept &= ~excluded
     for one, degree, mass in zip(whole, degrees, masses, strict=True):
-        _give_each_a_value(own, one.block.local[degree >= 0], mass[degree >= 0], excluded)
-    independent = np.flatnonzero(own)
-    values = spread(side, excluded, independent) if excluded.any() else csr_array(diags_array(own.astype(float)))
+        _give_each_a_value(kept, one.block.local[degree >= 0], mass[degree >= 0], excluded)
+    independent = np.flatnonzero(kept)
+    values = spread(side, excluded, independent) if excluded.any() else csr_array(diags_array(kept.astype(float)))
     if any((degree[degree >= 0] < 2).any() for degree in degrees):
-        values = _interpolated(csr_array(values), whole, degrees, own, excluded)
+        values = _interpolated(csr_array(values), whole, degrees, kept, excluded)
     return csr_array(csr_array(values)[:, independent]), independent
 
 
-def _give_each_a_value(own: Mask, local: Indices, mass: Array, excluded: Mask) -> None:
+def _give_each_a_value(kept: Mask, local: Indices, mass: Array, excluded: Mask) -> None:
     """Make one node independent, in place, in facets that have none: where most of the facet takes part."""
-    for row in np.flatnonzero(~own[local].any(axis=1)):
+    for row in np.flatnonzero(~kept[local].any(axis=1)):
         nodes = local[row]
-        if not (own[nodes].any() or excluded[nodes].all()):
-            own[nodes[np.argmax(np.where(excluded[nodes], -np.inf, mass[row].sum(axis=1)))]] = True
+        if not (kept[nodes].any() or excluded[nodes].all()):
+            kept[nodes[np.argmax(np.where(excluded[nodes], -np.inf, mass[row].sum(axis=1)))]] = True
 
 
 def _interpolated(
-    values: csr_array, whole: list[WholeFacets], degrees: list[Indices], own: Mask, excluded: Mask
+    values: csr_array, whole: list[WholeFacets], degrees: list[Indices], with_value: Mask, excluded: Mask
 ) -> csr_array:
     """Return the values (m, m) with those of nodes that are neither independent nor excluded.
 
     Corners take the mean of the independent nodes of their facets, and other nodes what is linear between the corners.
     """
-    m = len(own)
+    m = len(with_value)
     pairs = []
     for one, degree in zip(whole, degrees, strict=True):
         local = one.block.local[degree >= 0]
         corners = local[:, : len(one.to_corners)]
         row, column = np.repeat(corners, local.shape[1], axis=1).ravel(), np.tile(local, corners.shape[1]).ravel()
-        kept = ~own[row] & ~excluded[row] & own[column]
+        kept = ~with_value[row] & ~excluded[row] & with_value[column]
         pairs.append(np.column_stack([row[kept], column[kept]]))
     row, column = np.unique(np.concatenate(pairs), axis=0).T
     count = np.bincount(row, minlength=m)
-    values = csr_array(diags_array((own | excluded).astype(float)) @ values)
+    values = csr_array(diags_array((with_value | excluded).astype(float)) @ values)
     values = csr_array(values + coo_array((1.0 / count[row], (row, column)), shape=(m, m)))
-    return csr_array(values + _between_corners(whole, degrees, own | excluded) @ values)
+    return csr_array(values + _between_corners(whole, degrees, with_value | excluded) @ values)
 
 
 def _between_corners(whole: list[WholeFacets], degrees: list[Indices], done: Mask) -> csr_array:

@@ -62,8 +62,8 @@ def _edges(element: elements.Element) -> tuple[tuple[int, int], ...]:
 def _bernstein_square(element: elements.Element) -> Array:
     """Return T of nine-node quadrangles: the product of two lines."""
     line = elements.get("line3")
-    place = {-1.0: 0, 1.0: 1, 0.0: 2}
-    at = np.array([[place[float(c)] for c in node] for node in element.nodes])
+    index = {-1.0: 0, 1.0: 1, 0.0: 2}
+    at = np.array([[index[float(c)] for c in node] for node in element.nodes])
     T = positive(line.name)
     return T[np.ix_(at[:, 0], at[:, 0])] * T[np.ix_(at[:, 1], at[:, 1])]
 
@@ -86,40 +86,40 @@ def dual_functions(mass: Array, kept: Mask, fraction: Array) -> tuple[Array, Arr
         As by `biorthogonal`, for all functions kept where that makes sense. On a narrow strip those with next to no
         share are left out, and if that does not help all but those with the largest, or the first of these.
     """
-    part = kept & (fraction > 0.0)
-    dual, D = biorthogonal(mass, part)
-    share = np.where(part, fraction, -1.0)
+    partial = kept & (fraction > 0.0)
+    dual, D = biorthogonal(mass, partial)
+    share = np.where(partial, fraction, -1.0)
     # Those that are nearly equal, or the first of them: which they are must not change as facets deform.
     large = share >= EQUAL * share.max(axis=1, keepdims=True)
-    largest = np.argmax(large, axis=1)[:, None] == np.arange(part.shape[1])
-    for fewer in (part & (fraction > COVERED), part & large, part & largest):
-        wild = np.flatnonzero(~_tame(dual, mass, part))
+    largest = np.argmax(large, axis=1)[:, None] == np.arange(partial.shape[1])
+    for fewer in (partial & (fraction > COVERED), partial & large, partial & largest):
+        wild = np.flatnonzero(~_tame(dual, mass, partial))
         if not len(wild):
             break
-        part[wild] = np.where(np.any(fewer[wild], axis=1, keepdims=True), fewer[wild], part[wild])
-        dual[wild], D[wild] = biorthogonal(mass[wild], part[wild])
+        partial[wild] = np.where(np.any(fewer[wild], axis=1, keepdims=True), fewer[wild], partial[wild])
+        dual[wild], D[wild] = biorthogonal(mass[wild], partial[wild])
     return dual, D
 
 
-def _tame(dual: Array, mass: Array, part: Mask) -> Mask:
+def _tame(dual: Array, mass: Array, partial: Mask) -> Mask:
     """Return for which facets (n_facets,) the dual functions are moderate and positive on average."""
     area = np.maximum(mass.sum(axis=(1, 2)), 1e-300)
     weight = mass.sum(axis=2)
     with np.errstate(invalid="ignore", over="ignore"):
         size = np.sqrt(np.einsum("fab,fbc,fac->fa", dual, mass, dual) / area[:, None]).max(axis=1)
         off = np.abs(dual.sum(axis=1) - 1.0).max(axis=1)  # the shape functions sum to one with no other coefficients
-        share = np.where(part, np.einsum("fab,fb->fa", dual, weight) - LEAST * weight, 0.0).min(axis=1)
-    return ((size <= MOST) & (off <= ROUNDING) & (share >= 0.0)) | ~part.any(axis=1)
+        share = np.where(partial, np.einsum("fab,fb->fa", dual, weight) - LEAST * weight, 0.0).min(axis=1)
+    return ((size <= MOST) & (off <= ROUNDING) & (share >= 0.0)) | ~partial.any(axis=1)
 
 
-def biorthogonal(mass: Array, part: Mask) -> tuple[Array, Array]:
+def biorthogonal(mass: Array, partial: Mask) -> tuple[Array, Array]:
     r"""Return the dual functions of facets, and their integrals with the positive shape functions.
 
     Parameters
     ----------
     mass : ndarray (n_facets, k, k)
         Integrals of products of positive shape functions that sum to one [area].
-    part : ndarray of bool (n_facets, k)
+    partial : ndarray of bool (n_facets, k)
         Functions that take part; the dual functions of the others are zero.
 
     Returns
@@ -132,11 +132,11 @@ def biorthogonal(mass: Array, part: Mask) -> tuple[Array, Array]:
     Where the functions are linearly dependent to the last digit, both are NaN.
     """
     k = mass.shape[1]
-    rest = part.sum(axis=1)[:, None, None]
+    rest = partial.sum(axis=1)[:, None, None]
     # Those that take part share the others evenly, so that they still sum to one.
-    spanning = np.eye(k) * part[:, :, None] + part[:, :, None] * ~part[:, None, :] / np.maximum(rest, 1)
-    G = np.where(part[:, :, None] & part[:, None, :], spanning @ mass, np.eye(k))
-    weight = np.where(part, mass.sum(axis=2), 0.0)
+    spanning = np.eye(k) * partial[:, :, None] + partial[:, :, None] * ~partial[:, None, :] / np.maximum(rest, 1)
+    G = np.where(partial[:, :, None] & partial[:, None, :], spanning @ mass, np.eye(k))
+    weight = np.where(partial, mass.sum(axis=2), 0.0)
     # Rows and columns are scaled before the inversion: weights of cut facets may differ by orders.
     scale = 1.0 / np.sqrt(np.einsum("fkk->fk", G))
     scaled = G * scale[:, :, None] * scale[:, None, :]
@@ -145,5 +145,5 @@ def biorthogonal(mass: Array, part: Mask) -> tuple[Array, Array]:
     inverse = np.linalg.inv(scaled) * scale[:, :, None] * scale[:, None, :]
     inverse[~regular] = np.nan
     dual = weight[:, :, None] * inverse @ spanning
-    D = np.where(part[:, None, :], weight[:, :, None] * np.eye(k), dual @ mass)
-    return dual, D * part[:, :, None]
+    D = np.where(partial[:, None, :], weight[:, :, None] * np.eye(k), dual @ mass)
+    return dual, D * partial[:, :, None]

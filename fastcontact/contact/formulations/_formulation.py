@@ -140,7 +140,7 @@ class Formulation(ABC):
         return isinstance(self.primary, Surface) and self.normals == "facet" and not self.options.tied
 
     @property
-    def corner_functions(self) -> csr_array | None:
+    def basis_transformation(self) -> csr_array | None:
         """Values at mid nodes of functions that gaps are weighted with, where these are linear on quadratic facets.
 
         A matrix (n_points, n_points) with rows of mid nodes and columns of corners [-]; None where there are none.
@@ -166,63 +166,67 @@ class Formulation(ABC):
         """
         if self.tied is not None:
             return self.tied.constraints()
-        part = self.unilateral(at)
+        constraints = self.unilateral(at)
         if self.options.cohesion is None:
-            part = self._softened(part, at)
-        if part.friction is not None and at.friction_factor != 1.0:
-            part = replace(part, friction=at.friction_factor * part.friction)
+            constraints = self._softened(constraints, at)
+        if constraints.friction is not None and at.friction_factor != 1.0:
+            constraints = replace(constraints, friction=at.friction_factor * constraints.friction)
         if self.options.gap_only:
-            return part.without(np.ones(len(part), bool))
+            return constraints.without(np.ones(len(constraints), bool))
         if self.options.search_distance is not None:
             # Also as the step begins: what this iterate lets through by itself is not out of reach.
-            away = np.minimum(np.abs(part.gaps(at.displacement)), np.abs(part.gaps(at.start)))
-            part = part.without(away > self.options.search_distance)
+            away = np.minimum(np.abs(constraints.gaps(at.displacement)), np.abs(constraints.gaps(at.start)))
+            constraints = constraints.without(away > self.options.search_distance)
         if self.options.cohesion is not None:
-            return bonded(self.options.cohesion, part, at, _at_places(self._gaps_as_they_lie, part.positions))
-        part = replace(part, equality=self.never_opening(part.positions, at))
+            return bonded(
+                self.options.cohesion, constraints, at, _at_places(self._gaps_as_they_lie, constraints.positions)
+            )
+        constraints = replace(constraints, equality=self.never_opening(constraints.positions, at))
         if self.options.source is None:
-            return part
+            return constraints
         from fastcontact.contact.fluid_pressure import wetted
 
-        return wetted(part, at, self.secondary, self.options.source[self.secondary.points], self.points)
+        return wetted(constraints, at, self.secondary, self.options.source[self.secondary.points], self.points)
 
-    def _softened(self, part: Constraints, at: Configuration) -> Constraints:
+    def _softened(self, constraints: Constraints, at: Configuration) -> Constraints:
         """Return constraints with the compliance of normal and tangential penalties, if any."""
-        normal, tangential, areas = self.options.penalty, self.options.tangential_penalty, part.areas
+        normal, tangential, areas = self.options.penalty, self.options.tangential_penalty, constraints.areas
         if normal is None and tangential is None:
-            return part
+            return constraints
         if areas is None:
             raise ContactError(f"formulation '{self.name}' knows no penalty: leave out the option")
         if isinstance(normal, OverclosureLaw):
-            slope, without = normal.line(-part.gaps(at.displacement))
-            part = replace(part, gap0=part.gap0 + without, softness=1.0 / (slope * areas), law=normal)
+            slope, without = normal.line(-constraints.gaps(at.displacement))
+            constraints = replace(
+                constraints, gap0=constraints.gap0 + without, softness=1.0 / (slope * areas), law=normal
+            )
         elif normal is not None:
-            part = replace(part, softness=np.asarray(1.0 / (normal * areas)))
-        if tangential is None or not part.tangents:
-            return part
-        give, elastic = 1.0 / tangential(part.positions), np.zeros((len(part.tangents), len(part)))
+            constraints = replace(constraints, softness=np.asarray(1.0 / (normal * areas)))
+        if tangential is None or not constraints.tangents:
+            return constraints
+        give, elastic = 1.0 / tangential(constraints.positions), np.zeros((len(constraints.tangents), len(constraints)))
         if at.traction is not None:
-            before = _at_places(at.traction, part.positions)
-            elastic = np.stack([-give * np.einsum("md,md->m", t, before) for t in part.directions])
-        return replace(part, tangential_softness=give / areas, elastic_slip=elastic)
+            before = _at_places(at.traction, constraints.positions)
+            elastic = np.stack([-give * np.einsum("md,md->m", t, before) for t in constraints.directions])
+        return replace(constraints, tangential_softness=give / areas, elastic_slip=elastic)
 
     @cached_property
     def _gaps_as_they_lie(self) -> tuple[Array, Array]:
         """Places (m, dim) of constraints on the bodies before any load, and their gaps (m,) [length]."""
-        part = self.unilateral(Configuration.undeformed(self.points))
-        return part.positions, part.gap0
+        constraints = self.unilateral(Configuration.undeformed(self.points))
+        return constraints.positions, constraints.gap0
 
     @cached_property
     def tied(self) -> TiedPair | None:
         """The equations of a tied pair, on the bodies as they lie before any load."""
         if not self.options.tied:
             return None
-        part = self.unilateral(Configuration.undeformed(self.points))
-        if isinstance(self.primary, Surface) and part.tangents:
+        constraints = self.unilateral(Configuration.undeformed(self.points))
+        if isinstance(self.primary, Surface) and constraints.tangents:
             smooth = self.normals if self.normals != "secondary" and self.normals is not None else "facet"
-            pairing = pair(part.positions, self.primary, self.points, np.inf, smooth)
-            part = with_arms(part, pairing, self.primary, self.points)
-        return tied(part)
+            pairing = pair(constraints.positions, self.primary, self.points, np.inf, smooth)
+            constraints = with_arms(constraints, pairing, self.primary, self.points)
+        return tied(constraints)
 
     def never_opening(self, positions: Array, at: Configuration) -> Mask | None:
         """Return which constraints, by reference position (m, dim) [length], do not separate (m,); None if all may."""
@@ -242,7 +246,7 @@ class Formulation(ABC):
         assert self.normals is not None
         assert beyond is not None
         positions = candidates.positions(deformed)
-        pairing = pair(positions, self.primary, deformed, beyond, self.normals, at.stance, at.rounded)
+        pairing = pair(positions, self.primary, deformed, beyond, self.normals, at.pose, at.rounded)
         if self.normals != "secondary":
             return pairing
         return opposed(pairing, self._secondary_normals(candidates, deformed))
@@ -266,9 +270,9 @@ class Formulation(ABC):
         if not self.slides:
             return Constraints(B, gap0, positions, compliance)
         directions, rubbing = self.options.rubbing(tangents(pairing.normal), candidates)
-        along, drift = self.slips(candidates, pairing, rubbing, at)
+        along, slip0 = self.slips(candidates, pairing, rubbing, at)
         friction = self.options.coefficients(self.friction, candidates)
-        return Constraints(B, gap0, positions, compliance, along, directions, friction, drift)
+        return Constraints(B, gap0, positions, compliance, along, directions, friction, slip0)
 
     def slips(
         self, candidates: Candidates, pairing: Pairing, directions: Sequence[Array], at: Configuration
@@ -278,15 +282,15 @@ class Formulation(ABC):
         The latter: what a rigid primary side moves in the step, or minus the part that closes a gap [length]; None is zero.
         """
         along = tuple(rows_along(t, candidates, pairing, self.primary, self.points.size) for t in directions)
-        drift: Array | None = None
+        slip0: Array | None = None
         if isinstance(self.primary, RigidSide):
-            drift = -np.stack([t @ (at.obstacle - at.obstacle_start) for t in directions])
+            slip0 = -np.stack([t @ (at.obstacle - at.obstacle_start) for t in directions])
             turning = self.turning(candidates, at)
             if turning is not None:
-                drift -= np.stack([np.einsum("nd,nd->n", t, turning) for t in directions])
+                slip0 -= np.stack([np.einsum("nd,nd->n", t, turning) for t in directions])
         elif self.slip == "symmetric":
-            drift = self._closing_slip(candidates, pairing, directions, at)
-        return along, drift
+            slip0 = self._closing_slip(candidates, pairing, directions, at)
+        return along, slip0
 
     def added_gap(self, candidates: Candidates, pairing: Pairing, at: Configuration) -> Array:
         """Return the contribution of clearances and wear to the gaps (n,) of candidates, zero if unpaired [length]."""
@@ -315,7 +319,7 @@ class Formulation(ABC):
         """Return the displacement of the points faced by candidates due to obstacle rotation (n, dim) [length], or None."""
         assert isinstance(self.primary, RigidSide)
         now, before = (candidates.positions(self.points + u) for u in (at.displacement, at.start))
-        return self.primary.turning(now, before, at.stance, at.stance_start)
+        return self.primary.turning(now, before, at.pose, at.pose_start)
 
     def without_slip(self, at: Configuration) -> list[tuple[Array, Mask]]:
         """Return directions (n_nodes, dim) in which both sides are held, and do not move apart, with the nodes (n_nodes,).
@@ -374,7 +378,7 @@ class Formulation(ABC):
         """
         assert isinstance(self.primary, Surface)
         deformed, start = self.points + at.displacement, self.points + at.start
-        drift = np.zeros((len(directions), len(pairing.paired)))
+        slip0 = np.zeros((len(directions), len(pairing.paired)))
         rows = np.flatnonzero(pairing.paired)
         facing = places(self.primary, pairing.facet[rows], pairing.xi[rows])
         nodes, shape = candidates.nodes[rows], candidates.shape[rows]
@@ -387,8 +391,8 @@ class Formulation(ABC):
         apart -= np.einsum("nk,nkd->nd", facing.shape, start[facing.nodes])
         opening = np.einsum("nd,nd->n", mean, apart)
         for k, along in enumerate(directions):
-            drift[k, rows] = np.einsum("nd,nd->n", along[rows], mean) * opening
-        return drift
+            slip0[k, rows] = np.einsum("nd,nd->n", along[rows], mean) * opening
+        return slip0
 
     def first_contact(self, at: Configuration) -> tuple[Array, Array]:
         """Return where the bodies meet first [length], and the normal faced there [-], both (dim,).

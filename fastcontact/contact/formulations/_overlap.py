@@ -11,7 +11,7 @@ import numpy as np
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.integration import facet_measure, fine_rule
-from fastcontact.contact.obstacles.rigid_side import RigidSide, Stance
+from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.mesh import elements
 
@@ -57,7 +57,7 @@ class Overlap:
 
 
 def obstacle_overlap(
-    secondary: Surface, obstacle: RigidSide, points: tuple[Array, Array], axisymmetric: bool, stance: Stance
+    secondary: Surface, obstacle: RigidSide, points: tuple[Array, Array], axisymmetric: bool, pose: Pose
 ) -> Overlap:
     """Integrate the secondary facets over what faces a rigid obstacle; areas are those of the reference.
 
@@ -68,7 +68,7 @@ def obstacle_overlap(
     points : (ndarray, ndarray)
         Reference and deformed coordinates (n_points, dim) [length].
     axisymmetric : bool
-    stance : Stance
+    pose : Pose
         Where the obstacle stands.
     """
     mass, faced = [], []
@@ -76,7 +76,7 @@ def obstacle_overlap(
         xi, weights = fine_rule(block.element)
         N = elements.get(block.element).shape(xi)
         positions = np.einsum("qk,fkd->fqd", N, points[1][block.facets])
-        gap, normal, paired, _ = obstacle.facing(positions.reshape(-1, positions.shape[2]), stance)
+        gap, normal, paired, _ = obstacle.facing(positions.reshape(-1, positions.shape[2]), pose)
         foot = positions - (np.where(paired, gap, 0.0)[:, None] * normal).reshape(positions.shape)
         area = facet_measure(block.facets, block.element, points[0], xi, axisymmetric) * weights
         area = np.where(paired.reshape(area.shape), area, 0.0)

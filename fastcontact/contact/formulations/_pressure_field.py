@@ -35,7 +35,7 @@ from fastcontact.contact.multiplier_field import Projection
 from fastcontact.contact.pairing import Candidates, Pairing, normals
 from fastcontact.errors import ContactError
 
-# The area of a node on the axis vanishes but for rounding errors; what is below this part of the largest is none.
+# The area of a node on the axis vanishes but for rounding errors; what is below this part of the largest counts as zero.
 NO_AREA = 1e-9
 # Corners of quadratic faces have next to none, or less.
 NO_SHARE = 1e-3
@@ -122,9 +122,9 @@ class PressureField(NodalField):
         weight = np.where(usable, self.projection.areas, 0.0)[:, None] * self.shape
         total = np.bincount(self.around.ravel(), weight.ravel(), n)
         sums = np.bincount(self.around.ravel(), (weight * np.where(usable, gaps, 0.0)[:, None]).ravel(), n)
-        own = total > NO_SHARE * total.max(initial=0.0)
-        near = np.where(own[self.around], self.shape, -np.inf).argmax(axis=1)
-        return np.divide(sums, total, out=np.full(n, np.inf), where=own), self.around[np.arange(len(gaps)), near]
+        kept = total > NO_SHARE * total.max(initial=0.0)
+        near = np.where(kept[self.around], self.shape, -np.inf).argmax(axis=1)
+        return np.divide(sums, total, out=np.full(n, np.inf), where=kept), self.around[np.arange(len(gaps)), near]
 
     def closed_nodes(self, active: Mask, gap: Array, pressure: Array) -> Mask:
         """Return the nodes with a pressure that an active point is nearest to; at least one of its facet, if any has one.
@@ -158,9 +158,9 @@ class PressureField(NodalField):
 
 def _nearest(around: Indices, shape: Array, n_nodes: int) -> Mask:
     """Return the nodes (n_nodes,) with the largest shape functions (m, n) at any of the points; several where equal."""
-    found = np.zeros(n_nodes, bool)
-    found[around[shape >= shape.max(axis=1, keepdims=True, initial=-np.inf) - ROUNDING]] = True
-    return found
+    nearest = np.zeros(n_nodes, bool)
+    nearest[around[shape >= shape.max(axis=1, keepdims=True, initial=-np.inf) - ROUNDING]] = True
+    return nearest
 
 
 def shapes_at(shape: Array, local: Indices, n_nodes: int) -> csr_array:
@@ -211,9 +211,9 @@ class PressureFieldFormulation(Formulation):
     ) -> Constraints:
         """Return the constraints of paired integration points whose forces make up a pressure field."""
         projection = replace(field.projection, eliminable=self.eliminable, quadratic=self.secondary.order > 1)
-        part = self.assembled(candidates, pairing, projection, at)
-        undetermined = self._undetermined(field, part.directions, at) if self.friction else None
-        return replace(part, low_rank_compliance=undetermined, areas=field.areas, nodal=field)
+        constraints = self.assembled(candidates, pairing, projection, at)
+        undetermined = self._undetermined(field, constraints.directions, at) if self.friction else None
+        return replace(constraints, low_rank_compliance=undetermined, areas=field.areas, nodal=field)
 
     def _undetermined(self, field: PressureField, directions: tuple[Array, ...], at: Configuration) -> Array | None:
         """Return a compliance of tangential fields that do no work on any slip, where both sides are held."""

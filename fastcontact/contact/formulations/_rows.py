@@ -28,8 +28,8 @@ class Entries:
         """Return the sum of all entries."""
         if not self._rows:
             return csr_array(size)
-        place = np.concatenate(self._rows), np.concatenate(self._columns)
-        return csr_array(coo_array((np.concatenate(self._values), place), shape=size))
+        positions = np.concatenate(self._rows), np.concatenate(self._columns)
+        return csr_array(coo_array((np.concatenate(self._values), positions), shape=size))
 
 
 def rows_of(mean: csr_array, direction: Array) -> csr_array:

@@ -74,12 +74,12 @@ class SegmentMortar(PressureFieldFormulation):
         )
         facet, shape, area = points.facet, points.shape, points.area
         candidates = Candidates(self.secondary.facets[facet], shape, facet, points.xi[:, None])
-        found = self.facing(candidates, at)
-        paired = np.repeat(found.paired.reshape(-1, n_gauss).mean(axis=1) > 0.5, n_gauss)
+        faced = self.facing(candidates, at)
+        paired = np.repeat(faced.paired.reshape(-1, n_gauss).mean(axis=1) > 0.5, n_gauss)
         total = np.bincount(facet, weights=area)
         covered = np.bincount(facet, weights=np.where(paired, area, 0.0))
         kept = paired & (covered > COVERED * total)[facet] & (area > 0) & ~self.options.out(candidates)
-        pairing = replace(found, paired=kept)
+        pairing = replace(faced, paired=kept)
         field = self._pressure_field(facet, shape, np.where(kept, area, 0.0), area)
         return self.of_points(candidates, pairing, field, at)
 

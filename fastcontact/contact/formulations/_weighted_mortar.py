@@ -34,7 +34,7 @@ from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.formulations._overlap import Overlap, obstacle_overlap
 from fastcontact.contact.formulations._rows import Entries, rows_of
 from fastcontact.contact.integration import facet_measure, fine_rule, nodal_areas
-from fastcontact.contact.obstacles.rigid_side import RigidSide, Stance
+from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.pairing import Candidates, tangents
 from fastcontact.contact.prescribed_normals import Normals
 from fastcontact.contact.projection import facet_normals, nodal_normals, smooth_normals
@@ -91,7 +91,7 @@ class WeightedMortar(Formulation):
         return exact and self.points.shape[1] == 3
 
     @property
-    def corner_functions(self) -> csr_array | None:
+    def basis_transformation(self) -> csr_array | None:
         """See `Formulation`."""
         if self.multipliers == "dual" or self.secondary.order == 1:
             return None
@@ -116,9 +116,9 @@ class WeightedMortar(Formulation):
         linear = elements.get(element.linear).shape(element.nodes)
         return np.vstack([linear.T, np.zeros((element.n_nodes - element.n_corners, element.n_nodes))])
 
-    def _overlap(self, deformed: Array, stance: Stance) -> Overlap:
+    def _overlap(self, deformed: Array, pose: Pose) -> Overlap:
         if isinstance(self.primary, RigidSide):
-            return obstacle_overlap(self.secondary, self.primary, (self.points, deformed), self.axisymmetric, stance)
+            return obstacle_overlap(self.secondary, self.primary, (self.points, deformed), self.axisymmetric, pose)
         if deformed.shape[1] == 3:
             return face_overlap(self.secondary, self.primary, self.points, deformed, self.smoothing)
         return line_overlap(
@@ -134,37 +134,37 @@ class WeightedMortar(Formulation):
     def unilateral(self, at: Configuration) -> Constraints:
         """Cut and pair on the displaced configuration and return one mean gap per node."""
         deformed = self.points + at.displacement
-        overlap = self._overlap(deformed, at.stance)
+        overlap = self._overlap(deformed, at.pose)
         covered = [mass.sum(axis=2) @ T.T for T, mass in zip(self._test, overlap.mass, strict=True)]
         kept = self._taking_part(covered)
-        own, across, closer = self._weighted(overlap, covered, kept)
+        rows, across, closer = self._weighted(overlap, covered, kept)
         # Left out as a whole: its neighbours' functions do not take over what an excluded node stands for.
-        sums = np.where(self.options.excluded_nodes(self.secondary), 0.0, np.asarray(own.sum(axis=1)).ravel())
+        sums = np.where(self.options.excluded_nodes(self.secondary), 0.0, np.asarray(rows.sum(axis=1)).ravel())
         weight = np.where(sums > 0.0, sums, np.inf)
-        mean = scaled(csr_array(own - across), 1.0 / weight)
-        normal = self._mean_normals(overlap, deformed, at.stance)
+        mean = scaled(csr_array(rows - across), 1.0 / weight)
+        normal = self._mean_normals(overlap, deformed, at.pose)
         B = rows_of(mean, normal)
-        gap0 = B @ self.points.ravel() + at.clearance_factor * self._clearance(own, across, weight)
+        gap0 = B @ self.points.ravel() + at.clearance_factor * self._clearance(rows, across, weight)
         gap0 -= np.einsum("nd,nd->n", closer, normal) / weight
         if at.worn is not None:
-            gap0 += own @ at.worn / weight
+            gap0 += rows @ at.worn / weight
         points, nodes = self.secondary.points, self.secondary.points.astype(np.intp)
-        part = Constraints(B, gap0, self.points[points], areas=weight, nodes=nodes, nodal=self._nodal(weight))
+        constraints = Constraints(B, gap0, self.points[points], areas=weight, nodes=nodes, nodal=self._nodal(weight))
         if not self.slides:
-            return part
-        candidates = Candidates(points[:, None], np.ones((len(part), 1)))
+            return constraints
+        candidates = Candidates(points[:, None], np.ones((len(constraints), 1)))
         held = self.without_slip(at)
         directions, rubbing = self.options.rubbing(_tangents(normal, held), candidates)
         slips, apart = self._slips(rubbing, held, overlap, covered, kept, mean, weight, at)
         return replace(
-            part,
+            constraints,
             tangents=slips,
             directions=directions,
             friction=self.options.coefficients(self.friction, candidates),
-            drift=self._drift(mean, apart, normal, rubbing, at),
+            slip0=self._slip0(mean, apart, normal, rubbing, at),
         )
 
-    def _drift(
+    def _slip0(
         self, mean: csr_array, apart: Array, normal: Array, directions: tuple[Array, ...], at: Configuration
     ) -> Array | None:
         """Return the slip (k, m) beside that by displacements: by a rigid obstacle, or see `_closing_slip_of_nodes`."""
@@ -172,7 +172,7 @@ class WeightedMortar(Formulation):
             return self._closing_slip_of_nodes(apart, normal, directions, at) if self.slip == "symmetric" else None
         moved = np.tile(at.obstacle - at.obstacle_start, (len(normal), 1))
         now, before = (mean @ (self.points + u) for u in (at.displacement, at.start))
-        turning = self.primary.turning(now, before, at.stance, at.stance_start)
+        turning = self.primary.turning(now, before, at.pose, at.pose_start)
         moved = moved if turning is None else moved + turning
         return -np.stack([np.einsum("nd,nd->n", t, moved) for t in directions])
 
@@ -232,8 +232,8 @@ class WeightedMortar(Formulation):
             other = csr_array(scaled(csr_array(own - across), 1.0 / weight) - mean)
             other.eliminate_zeros()
             for k, direction in enumerate(directions):
-                part = np.einsum("md,md->m", direction, along)
-                rows[k] = csr_array(rows[k] + rows_of(other, part[:, None] * along))
+                slip = np.einsum("md,md->m", direction, along)
+                rows[k] = csr_array(rows[k] + rows_of(other, slip[:, None] * along))
             apart += np.einsum("md,md->m", other @ start, along)[:, None] * along
             held[nodes] += np.einsum("md,me->mde", along[nodes], along[nodes])
         free = [1.0 - np.einsum("md,mde,me->m", t, held, t) >= FREE for t in directions]
@@ -246,20 +246,20 @@ class WeightedMortar(Formulation):
         `covered` are the weights (n_facets, k) of the functions of each block, `kept` (m,) the nodes with gaps.
         """
         size = (len(self.secondary.points), len(self.points))
-        own, across, functions = Entries(), Entries(), {}
+        rows, across, functions = Entries(), Entries(), {}
         closer = np.zeros((size[0], self.points.shape[1]))
         for number, (block, mass) in enumerate(zip(self.secondary.blocks, overlap.mass, strict=True)):
             whole = self._whole[number]
             fraction = np.where(whole > 0.0, covered[number] / np.where(whole > 0.0, whole, 1.0), 0.0)
             psi, products = self._functions(self._test[number], mass, kept[block.local], fraction)
-            own.add(block.local, block.facets, products)
+            rows.add(block.local, block.facets, products)
             functions[block.element] = psi
             np.add.at(closer, block.local, psi @ overlap.closer[number])
         for coupling in overlap.couplings:
             ours, theirs = coupling.pairs.T
             values = functions[coupling.secondary.element][ours] @ coupling.integrals
             across.add(coupling.secondary.local[ours], coupling.primary.facets[theirs], values)
-        return own.matrix(size), across.matrix(size), closer
+        return rows.matrix(size), across.matrix(size), closer
 
     def _functions(self, T: Array, mass: Array, kept: Mask, fraction: Array) -> tuple[Array, Array]:
         """Return psi of facets by their shape functions, and its integrals with those, both (n_facets, k, k)."""
@@ -284,13 +284,13 @@ class WeightedMortar(Formulation):
             rescued[block.local[lost][np.arange(len(most)), most]] = True
         return (enough | rescued) & (whole > 0.0)
 
-    def _mean_normals(self, overlap: Overlap, deformed: Array, stance: Stance) -> Array:
+    def _mean_normals(self, overlap: Overlap, deformed: Array, pose: Pose) -> Array:
         """Return unit means (m, dim) of the primary normals that the nodes face; the last axis for nodes without.
 
         Against an obstacle the normals at the nodes themselves, which lie in planes of symmetry.
         """
         if isinstance(self.primary, RigidSide):
-            _, normal, paired, _ = self.primary.facing(deformed[self.secondary.points], stance)
+            _, normal, paired, _ = self.primary.facing(deformed[self.secondary.points], pose)
             return np.where(paired[:, None], normal, -nodal_normals(self.secondary, deformed))
         if self.normals == "secondary":
             return -nodal_normals(self.secondary, deformed)
@@ -309,11 +309,11 @@ class WeightedMortar(Formulation):
         length = np.linalg.norm(mean, axis=1, keepdims=True)
         return np.where(length > 0, mean / np.where(length > 0, length, 1.0), np.eye(mean.shape[1])[-1])
 
-    def _clearance(self, own: csr_array, across: csr_array, weight: Array) -> Array:
+    def _clearance(self, rows: csr_array, across: csr_array, weight: Array) -> Array:
         """Return the contribution of nodal clearances on both sides to the weighted gaps (m,) [length]."""
-        added = np.zeros(own.shape[0])
+        added = np.zeros(rows.shape[0])
         for matrix, side, clearance in (
-            (own, self.secondary, self.options.clearance), (across, self.primary, self.options.clearance_primary)
+            (rows, self.secondary, self.options.clearance), (across, self.primary, self.options.clearance_primary)
         ):  # fmt: skip
             if clearance is not None:
                 values = np.zeros(len(self.points))
@@ -332,15 +332,15 @@ def _tangents(normal: Array, without_slip: list[tuple[Array, Mask]]) -> list[Arr
         return tangents(normal)
     first = np.cross(np.eye(3)[np.argmin(np.abs(normal), axis=1)], normal)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
-    found = [first, np.cross(normal, first)]
+    axes = [first, np.cross(normal, first)]
     if not without_slip:
-        return found
+        return axes
     held = sum(
         np.where(nodes[:, None, None], along[:, :, None] * along[:, None, :], 0.0) for along, nodes in without_slip
     )
-    first, mixed, second = (np.einsum("md,mde,me->m", found[a], held, found[b]) for a, b in ((0, 0), (0, 1), (1, 1)))
+    first, mixed, second = (np.einsum("md,mde,me->m", axes[a], held, axes[b]) for a, b in ((0, 0), (0, 1), (1, 1)))
     angle = 0.5 * np.arctan2(2 * mixed, first - second)[:, None]
-    turned = np.cos(angle) * found[0] + np.sin(angle) * found[1]
+    turned = np.cos(angle) * axes[0] + np.sin(angle) * axes[1]
     return [turned, np.cross(normal, turned)]
 
 
@@ -376,14 +376,16 @@ class WeightedPressures(NodalField):
     def covered(self) -> Array:
         """Covered part of the nodal areas; at mid nodes without a gap, the mean of their corners."""
         usable = np.isfinite(self.weight)
-        part = np.divide(self.weight, self.tested, out=np.zeros_like(self.weight), where=usable & (self.tested > 0.0))
-        return self._at_nodes(part, only_without_gap=True)
+        fraction = np.divide(
+            self.weight, self.tested, out=np.zeros_like(self.weight), where=usable & (self.tested > 0.0)
+        )
+        return self._at_nodes(fraction, only_without_gap=True)
 
     def over_whole_side(self, force: Array) -> Array:
         """Return forces over the whole areas of the positive functions; see `_at_nodes`.
 
         A node may face the other side with as little as it likes, and its force goes to nothing with that: over what it
-        faces its pressure is as good as undetermined, over all that belongs to it it is not.
+        faces its pressure is nearly undetermined, over all that belongs to it it is not.
         """
         return self._at_nodes(np.divide(force, self.tested, out=np.zeros_like(force), where=self.tested > 0.0))
 
@@ -398,11 +400,11 @@ class WeightedPressures(NodalField):
             with_gaps = T[corners:].any()
             if only_without_gap and with_gaps:
                 continue
-            own = coefficients[local[:, corners:]]
+            at_mid_nodes = coefficients[local[:, corners:]]
             values[local[:, corners:]] = coefficients[local] @ T[:, corners:]
             if with_gaps and self.held.any():
                 held = self.held[local]
-                values[local[:, corners:]] += (held @ T[:, corners:]) * own - (held * coefficients[local]) @ T[
+                values[local[:, corners:]] += (held @ T[:, corners:]) * at_mid_nodes - (held * coefficients[local]) @ T[
                     :, corners:
                 ]
         return values

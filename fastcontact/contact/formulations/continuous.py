@@ -139,10 +139,10 @@ class Continuous(PressureFieldFormulation):
         areas = self._field.projection.areas
         at_axis = self._at_axis
         pairing.paired[~(areas > 1e-12 * areas.max()) & ~at_axis] = False
-        part = self.of_points(self._candidates, pairing, self._field, at)
-        if part.friction is not None and at_axis.any():  # nothing slides at the axis
-            part = replace(part, friction=np.where(at_axis, 0.0, part.friction))
-        return part
+        constraints = self.of_points(self._candidates, pairing, self._field, at)
+        if constraints.friction is not None and at_axis.any():  # nothing slides at the axis
+            constraints = replace(constraints, friction=np.where(at_axis, 0.0, constraints.friction))
+        return constraints
 
     @cached_property
     def _at_axis(self) -> Mask:

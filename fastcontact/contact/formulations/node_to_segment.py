@@ -66,12 +66,12 @@ class NodeToSegment(Formulation):
 
     def facing(self, candidates: Candidates, at: Configuration, tolerance: float | None = None) -> Pairing:
         """Return the pairing of candidates with facets, or with the nearest primary nodes."""
-        found = super().facing(candidates, at, tolerance)
+        pairing = super().facing(candidates, at, tolerance)
         if self.opposite == "facet":
-            return found
+            return pairing
         assert isinstance(self.primary, Surface)
         assert self.normals is not None
-        snapped = at_nodes(found, candidates, self.primary, self.points + at.displacement, self.normals)
+        snapped = at_nodes(pairing, candidates, self.primary, self.points + at.displacement, self.normals)
         return replace(snapped, beyond=None)
 
     def unilateral(self, at: Configuration) -> Constraints:
@@ -80,8 +80,8 @@ class NodeToSegment(Formulation):
         pairing.paired[self.options.out(self._candidates)] = False
         areas = self._nodal.nodal_areas
         usable = np.where(areas > 1e-12 * areas.max(), areas, np.inf)
-        part = self.assembled(self._candidates, pairing, None, at)
-        return replace(part, areas=usable, nodes=self.secondary.points.astype(np.intp), nodal=self._nodal)
+        constraints = self.assembled(self._candidates, pairing, None, at)
+        return replace(constraints, areas=usable, nodes=self.secondary.points.astype(np.intp), nodal=self._nodal)
 
     @cached_property
     def _nodal(self) -> NodalForces:

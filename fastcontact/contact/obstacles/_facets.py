@@ -82,8 +82,8 @@ def surface_facets(mesh: Mesh, group: str, flip: bool, crease: float) -> Surface
     """
     blocks = _oriented_blocks(mesh, group, flip)
     beyond = _neighbours(blocks, group)
-    own = [block.normals() for block in blocks]
-    smooth, at_points = _smooth_normals(blocks, own, crease)
+    facet_normals_of_blocks = [block.normals() for block in blocks]
+    smooth, at_points = _smooth_normals(blocks, facet_normals_of_blocks, crease)
     on_border, first = np.zeros(len(at_points), bool), 0
     for block in blocks:
         ends = block.ridges()
@@ -91,7 +91,9 @@ def surface_facets(mesh: Mesh, group: str, flip: bool, crease: float) -> Surface
         for end in ends:
             on_border[end[open_]] = True
         first += len(block.nodes)
-    return SurfaceFacets(blocks, beyond, [normals for normals, _ in own], smooth, at_points, on_border)
+    return SurfaceFacets(
+        blocks, beyond, [normals for normals, _ in facet_normals_of_blocks], smooth, at_points, on_border
+    )
 
 
 def _oriented_blocks(mesh: Mesh, group: str, flip: bool) -> list[Block]:
@@ -100,7 +102,7 @@ def _oriented_blocks(mesh: Mesh, group: str, flip: bool) -> list[Block]:
     Facets on the outside of solid cells look out of these, whatever their own order of nodes.
     """
     rows = mesh.split(mesh.cell_groups[group]) if mesh.cells_of(group, dim=mesh.dim - 1) else {}
-    rows = {name: found for name, found in rows.items() if elements.get(name).dim == mesh.dim - 1}
+    rows = {name: block for name, block in rows.items() if elements.get(name).dim == mesh.dim - 1}
     if not rows:
         raise ContactError(
             f"group '{group}' holds no facets (cells of dimension {mesh.dim - 1}), so it is no rigid surface: "
@@ -108,12 +110,12 @@ def _oriented_blocks(mesh: Mesh, group: str, flip: bool) -> list[Block]:
         )
     outer = outer_facets(mesh) if mesh.solids else {}
     blocks = []
-    for name, found in rows.items():
+    for name, block in rows.items():
         element = elements.get(name)
-        nodes = _out_of_solids(mesh.cells[name][found], outer.get(name))
+        nodes = _out_of_solids(mesh.cells[name][block], outer.get(name))
         if flip:
             nodes = nodes[:, list(element.reversed)]
-        blocks.append(Block(element, found + mesh.offsets[name], nodes.astype(np.intp), mesh.points[nodes]))
+        blocks.append(Block(element, block + mesh.offsets[name], nodes.astype(np.intp), mesh.points[nodes]))
         lengths = np.linalg.norm(blocks[-1].normals()[0], axis=2)
         flat = np.flatnonzero(lengths.min(axis=1) == 0.0)
         if len(flat):
@@ -144,8 +146,8 @@ def _described(blocks: list[Block], facet: int) -> str:
             break
         facet -= len(block.nodes)
     middle = block.corners[facet, : block.element.n_corners].mean(axis=0)
-    place = ", ".join(f"{x:.6g}" for x in middle)
-    return f"facet {block.numbers[facet]} ({block.element.name} near ({place}))"
+    position = ", ".join(f"{x:.6g}" for x in middle)
+    return f"facet {block.numbers[facet]} ({block.element.name} near ({position}))"
 
 
 def _neighbours(blocks: list[Block], group: str) -> Indices:
@@ -192,10 +194,10 @@ def _check_orientation(blocks: list[Block], group: str, one: Indices, other: Ind
         return
     n = sum(len(block.nodes) for block in blocks)
     good = coo_array((np.ones(consistent.sum()), (one[consistent], other[consistent])), shape=(n, n))
-    _, part = connected_components(good, directed=False)
-    size = np.bincount(part)
+    _, component = connected_components(good, directed=False)
+    size = np.bincount(component)
     bad = int(np.flatnonzero(~consistent)[0])
-    pair = sorted((int(one[bad]), int(other[bad])), key=lambda facet: (size[part[facet]], facet))
+    pair = sorted((int(one[bad]), int(other[bad])), key=lambda facet: (size[component[facet]], facet))
     numbers = np.concatenate([block.numbers for block in blocks])
     raise ContactError(
         f"{_described(blocks, pair[0])} of the rigid surface '{group}' looks to the other side than its neighbour facet "
@@ -207,7 +209,7 @@ def _smooth_normals(blocks: list[Block], own: list[tuple[Array, Array]], crease:
     """Return the smooth normals of facets and those of points, from the `own` normals of facets and their angles."""
     dim = own[0][0].shape[2]
     node = np.concatenate([block.nodes.ravel() for block in blocks])
-    normal = np.concatenate([found.reshape(-1, dim) for found, _ in own])
+    normal = np.concatenate([normals.reshape(-1, dim) for normals, _ in own])
     weight = np.concatenate([angle.ravel() for _, angle in own])
     at_points = np.zeros((node.max() + 1, dim))
     np.add.at(at_points, node, weight[:, None] * normal)

@@ -77,7 +77,7 @@ class MeshedSurface:
         return f"MeshedSurface('{self.group}', {len(self._facets.beyond)} facets)"
 
     def check_apart(self, mesh: Mesh) -> None:
-        """Raise ContactError if the surface is part of `mesh` and hangs on solid cells there."""
+        """Raise ContactError if the surface is part of `mesh` and belongs to solid cells there."""
         if mesh.points is not self.mesh.points and not np.array_equal(mesh.points, self.mesh.points):
             return
         solid = np.zeros(mesh.n_points, bool)
@@ -99,37 +99,37 @@ class MeshedSurface:
             raise ContactError(
                 f"the rigid surface '{self.group}' has {dim} dimensions, but the model has {points.shape[1]}"
             )
-        found = closest_of_kinds(points, [block.corners for block in self._facets.blocks])
-        sense, smooth, on_ridge, on_border = self._frames(found)
-        apart = points - found.position
+        closest = closest_of_kinds(points, [block.corners for block in self._facets.blocks])
+        sense, smooth, on_ridge, on_border = self._frames(closest)
+        apart = points - closest.position
         extents = [np.linalg.norm(np.ptp(block.corners, axis=1), axis=1) for block in self._facets.blocks]
-        size = np.concatenate(extents)[found.facet]
-        touching = found.distance <= TOUCHING * size
+        size = np.concatenate(extents)[closest.facet]
+        touching = closest.distance <= TOUCHING * size
         outside = np.einsum("nd,nd->n", apart, sense) >= 0
-        distance = np.where(outside, found.distance, -found.distance)
-        normal = smooth if self.crease else np.where(on_ridge[:, None], smooth, found.normal)
+        distance = np.where(outside, closest.distance, -closest.distance)
+        normal = smooth if self.crease else np.where(on_ridge[:, None], smooth, closest.normal)
         sense /= np.linalg.norm(sense, axis=1, keepdims=True)
         # Next to a sharp edge the closest point tells the direction; the normals of either facet do not.
         sharp = np.einsum("nd,nd->n", sense, smooth) < np.cos(np.radians(0.5 * self.crease)) - 1e-9
         turned = on_ridge & sharp & ~touching
         normal[turned] = apart[turned] / distance[turned, None]
         height = np.abs(np.einsum("nd,nd->n", apart, sense))
-        aside = np.sqrt(np.maximum(found.distance**2 - height**2, 0.0))
+        aside = np.sqrt(np.maximum(closest.distance**2 - height**2, 0.0))
         nothing = on_border & (aside > BEYOND * size) & (aside > LEAN * height)
         return np.where(nothing, np.inf, distance), normal
 
-    def _frames(self, found: Closest) -> tuple[Array, Array, Mask, Mask]:
+    def _frames(self, closest: Closest) -> tuple[Array, Array, Mask, Mask]:
         """Return, at projections, a vector that tells in from out (n, dim), smooth normals, what is on a ridge or border.
 
         Inside a facet its normal tells; on an edge the mean of the facets that meet there, at a corner that of all
         facets weighted by their angles: the only ones that never err (Baerentzen and Aanaes, 2005).
         """
-        sense, smooth = found.normal.copy(), np.empty_like(found.normal)
+        sense, smooth = closest.normal.copy(), np.empty_like(closest.normal)
         on_ridge, on_border = np.zeros(len(sense), bool), np.zeros(len(sense), bool)
         facets, first = self._facets, 0
         for block, normals in zip(facets.blocks, facets.smooth, strict=True):
-            mine = np.flatnonzero((found.facet >= first) & (found.facet < first + len(block.nodes)))
-            rows, xi = found.facet[mine] - first, found.xi[mine]
+            mine = np.flatnonzero((closest.facet >= first) & (closest.facet < first + len(block.nodes)))
+            rows, xi = closest.facet[mine] - first, closest.xi[mine]
             mean = np.einsum("nk,nkd->nd", block.element.shape(xi), normals[rows])
             smooth[mine] = mean / np.linalg.norm(mean, axis=1, keepdims=True)
             corner, edge = _place(block, xi)
@@ -149,7 +149,7 @@ class MeshedSurface:
         a, b = block.element.nodes[ends[:, 0]], block.element.nodes[ends[:, 1]]
         along = np.linalg.norm(xi - a, axis=1) / np.linalg.norm(b - a, axis=1)
         beyond = self._facets.beyond[first + rows, edge]
-        found = np.zeros((len(rows), self.mesh.dim))
+        directions = np.zeros((len(rows), self.mesh.dim))
         start = 0
         for other, normals in zip(self._facets.blocks, self._facets.normals, strict=True):
             mine = np.flatnonzero((beyond >= start) & (beyond < start + len(other.nodes)))
@@ -157,9 +157,9 @@ class MeshedSurface:
             for weight, end in ((1.0 - along, ends[:, 0]), (along, ends[:, 1])):
                 node = block.nodes[rows[mine], end[mine]]
                 local = np.argmax(other.nodes[facet] == node[:, None], axis=1)
-                found[mine] += weight[mine, None] * normals[facet, local]
+                directions[mine] += weight[mine, None] * normals[facet, local]
             start += len(other.nodes)
-        return found
+        return directions
 
 
 def _place(block: Block, xi: Array) -> tuple[Indices, Indices]:

@@ -14,7 +14,7 @@ from fastcontact.errors import ContactError
 
 
 @dataclass(frozen=True, eq=False)
-class Stance:
+class Pose:
     """Position and rotation of a rigid obstacle.
 
     Attributes
@@ -42,7 +42,7 @@ class RigidSide:
         """The nodes of the side (0,): none."""
         return np.empty(0, np.int32)
 
-    def facing(self, positions: Array, at: Stance) -> tuple[Array, Array, Mask, Array]:
+    def facing(self, positions: Array, at: Pose) -> tuple[Array, Array, Mask, Array]:
         """Return (gap, normal, paired, offset) of points at `positions` (n, dim) [length].
 
         Near there the gap is ``offset + normal . x``.
@@ -60,16 +60,16 @@ class RigidSide:
 
     def _distance(self, points: Array) -> tuple[Array, Array]:
         """Return gap (n,) [length] and normals (n, dim) [-] of `points` (n, dim) [length] from the obstacle at rest."""
-        found = self.obstacle.distance(points)
-        if is_masked(found):
+        distance_and_normal = self.obstacle.distance(points)
+        if is_masked(distance_and_normal):
             raise ContactError(
                 f"the distance from a rigid obstacle {REFUSAL}; a gap that is infinite leaves a point out"
             )
-        if any(np.iscomplexobj(part) for part in found):
+        if any(np.iscomplexobj(part) for part in distance_and_normal):
             raise ContactError("the distance from a rigid obstacle must be real numbers, not complex ones")
-        return found
+        return distance_and_normal
 
-    def turning(self, positions: Array, before: Array, now: Stance, then: Stance) -> Array | None:
+    def turning(self, positions: Array, before: Array, now: Pose, then: Pose) -> Array | None:
         """Return how far the rotation alone carries points of the obstacle's surface (n, dim) [length]; None without any.
 
         What faces the surface at `positions` (n, dim) [length] and was at `before` has slid over it by its own displacement
@@ -84,7 +84,7 @@ class RigidSide:
         slip = (end @ half - start @ half.T) * (0.5 * angle / math.sin(0.5 * angle))
         return np.asarray((end - start) - slip)
 
-    def torque(self, positions: Array, forces: Array, at: Stance) -> float | None:
+    def torque(self, positions: Array, forces: Array, at: Pose) -> float | None:
         """Return the moment about the axis of the obstacle of `forces` (n, dim) [force] at `positions` [length]."""
         if self.rotation is None:
             return None

@@ -41,17 +41,17 @@ def closest(points: Array, corners: Array) -> Closest:
     """
     points, corners = np.ascontiguousarray(points), np.ascontiguousarray(corners)
     n, dim = points.shape
-    found = Closest(
+    result = Closest(
         np.empty(n, np.intp), np.empty((n, dim - 1)), np.empty((n, dim)), np.empty(n), np.empty((n, dim)), np.empty(n)
     )
     if dim == 2:
-        _on_lines(points, corners, found)
+        _on_lines(points, corners, result)
     else:
-        _on_faces(points, corners, found)
-    wrong = np.flatnonzero(np.isnan(found.distance))
+        _on_faces(points, corners, result)
+    wrong = np.flatnonzero(np.isnan(result.distance))
     if len(wrong):
-        _refuse(points[wrong], found.facet[wrong], corners)
-    return found
+        _refuse(points[wrong], result.facet[wrong], corners)
+    return result
 
 
 def closest_of_kinds(points: Array, kinds: Sequence[Array]) -> Closest:
@@ -59,13 +59,13 @@ def closest_of_kinds(points: Array, kinds: Sequence[Array]) -> Closest:
     if len(kinds) == 1:
         return closest(points, kinds[0])
     first = np.cumsum([0] + [len(corners) for corners in kinds])
-    found = [closest(points, corners) for corners in kinds]
-    nearest = np.argmin([one.distance for one in found], axis=0)
-    facet, *others = (np.stack(values)[nearest, np.arange(len(points))] for values in zip(*found, strict=True))
+    by_kind = [closest(points, corners) for corners in kinds]
+    nearest = np.argmin([one.distance for one in by_kind], axis=0)
+    facet, *others = (np.stack(values)[nearest, np.arange(len(points))] for values in zip(*by_kind, strict=True))
     return Closest(facet + first[nearest], *others)
 
 
-def _on_lines(points: Array, corners: Array, found: Closest) -> None:
+def _on_lines(points: Array, corners: Array, closest: Closest) -> None:
     numbers, order = tree_order(corners[:, 0].copy(), 1), tree_order(points, TOGETHER)
     corners = corners[numbers]
     hull = corners
@@ -74,12 +74,12 @@ def _on_lines(points: Array, corners: Array, found: Closest) -> None:
         hull[:, 2] = 2.0 * corners[:, 2] - 0.5 * (corners[:, 0] + corners[:, 1])
     tree = build(hull.min(axis=1), hull.max(axis=1))
     shared(
-        lambda part: search_2d_kernels.closest_facets(points, order, *part, corners, numbers, tree, found),
+        lambda part: search_2d_kernels.closest_facets(points, order, *part, corners, numbers, tree, closest),
         portions(len(points)),
     )
 
 
-def _on_faces(points: Array, corners: Array, found: Closest) -> None:
+def _on_faces(points: Array, corners: Array, closest: Closest) -> None:
     n, kind = len(corners), tables(corners.shape[1])
     numbers, order = tree_order(corners[:, 0].copy(), 1), tree_order(points, TOGETHER)
     midst = 0.5 * (corners.min(axis=0).min(axis=0) + corners.max(axis=0).max(axis=0))
@@ -88,7 +88,7 @@ def _on_faces(points: Array, corners: Array, found: Closest) -> None:
     shared(lambda part: facets_3d_kernels.prepare(facets, *part, kind.to_terms, kind.weights, low, high), portions(n))
     tree, domain = build(low, high), Domain(kind.nodes, flat_triangles(len(kind.nodes)), kind.sides)
     shared(
-        lambda part: search_3d_kernels.closest_facets(points, order, *part, facets, domain, numbers, tree, found),
+        lambda part: search_3d_kernels.closest_facets(points, order, *part, facets, domain, numbers, tree, closest),
         portions(len(points)),
     )
 

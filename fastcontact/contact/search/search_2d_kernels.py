@@ -62,11 +62,11 @@ def _project(corners, f, x, y):
 
 
 @kernel
-def closest_facets(points, order, begin, end, corners, numbers, tree, found):
+def closest_facets(points, order, begin, end, corners, numbers, tree, result):
     """Project points (n, 2) on their closest facets; of equally close facets on the one with the lowest number.
 
     Points are taken from `begin` to `end` of an `order` (n,) in which neighbours in space follow each other. Facets are in
-    the order of the tree; `numbers` (n_facets,) are those before they were sorted. `found` is filled in place, with facet
+    the order of the tree; `numbers` (n_facets,) are those before they were sorted. `result` is filled in place, with facet
     -1 and distance NaN where a point is not finite.
     """
     stack, squares, leaves = np.empty(DEPTH, np.int64), np.empty(DEPTH), len(tree.low) // 2
@@ -88,31 +88,31 @@ def closest_facets(points, order, begin, end, corners, numbers, tree, found):
             s, d = _project(corners, f, x, y)
             if d < best or (d == best and numbers[f] < numbers[closest]):
                 closest, best, best_s, reach = f, d, s, ROUNDING * d
-        found.facet[i], found.distance[i] = -1, np.nan
+        result.facet[i], result.distance[i] = -1, np.nan
         if closest >= 0:
-            found.facet[i] = numbers[closest]
-            _write(found, i, corners, closest, best_s, x, y)
+            result.facet[i] = numbers[closest]
+            _write(result, i, corners, closest, best_s, x, y)
 
 
 @inlined_kernel
-def _write(found, i, corners, f, s, x, y):
+def _write(closest, i, corners, f, s, x, y):
     """Fill what is found for point `i`, at (x, y), but for the number of the facet `f`."""
     px, py, tx, ty, _, _ = _curve(corners, f, s)
     square = tx * tx + ty * ty
     length, along = np.sqrt(square), ((x - px) * tx + (y - py) * ty) / square
-    found.xi[i, 0], found.normal[i, 0], found.normal[i, 1] = s, ty / length, -tx / length
+    closest.xi[i, 0], closest.normal[i, 0], closest.normal[i, 1] = s, ty / length, -tx / length
     outward = along if s == 1.0 else -along if s == -1.0 else 0.0
-    found.overhang[i] = max(0.5 * outward, 0.0)
+    closest.overhang[i] = max(0.5 * outward, 0.0)
     # As a mean of the nodes, which at an end is that node to the last bit.
     a, b, c = 0.5 * (1.0 - s), 0.5 * (1.0 + s), 0.0
     if corners.shape[1] == 3:
         a, b, c = -s * a, s * b, 1.0 - s * s
     square = 0.0
     for d in range(2):
-        place = a * corners[f, 0, d] + b * corners[f, 1, d]
+        coordinate = a * corners[f, 0, d] + b * corners[f, 1, d]
         if corners.shape[1] == 3:
-            place += c * corners[f, 2, d]
-        found.position[i, d] = place
-        gap = (x if d == 0 else y) - place
+            coordinate += c * corners[f, 2, d]
+        closest.position[i, d] = coordinate
+        gap = (x if d == 0 else y) - coordinate
         square += gap * gap
-    found.distance[i] = np.sqrt(square)
+    closest.distance[i] = np.sqrt(square)

@@ -15,7 +15,7 @@ ROUNDING = 1.0 + 1e-14
 
 
 @kernel
-def closest_facets(points, order, begin, end, facets, domain, numbers, tree, found):
+def closest_facets(points, order, begin, end, facets, domain, numbers, tree, closest_facet):
     """Project points (n, 3) on their closest facets; of facets that meet in the closest point the one with the lowest number.
 
     Arguments are as for `search_2d_kernels.closest_facets`. Where a projection fails, the distance is NaN; where a point is
@@ -50,14 +50,14 @@ def closest_facets(points, order, begin, end, facets, domain, numbers, tree, fou
             if square < best:
                 best = square
                 reach = ROUNDING * (np.sqrt(best) + same) ** 2
-        found.facet[i], found.distance[i] = -1, np.nan
+        closest_facet.facet[i], closest_facet.distance[i] = -1, np.nan
         if closest >= 0:
-            found.facet[i] = numbers[closest]
-            _write(found, i, facets, closest, domain, best_s, best_t, point, place, certain, converged)
+            closest_facet.facet[i] = numbers[closest]
+            _write(closest_facet, i, facets, closest, domain, best_s, best_t, point, place, certain, converged)
 
 
 @inlined_kernel
-def _write(found, i, facets, f, domain, s, t, point, place, inside, converged):
+def _write(closest, i, facets, f, domain, s, t, point, place, inside, converged):
     """Fill what is found for point `i`, but for the number of the facet `f`."""
     if inside:
         a, b, c = vector(facets.terms, f, 1), vector(facets.terms, f, 2), _twist(facets.terms, f)
@@ -66,11 +66,11 @@ def _write(found, i, facets, f, domain, s, t, point, place, inside, converged):
         s, t = onto_sides(domain.sides, s, t)
         normal, overhang = frame(facets.terms, f, s, t, point, domain.sides, domain.nodes)
     gap = minus(point, place)
-    found.xi[i, 0], found.xi[i, 1], found.overhang[i] = s, t, overhang
+    closest.xi[i, 0], closest.xi[i, 1], closest.overhang[i] = s, t, overhang
     if converged and np.isfinite(normal[0]):
-        found.distance[i] = np.sqrt(dot(gap, gap))
+        closest.distance[i] = np.sqrt(dot(gap, gap))
     for d in range(3):
-        found.normal[i, d], found.position[i, d] = normal[d], place[d] + facets.midst[d]
+        closest.normal[i, d], closest.position[i, d] = normal[d], place[d] + facets.midst[d]
 
 
 @inlined_kernel

@@ -164,26 +164,26 @@ def _joined(
 
 @kernel
 def rows_below(
-    start: Numbers, rows: Numbers, order: Numbers, place: Numbers, parent: Numbers, first: Offsets, begin: Offsets,
-    found: Numbers,
+    start: Numbers, rows: Numbers, order: Numbers, position: Numbers, parent: Numbers, first: Offsets, begin: Offsets,
+    row_indices: Numbers,
 ) -> None:  # fmt: skip
-    """Fill `found` with the rows of each run of columns below it, ascending; those of run s begin at ``begin[s]``.
+    """Fill `row_indices` with the rows of each run of columns below it, ascending; those of run s begin at ``begin[s]``.
 
     The matrix is numbered as it was, everything else as in `postordered`: ``order[k]`` is column k, ``place`` the inverse.
     """
     n, count = len(order), len(first) - 1
-    own, seen, at = np.empty(n, np.int32), np.full(count, -1, np.int32), begin[:count].copy()
+    members, seen, at = np.empty(n, np.int32), np.full(count, -1, np.int32), begin[:count].copy()
     for s in range(count):
-        own[first[s] : first[s + 1]] = s
+        members[first[s] : first[s + 1]] = s
     for i in range(n):
         # The row runs up the tree from each of its entries until it meets a way taken before, or its own column.
         for k in range(start[order[i]], start[order[i] + 1]):
-            j = place[rows[k]]
+            j = position[rows[k]]
             if j >= i:
                 continue
-            s = own[j]
-            while s != own[i] and seen[s] != i:
+            s = members[j]
+            while s != members[i] and seen[s] != i:
                 seen[s] = i
-                found[at[s]] = i
+                row_indices[at[s]] = i
                 at[s] += 1
-                s = own[parent[first[s + 1] - 1]]
+                s = members[parent[first[s + 1] - 1]]

@@ -37,11 +37,11 @@ def fill_reducing(K: bsr_array, last: Indices) -> Indices:
     pattern = csc_array((np.ones(len(K.indices)), K.indices, K.indptr), shape=(n, n))
     # A dominant diagonal, so that nothing is pivoted; one column at a time, since nearly nothing is computed.
     pattern = csc_array(pattern + 2.0 * n * eye_array(n))
-    found = spilu(
+    incomplete = spilu(
         pattern, drop_tol=1.0, fill_factor=1.0, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, panel_size=1,
         options={"SymmetricMode": True},
     )  # fmt: skip
-    order = (np.argsort(found.perm_c)[:, None] * size + np.arange(size)).ravel()
+    order = (np.argsort(incomplete.perm_c)[:, None] * size + np.arange(size)).ravel()
     late = np.zeros(len(order), bool)
     late[last] = True
     return np.concatenate([order[~late[order]], order[late[order]]])
@@ -80,9 +80,9 @@ def factors(K: bsr_array, last: Indices) -> SymmetricFactors:
         if abs(d[bad]) <= ROUND_OFF * A.diagonal()[tree.order[bad]]:
             raise singular()
         raise ModelError("the stiffness matrix is not positive definite: check the material and the cells")
-    place = np.empty(n, np.intp)
-    place[order[tree.order]] = np.arange(n)
-    return SymmetricFactors(LowerTriangle(start, values, *nodes), d, place, last)
+    position = np.empty(n, np.intp)
+    position[order[tree.order]] = np.arange(n)
+    return SymmetricFactors(LowerTriangle(start, values, *nodes), d, position, last)
 
 
 class Tree(NamedTuple):
@@ -105,13 +105,13 @@ class Supernodes(NamedTuple):
 def elimination_tree(A: csc_array) -> Tree:
     """Return the elimination tree of a symmetric matrix (n, n)."""
     n = A.shape[0]
-    parent, order, count, place = (np.empty(n, np.intc) for _ in range(4))
+    parent, order, count, position = (np.empty(n, np.intc) for _ in range(4))
     elimination_tree_kernels.parents(A.indptr, A.indices, parent)
     elimination_tree_kernels.postordered(parent, order)
     elimination_tree_kernels.counts(A.indptr, A.indices, parent, order, count)
-    place[order] = np.arange(n, dtype=np.intc)
+    position[order] = np.arange(n, dtype=np.intc)
     above = parent[order]
-    return Tree(order, place, np.where(above < 0, np.intc(-1), place[above]), count[order])
+    return Tree(order, position, np.where(above < 0, np.intc(-1), position[above]), count[order])
 
 
 def supernodes(A: csc_array, tree: Tree, late: Mask) -> Supernodes:

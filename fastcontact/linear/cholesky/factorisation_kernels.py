@@ -44,7 +44,7 @@ def room(parent: Numbers, first: Offsets, begin: Offsets) -> tuple[int, int]:
 
 @kernel
 def factorise(
-    start: Numbers, rows: Numbers, values: Array, order: Numbers, place: Numbers, parent: Numbers, first: Offsets,
+    start: Numbers, rows: Numbers, values: Array, order: Numbers, position: Numbers, parent: Numbers, first: Offsets,
     begin: Offsets, below: Numbers, sizes: tuple[int, int], begins: Offsets, L: Array, d: Array,
 ) -> int:  # fmt: skip
     """Fill L and `d` (n,); return the first column whose pivot, then in `d`, is not positive, or -1.
@@ -82,7 +82,7 @@ def factorise(
         low, high, rest = first[s], first[s + 1], below[begin[s] : begin[s + 1]]
         size = high - low + len(rest)
         F = front[: size * size].reshape(size, size)
-        _gather(start, rows, values, order, place, low, high, rest, local, F)
+        _gather(start, rows, values, order, position, low, high, rest, local, F)
         while top > 0 and low <= parent[first[left[top - 1] + 1] - 1] < high:
             top -= 1
             child = below[begin[left[top]] : begin[left[top] + 1]]
@@ -104,7 +104,7 @@ def factorise(
 
 @kernel
 def _gather(
-    start: Numbers, rows: Numbers, values: Array, order: Numbers, place: Numbers, low: int, high: int, rest: Numbers,
+    start: Numbers, rows: Numbers, values: Array, order: Numbers, position: Numbers, low: int, high: int, rest: Numbers,
     local: Offsets, F: Array,
 ) -> None:  # fmt: skip
     """Fill a front with the columns `low` to ``high - 1`` of the matrix, and `local` with the places of its rows."""
@@ -117,7 +117,7 @@ def _gather(
         local[rest[k]] = width + k
     for j in range(low, high):
         for k in range(start[order[j]], start[order[j] + 1]):
-            i = place[rows[k]]
+            i = position[rows[k]]
             if i >= j:
                 F[j - low, local[i]] = values[k]
 
@@ -142,9 +142,9 @@ def _add(rest: Array, rows: Numbers, local: Offsets, F: Array) -> None:
     """Add what a front left for its `rows` (m,) to the front above."""
     m = len(rows)
     for i in range(m):
-        target, own = F[local[rows[i]]], rest[i]
+        target, source = F[local[rows[i]]], rest[i]
         for k in range(i, m):
-            target[local[rows[k]]] += own[k]
+            target[local[rows[k]]] += source[k]
 
 
 @kernel
@@ -204,6 +204,6 @@ def _reduced_by_blocks(F: Array, begin: int, end: int, one: Array, other: Array,
         change = product[: (high - low) * (m - low)].reshape(high - low, m - low)
         np.dot(scaled[low:high], plain[low:].T, change)
         for i in range(low, high):
-            target, own = F[end + i], change[i - low]
+            target, source = F[end + i], change[i - low]
             for k in range(i, m):
-                target[end + k] -= own[k - low]
+                target[end + k] -= source[k - low]

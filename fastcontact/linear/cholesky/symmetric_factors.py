@@ -38,12 +38,12 @@ class SymmetricFactors:
         Unknowns that are eliminated after all others: no column of theirs in L has a row of another one.
     """
 
-    def __init__(self, L: LowerTriangle, d: Array, place: Indices, last: Indices) -> None:
+    def __init__(self, L: LowerTriangle, d: Array, position: Indices, last: Indices) -> None:
         self.n = len(d)
         self.nnz = len(L.values)
-        self._L, self._d, self._place, self._last = L, d, place, last
+        self._L, self._d, self._place, self._last = L, d, position, last
         self._given = np.zeros(self.n, bool)
-        self._given[place[last]] = True
+        self._given[position[last]] = True
 
     @property
     def nbytes(self) -> int:

@@ -38,15 +38,15 @@ def one_norm(apply: Apply, apply_transposed: Apply, m: int) -> float:
     A lower bound, seldom less than a third of it (Hager, 1984; Higham, 1988). Infinite where products overflow.
     """
     alternating = np.where(np.arange(m) % 2 == 0, 1.0, -1.0) * (1.0 + np.arange(m) / max(m - 1, 1))
-    found = float(np.abs(apply(alternating)).sum()) * 2.0 / (3.0 * m)
+    estimate = float(np.abs(apply(alternating)).sum()) * 2.0 / (3.0 * m)
     x = np.full(m, 1.0 / m)
     for _ in range(STEPS):
         y = apply(x)
-        found = np.maximum(found, np.abs(y).sum())
+        estimate = np.maximum(estimate, np.abs(y).sum())
         z = apply_transposed(np.where(y < 0.0, -1.0, 1.0))
         largest = int(np.abs(z).argmax())
         if not np.abs(z[largest]) > z @ x:
             break
         x = np.zeros(m)
         x[largest] = 1.0
-    return float(found) if np.isfinite(found) else np.inf
+    return float(estimate) if np.isfinite(estimate) else np.inf

@@ -1,7 +1,7 @@
 """Inverse of the pivot columns: small independent blocks, or a factorisation where constraints of many nodes are coupled.
 
 Gaps weighted with standard multipliers are coupled by a mass matrix of the secondary surface, whose inverse is full. Its
-factors are not: a solution costs next to nothing beside a product with the stiffness. Preconditioners need sparse weights
+factors are not: a solution is cheap beside a product with the stiffness. Preconditioners need sparse weights
 and take a sparse inverse instead, that of one block a node which does the same to translations.
 """
 
@@ -98,12 +98,12 @@ def lumped(P: csr_array, pivots: Indices, size: int) -> csr_array:
     are no pivots of the row's own node are left out.
     """
     node, direction = pivots // size, pivots % size
-    place = np.full((node.max() + 1) * size, -1, np.intp)
-    place[pivots] = np.arange(len(pivots))
+    column = np.full((node.max() + 1) * size, -1, np.intp)
+    column[pivots] = np.arange(len(pivots))
     entries = coo_array(P)
-    own = place[node[entries.row] * size + direction[entries.col]]
-    kept = own >= 0
-    return csr_array((entries.data[kept], (entries.row[kept], own[kept])), shape=P.shape)
+    columns = column[node[entries.row] * size + direction[entries.col]]
+    kept = columns >= 0
+    return csr_array((entries.data[kept], (entries.row[kept], columns[kept])), shape=P.shape)
 
 
 def block_inverse(A: csr_array) -> csr_array:
@@ -118,8 +118,8 @@ def block_inverse(A: csr_array) -> csr_array:
     label = connected_components(A, directed=False)[1]
     order, size = np.argsort(label, kind="stable"), np.bincount(label)
     first = np.cumsum(size) - size
-    place = np.empty(m, np.intp)
-    place[order] = np.arange(m) - first[label[order]]
+    position = np.empty(m, np.intp)
+    position[order] = np.arange(m) - first[label[order]]
     entries = coo_array(A)
     rows, cols, values = [], [], []
     for k in np.unique(size):
@@ -129,13 +129,13 @@ def block_inverse(A: csr_array) -> csr_array:
         mine = number[label[entries.row]] >= 0
         row, col = entries.row[mine], entries.col[mine]
         blocks = np.zeros((len(alike), k, k))
-        np.add.at(blocks, (number[label[row]], place[row], place[col]), entries.data[mine])
+        np.add.at(blocks, (number[label[row]], position[row], position[col]), entries.data[mine])
         members = order[first[alike][:, None] + np.arange(k)]
         rows.append(np.repeat(members, k, axis=1).ravel())
         cols.append(np.tile(members, k).ravel())
         values.append(_inverses(blocks).ravel())
-    found = np.concatenate(values), (np.concatenate(rows), np.concatenate(cols))
-    return csr_array(found, shape=A.shape)
+    coo = np.concatenate(values), (np.concatenate(rows), np.concatenate(cols))
+    return csr_array(coo, shape=A.shape)
 
 
 def _inverses(blocks: Array) -> Array:

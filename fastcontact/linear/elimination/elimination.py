@@ -33,7 +33,7 @@ class Elimination:
     own_inverse : csr_array (m, m), optional
         P^-1, where it is not.
     compliance : ndarray (m,), optional
-        By how much the equations give way by themselves: ``B u + compliance * multiplier = c`` [length / force].
+        Compliance of the equations themselves: ``B u + compliance * multiplier = c`` [length / force].
     """
 
     pivots: Indices
@@ -122,13 +122,13 @@ def eliminate(
     pivots, inverse = pivot_order.chosen(B, nodes, size)
     weights, coupled = _weights(B, pivots, inverse), None
     if isinstance(inverse, CoupledPivots):
-        own, coupled, offset = None, inverse, inverse.solve(c)
+        sparse_inverse, coupled, offset = None, inverse, inverse.solve(c)
     else:
-        own, offset = inverse, np.asarray(inverse @ c, np.float64)
+        sparse_inverse, offset = inverse, np.asarray(inverse @ c, np.float64)
     if force_rows is None:
-        return Elimination(pivots, weights, offset, weights, inverse, coupled, own)
+        return Elimination(pivots, weights, offset, weights, inverse, coupled, sparse_inverse)
     inverse = pivot_order.inverse_of(force_rows, pivots, size)
-    return Elimination(pivots, weights, offset, _weights(force_rows, pivots, inverse), inverse, coupled, own)
+    return Elimination(pivots, weights, offset, _weights(force_rows, pivots, inverse), inverse, coupled, sparse_inverse)
 
 
 def _weights(B: csr_array, pivots: Indices, inverse: csr_array | CoupledPivots) -> csr_array:

@@ -10,10 +10,10 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Indices
-from fastcontact.linear.elimination.corner_functions import eliminated
+from fastcontact.linear.delassus import multipliers
+from fastcontact.linear.elimination.basis_transformation import eliminated
 from fastcontact.linear.elimination.pivot_order import RepeatedError
 from fastcontact.linear.field_compliance import FieldCompliance
-from fastcontact.linear.flexibility import multipliers
 from fastcontact.linear.protocol import Monitor
 
 log = logging.getLogger("fastcontact")
@@ -25,7 +25,7 @@ class LoadedIteration:
     Parameters
     ----------
     solver : object
-        With ``columns``, columns of K^-1 (`FlexibilityColumns`), and two methods for an `Elimination` or None:
+        With ``columns``, columns of K^-1 (`InverseColumns`), and two methods for an `Elimination` or None:
         ``solution(f, elimination, guess, monitor, tolerance)`` returns u (n,), ``multiplier(elimination, u, f)`` the
         multipliers (m,) of the equations.
     f : ndarray (n,)
@@ -37,7 +37,7 @@ class LoadedIteration:
 
     @property
     def _functions(self) -> csr_array | None:
-        """See `corner_functions.eliminated`: None where the solver does not use them."""
+        """See `basis_transformation.eliminated`: None where the solver does not use them."""
         return None
 
     @functools.cached_property
@@ -64,7 +64,7 @@ class LoadedIteration:
         multiplier = multipliers(solver.columns, B, c - B @ self._free, C)
         return solver.solution(self._f + B.T @ multiplier, None, guess), multiplier
 
-    def flexibility(self, R: csr_array) -> tuple[Array, Array]:
+    def delassus(self, R: csr_array) -> tuple[Array, Array]:
         """See `Loaded`."""
         return R @ self._free, self._solver.columns.of_rows(R)
 

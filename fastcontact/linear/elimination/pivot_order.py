@@ -52,12 +52,12 @@ def chosen(B: csr_array, nodes: Indices | None = None, size: int = 1) -> tuple[I
     """
     if not B.shape[0]:
         return np.empty(0, np.intp), csr_array((0, 0))
-    if (found := layered(B, layers=1)) is not None:
-        return found
+    if (layers := layered(B, layers=1)) is not None:
+        return layers
     if nodes is not None and (pivots := of_groups(B, nodes, layers=1)) is not None:
         return pivots, block_inverse(csr_array(B[:, pivots]))
-    if (found := layered(B)) is not None:
-        return found
+    if (layers := layered(B)) is not None:
+        return layers
     if nodes is not None and (pivots := of_groups(B, nodes)) is not None:
         return pivots, inverse_of(B, pivots, size)
     if nodes is not None and (pivots := of_nodes(B, nodes, size)) is not None:
@@ -80,13 +80,13 @@ def inverse_of(B: csr_array, pivots: Indices, size: int) -> csr_array | CoupledP
     label = connected_components(P, directed=False)[1]
     largest = np.bincount(label).max(initial=0)
     if largest > LARGEST_BLOCK:
-        if (found := _triangular_inverse(P, LARGEST_BLOCK, MOST_LAYERS)) is not None:
-            return found
+        if (inverse := _triangular_inverse(P, LARGEST_BLOCK, MOST_LAYERS)) is not None:
+            return inverse
         try:
             return CoupledPivots(P, pivots, size)
         except CoupledError:
-            if (found := _triangular_inverse(P, FULL_UP_TO, 2 * MOST_LAYERS)) is not None:
-                return found
+            if (inverse := _triangular_inverse(P, FULL_UP_TO, 2 * MOST_LAYERS)) is not None:
+                return inverse
             if largest > FULL_UP_TO:
                 raise
     return block_inverse(P)
@@ -146,9 +146,9 @@ def _in_layers(B: csr_array, groups: Indices, layers: int) -> Indices:
         lowest, highest = np.full(n, m), np.full(n, -1)
         np.minimum.at(lowest, B.indices[among], group[row[among]])
         np.maximum.at(highest, B.indices[among], group[row[among]])
-        found = _pivots_in_groups(B, group, among & (lowest[B.indices] == highest[B.indices]))
-        pivots = np.where(pivots < 0, found, pivots)
-        if (pivots >= 0).all() or not (found >= 0).any():
+        pivots_of_group = _pivots_in_groups(B, group, among & (lowest[B.indices] == highest[B.indices]))
+        pivots = np.where(pivots < 0, pivots_of_group, pivots)
+        if (pivots >= 0).all() or not (pivots_of_group >= 0).any():
             break
     return pivots
 
@@ -167,18 +167,18 @@ def _pivots_in_groups(B: csr_array, group: Indices, is_own: Mask) -> Indices:
     Groups without as many pivots as rows have none, -1.
     """
     m, n = B.shape
-    row, own = np.repeat(np.arange(m), np.diff(B.indptr)), np.flatnonzero(is_own)
+    row, entries = np.repeat(np.arange(m), np.diff(B.indptr)), np.flatnonzero(is_own)
     pivots = np.full(m, -1, np.intp)
-    if not len(own):
+    if not len(entries):
         return pivots
-    found = B.indices[np.sort(own[np.unique(B.indices[own], return_index=True)[1]])]
+    pivot_columns = B.indices[np.sort(entries[np.unique(B.indices[entries], return_index=True)[1]])]
     line, column, owner = _place_in_group(group), np.zeros(n, np.intp), np.zeros(n, np.intp)
-    owner[B.indices[own]] = group[row[own]]
-    column[found] = _place_in_group(owner[found])
+    owner[B.indices[entries]] = group[row[entries]]
+    column[pivot_columns] = _place_in_group(owner[pivot_columns])
     table = np.zeros((group.max() + 1, line.max() + 1, column.max() + 1))
-    table[group[row[own]], line[row[own]], column[B.indices[own]]] = B.data[own]
+    table[group[row[entries]], line[row[entries]], column[B.indices[entries]]] = B.data[entries]
     equation, unknown = np.zeros(table.shape[:2], np.intp), np.zeros((len(table), table.shape[2]), np.intp)
-    equation[group, line], unknown[owner[found], column[found]] = np.arange(m), found
+    equation[group, line], unknown[owner[pivot_columns], column[pivot_columns]] = np.arange(m), pivot_columns
     count, largest = np.bincount(group), abs(B).max(axis=1).toarray().ravel()
     failed = np.zeros(len(count), bool)
     for made in range(table.shape[1]):
@@ -201,9 +201,9 @@ def _pivots_in_groups(B: csr_array, group: Indices, is_own: Mask) -> Indices:
 def _place_in_group(group: Indices) -> Indices:
     """Return how many earlier entries have the same number, for each entry of `group`."""
     order = np.argsort(group, kind="stable")
-    place = np.empty(len(group), np.intp)
-    place[order] = np.arange(len(group)) - np.searchsorted(group[order], group[order])
-    return place
+    position = np.empty(len(group), np.intp)
+    position[order] = np.arange(len(group)) - np.searchsorted(group[order], group[order])
+    return position
 
 
 def layered(B: csr_array, smallest: float = SMALLEST, layers: int = MOST_LAYERS) -> tuple[Indices, csr_array] | None:

@@ -11,9 +11,9 @@ from scipy.sparse import bsr_array, csc_array, csr_array
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.linear.cholesky.symmetric_factors import SymmetricFactors
+from fastcontact.linear.delassus import InverseColumns, check_rows, multipliers, solve_multipliers, symmetric
 from fastcontact.linear.factors.known_loads import KnownLoads
 from fastcontact.linear.field_compliance import FieldCompliance
-from fastcontact.linear.flexibility import FlexibilityColumns, check_rows, multipliers, solve_multipliers, symmetric
 from fastcontact.linear.protocol import Counters, LinearSolver, Monitor
 
 log = logging.getLogger("fastcontact")
@@ -27,8 +27,8 @@ MARGIN = 10.0
 class FactorSolver(LinearSolver):
     """A direct solver; sub-classes factorise and solve.
 
-    Where a sub-class gives factors with the unknowns last that equations may involve, their flexibility is the inverse of
-    the trailing block, ``(K^-1)_cc = (L_cc D_c L_cc.T)^-1``, and costs no solution with K at all; the displacement of the
+    Where a sub-class gives factors with the unknowns last that equations may involve, their Delassus operator is the inverse
+    of the trailing block, ``(K^-1)_cc = (L_cc D_c L_cc.T)^-1``, and costs no solution with K at all; the displacement of the
     other unknowns under contact forces follows from theirs by half a solution.
 
     Parameters
@@ -81,7 +81,7 @@ class FactorSolver(LinearSolver):
             self._factorise(K.tocsc())
             self.error = MARGIN * self._error(K)
         self.counters.setups += 1
-        self.columns, self.known_loads = FlexibilityColumns(self.n, self._solution), KnownLoads()
+        self.columns, self.known_loads = InverseColumns(self.n, self._solution), KnownLoads()
         if self._factors is not None and involved is not None and len(involved):
             self.last, self.inverse = involved, self._factors.last_inverse()
             self.columns.give(self.last, self.inverse)
@@ -164,7 +164,7 @@ class LoadedFactor:
         multiplier = multipliers(self._solver.columns, B, c - B @ self._free, C)
         return self.involved_solution(B.T @ multiplier, guess), multiplier
 
-    def flexibility(self, R: csr_array) -> tuple[Array, Array]:
+    def delassus(self, R: csr_array) -> tuple[Array, Array]:
         """See `Loaded`."""
         return R @ self._free, self._solver.columns.of_rows(R)
 
@@ -225,7 +225,7 @@ class CondensedProblem:
         multiplier = solve_multipliers(symmetric(B @ moved.T), c - B @ self._free, C)
         return self._free + multiplier @ moved, multiplier
 
-    def flexibility(self, R: csr_array) -> tuple[Array, Array]:
+    def delassus(self, R: csr_array) -> tuple[Array, Array]:
         """See `Loaded`."""
         return R @ self._free, symmetric(R @ (R @ self._inverse).T)
 

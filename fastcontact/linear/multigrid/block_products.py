@@ -42,8 +42,8 @@ def row_times_plain(
         Tuples of m and n zeros: the size of a block.
     """
     m, n = len(rows), len(cols)
-    own = slice(begin * m * n, end * m * n)
-    blocks = sum(part[own].astype(x.dtype) for part in numbers).reshape(-1, m, n)
+    entries = slice(begin * m * n, end * m * n)
+    blocks = sum(part[entries].astype(x.dtype) for part in numbers).reshape(-1, m, n)
     return tuple(np.einsum("kmn,kn->m", blocks, x.reshape(-1, n)[indices[begin:end]]))
 
 

@@ -282,10 +282,10 @@ class _Row(_Writer):
                 lanes.append(vector)
             else:
                 lanes += [self.builder.extract_element(vector, self.lane(first + c)) for c in range(piece.used)]
-        found = lanes[0]
+        partial = lanes[0]
         for lane in lanes[1:]:
-            found = self.builder.fadd(found, lane)
-        return found
+            partial = self.builder.fadd(partial, lane)
+        return partial
 
     def _three(self, j: Any) -> list[Any]:
         """Return three numbers of x and any fourth, without a look beyond them."""
@@ -325,9 +325,9 @@ class _RowBothWays(_Row):
 
 def _pieces(n: int) -> list[Piece]:
     """Return the pieces of n columns: as many whole vectors as there are, half a one, a single number."""
-    found, column = [], 0
+    pieces, column = [], 0
     for width in (WIDTH, WIDTH // 2, 1):
         while n - column >= width:
-            found.append(Piece(column, width, width))
+            pieces.append(Piece(column, width, width))
             column += width
-    return found
+    return pieces

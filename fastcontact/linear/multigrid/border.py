@@ -2,7 +2,7 @@
 
 The matrix of displacements and multipliers, ``[A, -B.T; B, C]``, is bordered and not positive definite. Conjugate residuals
 solve it, preconditioned by its lower triangle: multigrid for A, and for the multipliers ``C + B D^-1 B.T``, D the diagonal of
-A, softer by as much as neighbours give way, too.
+A, softer by the compliance of their neighbours.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from scipy.sparse.linalg import splu
 from fastcontact.arrays import Array
 from fastcontact.linear.krylov.iterations import Multiply, Precondition
 
-# By how much displacements give way more than the diagonal of their matrix says.
+# Compliance of displacements in units of the inverse diagonal of their matrix.
 SOFTER = 2.0
 # Part of what they have by themselves that is added to multipliers in the preconditioner: some are linearly dependent.
 REPEATED = 1e-10
@@ -42,10 +42,10 @@ class Border:
         """Factorise the preconditioner of the multipliers, given the diagonal (n,) of A [force / length]."""
         yielding = np.divide(1.0, diagonal, out=np.zeros(len(diagonal)), where=diagonal > 0.0)
         S = self.compliance + SOFTER * (self.rows @ diags_array(yielding) @ self.rows.T)
-        own = S.diagonal()
+        diagonal_of_S = S.diagonal()
         # Residuals of these equations become forces.
-        self.stiffness = 1.0 / own
-        self._factors = splu(csc_array(S + diags_array(REPEATED * own)))
+        self.stiffness = 1.0 / diagonal_of_S
+        self._factors = splu(csc_array(S + diags_array(REPEATED * diagonal_of_S)))
 
     def multiply(self, multiply: Multiply, move_forces: Callable[[Array], None]) -> Multiply:
         """Return the product with the bordered matrix, from that with A; forces (n,) move from eliminated unknowns."""

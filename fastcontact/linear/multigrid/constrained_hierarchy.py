@@ -28,7 +28,7 @@ from fastcontact.linear.springs import Springs
 SPECTRUM_CHANGED = 2.0
 # Largest eigenvalue of the finest level, beside its diagonal, from which it counts as wide; 3 to 4 on well-shaped hexahedra.
 WIDE = 6.0
-# Nodes that equations make so many times as stiff need more than the smoother and the coarser levels of K.
+# Nodes that equations stiffen by this factor need more than the smoother and the coarser levels of K.
 MUCH = 4.0
 
 
@@ -118,8 +118,8 @@ class ConstrainedHierarchy:
         """Return the nodes without pivots that equations stiffen by much, and set `stiffening`."""
         size = change.size
         of_all = self.hierarchy.levels[0].diagonal.reshape(-1, size * size)[change.nodes]
-        own, more = (np.einsum("kii->k", part.reshape(-1, size, size)) for part in (of_all, change.diagonal()))
-        by = np.divide(more, own, out=np.zeros(len(more)), where=own > 0.0)
+        trace, more = (np.einsum("kii->k", part.reshape(-1, size, size)) for part in (of_all, change.diagonal()))
+        by = np.divide(more, trace, out=np.zeros(len(more)), where=trace > 0.0)
         self.stiffening = float(by.max(initial=0.0))
         return change.nodes[(by > MUCH) & ~np.isin(change.nodes, elimination.pivots // size)]
 

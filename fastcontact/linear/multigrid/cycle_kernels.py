@@ -175,8 +175,8 @@ def invert_blocks(blocks, size, out):
                 a[r, c] = blocks[base + r * size + c]
                 a[r, size + c] = 1.0 if r == c else 0.0
         for p in range(size):
-            own = blocks[base + p * size + p]
-            idle = not (a[p, p] > 1e-10 * own and own > 1e-12 * largest)
+            pivot_before = blocks[base + p * size + p]
+            idle = not (a[p, p] > 1e-10 * pivot_before and pivot_before > 1e-12 * largest)
             if idle:
                 for k in range(size):
                     a[k, p] = a[p, k] = 0.0

@@ -19,16 +19,16 @@ PARTS = 8
 
 
 @kernel
-def _near(i, indptr, indices, storage, data, square, found):
-    """Fill `found` with the columns of the blocks of row i that are not zero, but for the diagonal; return their number."""
+def _near(i, indptr, indices, storage, data, square, near):
+    """Fill `near` with the columns of the blocks of row i that are not zero, but for the diagonal; return their number."""
     part, count = part_of(storage, i), 0
     for k in range(indptr[i], indptr[i + 1]):
         if indices[k] == i:
             continue
-        own = place_of(storage, part, i, indices[k], k)[0]
-        for e in range(own * square, (own + 1) * square):
+        slot = place_of(storage, part, i, indices[k], k)[0]
+        for e in range(slot * square, (slot + 1) * square):
             if data[e] != 0.0:
-                found[count] = indices[k]
+                near[count] = indices[k]
                 count += 1
                 break
     return count
@@ -45,37 +45,37 @@ def graph(indptr, indices, storage, data, size):
     for i in range(n):
         widest = max(widest, indptr[i + 1] - indptr[i])
     for c in prange((n + CHUNK - 1) // CHUNK):
-        found = np.empty(widest, np.int32)
+        near = np.empty(widest, np.int32)
         for i in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
-            start[i + 1] = _near(i, indptr, indices, storage, data, size * size, found)
+            start[i + 1] = _near(i, indptr, indices, storage, data, size * size, near)
     for i in range(n):
         start[i + 1] += start[i]
     neighbours = np.empty(start[n], np.int32)
     for c in prange((n + CHUNK - 1) // CHUNK):
-        found = np.empty(widest, np.int32)
+        near = np.empty(widest, np.int32)
         for i in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
-            count = _near(i, indptr, indices, storage, data, size * size, found)
+            count = _near(i, indptr, indices, storage, data, size * size, near)
             for e in range(count):
-                neighbours[start[i] + e] = found[e]
+                neighbours[start[i] + e] = near[e]
     return start, neighbours
 
 
 @kernel
-def _aggregates_of(i, indptr, indices, aggregate, found):
-    """Fill `found` with the aggregates of node i and its neighbours, ascending; return their number."""
+def _aggregates_of(i, indptr, indices, aggregate, aggregates):
+    """Fill `aggregates` with the aggregates of node i and its neighbours, ascending; return their number."""
     count = 0
     for k in range(indptr[i], indptr[i + 1]):
-        own = aggregate[indices[k]]
-        if own < 0:
+        of_neighbour = aggregate[indices[k]]
+        if of_neighbour < 0:
             continue
         at = count
-        while at > 0 and found[at - 1] > own:
+        while at > 0 and aggregates[at - 1] > of_neighbour:
             at -= 1
-        if at > 0 and found[at - 1] == own:
+        if at > 0 and aggregates[at - 1] == of_neighbour:
             continue
         for e in range(count, at, -1):
-            found[e] = found[e - 1]
-        found[at] = own
+            aggregates[e] = aggregates[e - 1]
+        aggregates[at] = of_neighbour
         count += 1
     return count
 
@@ -89,9 +89,9 @@ def count_prolongator(indptr, indices, aggregate):
         widest = max(widest, indptr[i + 1] - indptr[i])
     start = np.zeros(n + 1, np.int32)
     for c in prange((n + CHUNK - 1) // CHUNK):
-        found = np.empty(widest, np.int32)
+        aggregates = np.empty(widest, np.int32)
         for i in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
-            start[i + 1] = _aggregates_of(i, indptr, indices, aggregate, found)
+            start[i + 1] = _aggregates_of(i, indptr, indices, aggregate, aggregates)
     for i in range(n):
         start[i + 1] += start[i]
     return start
@@ -128,11 +128,11 @@ def _smooth_row(
         at = 0
         while found[at] != aggregate[j]:
             at += 1
-        own, turned = place_of(storage, part, i, j, k)
+        slot, turned = place_of(storage, part, i, j, k)
         if turned:
-            add_transposed(sums, at * m * n, data, own * m * m, tentative, j * m * n, (rows, rows, cols))
+            add_transposed(sums, at * m * n, data, slot * m * m, tentative, j * m * n, (rows, rows, cols))
         else:
-            add_product(sums, at * m * n, data, own * m * m, tentative, j * m * n, (rows, rows, cols))
+            add_product(sums, at * m * n, data, slot * m * m, tentative, j * m * n, (rows, rows, cols))
     for at in range(count):
         base = (start[i] + at) * m * n
         columns[start[i] + at] = found[at]
@@ -158,18 +158,18 @@ def smooth_prolongator(indptr, indices, storage, data, inverse, aggregate, tenta
         widest = max(widest, start[i + 1] - start[i])
     columns = np.empty(start[n], np.int32)
     for c in prange((n + CHUNK - 1) // CHUNK):
-        found = np.empty(widest + 1, np.int32)
+        near = np.empty(widest + 1, np.int32)
         sums = np.empty((widest + 1) * m * len(cols))
         for i in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
             _smooth_row(
-                i, indptr, indices, storage, data, inverse, aggregate, tentative, omega, start, columns, out, found, sums,
+                i, indptr, indices, storage, data, inverse, aggregate, tentative, omega, start, columns, out, near, sums,
                 rows, cols,
             )  # fmt: skip
     return columns
 
 
 @kernel
-def _reach(row, indptr, indices, start, columns, tstart, torigin, seen, near, seen_coarse, found):
+def _reach(row, indptr, indices, start, columns, tstart, torigin, seen, near, seen_coarse, reached):
     """Find the fine nodes next to those of a coarse node, and the coarse nodes that these reach; return both counts."""
     n_near = n_found = 0
     for e in range(tstart[row], tstart[row + 1]):
@@ -186,7 +186,7 @@ def _reach(row, indptr, indices, start, columns, tstart, torigin, seen, near, se
             J = columns[k]
             if seen_coarse[J] != row:
                 seen_coarse[J] = row
-                found[n_found] = J
+                reached[n_found] = J
                 n_found += 1
     return n_near, n_found
 
@@ -197,10 +197,10 @@ def count_galerkin(indptr, indices, start, columns, tstart, torigin, count, near
     n, n_coarse = indptr.shape[0] - 1, tstart.shape[0] - 1
     for part in prange(PARTS):
         seen, near = np.full(n, -1, np.int32), np.empty(n, np.int32)
-        seen_coarse, found = np.full(n_coarse, -1, np.int32), np.empty(n_coarse, np.int32)
+        seen_coarse, reached = np.full(n_coarse, -1, np.int32), np.empty(n_coarse, np.int32)
         for row in range(part * n_coarse // PARTS, (part + 1) * n_coarse // PARTS):
             near_count[row], count[row] = _reach(
-                row, indptr, indices, start, columns, tstart, torigin, seen, near, seen_coarse, found
+                row, indptr, indices, start, columns, tstart, torigin, seen, near, seen_coarse, reached
             )
 
 
@@ -216,14 +216,14 @@ def _galerkin_row(
     for e in range(n_near * m * n):
         products[e] = 0.0
     for e in range(tstart[row], tstart[row + 1]):
-        i, own = torigin[e], tslot[e] * m * n
+        i, slot = torigin[e], tslot[e] * m * n
         part = part_of(storage, i)
         for k in range(indptr[i], indptr[i + 1]):  # A_ji = A_ij.T
             at, turned = place_of(storage, part, i, indices[k], k)
             if turned:
-                add_product(products, place[indices[k]] * m * n, data, at * m * m, P, own, (rows, rows, cols))
+                add_product(products, place[indices[k]] * m * n, data, at * m * m, P, slot, (rows, rows, cols))
             else:
-                add_transposed(products, place[indices[k]] * m * n, data, at * m * m, P, own, (rows, rows, cols))
+                add_transposed(products, place[indices[k]] * m * n, data, at * m * m, P, slot, (rows, rows, cols))
     for e in range(n_near):
         j, base = near[e], e * m * n
         for k in range(start[j], start[j + 1]):
@@ -258,17 +258,17 @@ def galerkin(
     m, size = len(rows), len(cols)
     for part in prange(PARTS):
         seen, near = np.full(n, -1, np.int32), np.empty(n, np.int32)
-        seen_coarse, found = np.full(n_coarse, -1, np.int32), np.empty(n_coarse, np.int32)
+        seen_coarse, reached = np.full(n_coarse, -1, np.int32), np.empty(n_coarse, np.int32)
         place, places = np.empty(n, np.int32), np.empty(n_coarse, np.int32)
         products = np.empty(largest * m * size)
         for row in range(part * n_coarse // PARTS, (part + 1) * n_coarse // PARTS):
             n_near, n_found = _reach(
-                row, indptr, indices, start, columns, tstart, torigin, seen, near, seen_coarse, found
+                row, indptr, indices, start, columns, tstart, torigin, seen, near, seen_coarse, reached
             )
-            found[:n_found].sort()
+            reached[:n_found].sort()
             for e in range(n_found):
-                places[found[e]] = e
-                out_columns[low[row] + e] = found[e]
+                places[reached[e]] = e
+                out_columns[low[row] + e] = reached[e]
             _galerkin_row(
                 row, near, n_near, place, products, indptr, indices, storage, data, start, columns, P, tstart, torigin, tslot,
                 low[row], places, out, rows, cols,

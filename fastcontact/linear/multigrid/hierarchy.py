@@ -60,11 +60,11 @@ class Hierarchy:
 
     def _level(self, A: BlockMatrix) -> Level:
         size = len(A.rows)
-        own = replace(A, data=A.data.astype(self.dtype, copy=False), low=None)
-        diagonal = own.diagonal_part(own.data)
+        matrix = replace(A, data=A.data.astype(self.dtype, copy=False), low=None)
+        diagonal = matrix.diagonal_part(matrix.data)
         inverse = np.empty_like(diagonal)
         cycle_kernels.invert_blocks(diagonal, size, inverse)
-        level = Level(own, diagonal, inverse, 1.0)
+        level = Level(matrix, diagonal, inverse, 1.0)
         level.bound = SAFETY * largest_eigenvalue(level)
         return level
 
@@ -161,8 +161,8 @@ class Hierarchy:
 def by_columns(P: BlockMatrix, n: int) -> tuple[Numbers, Numbers, Numbers]:
     """Return where the blocks of each of n block columns begin, their rows, ascending, and their numbers."""
     numbers = np.arange(len(P.indices), dtype=np.int32)
-    found = csr_matrix((numbers, P.indices, P.indptr), shape=(len(P.indptr) - 1, n)).tocsc()
-    return found.indptr, found.indices, found.data
+    columns = csr_matrix((numbers, P.indices, P.indptr), shape=(len(P.indptr) - 1, n)).tocsc()
+    return columns.indptr, columns.indices, columns.data
 
 
 def product(A: BlockMatrix, P: BlockMatrix, index: tuple[Numbers, Numbers, Numbers]) -> BlockMatrix:

@@ -107,15 +107,15 @@ class Level:
         if self.followers is None:
             self.P.combine(1.0, coarse, 1.0, self.x, self.x)
         else:
-            own, W = self.followers.pivots, self.followers.weights
-            beside = self.x[own] - W @ self.x
+            pivots, W = self.followers.pivots, self.followers.weights
+            beside = self.x[pivots] - W @ self.x
             self.P.combine(1.0, coarse, 1.0, self.x, self.x)
-            self.x[own] = W @ self.x + beside
+            self.x[pivots] = W @ self.x + beside
         if self.eliminated is not None:
             self.eliminated.complete(self.x)
 
     @property
     def nbytes(self) -> int:
         """Memory [bytes]."""
-        own = self.A.nbytes + self.diagonal.nbytes + self.inverse.nbytes + 4 * self.b.nbytes
-        return own + sum(A.nbytes for A in (self.P, self.R) if A is not None)
+        total = self.A.nbytes + self.diagonal.nbytes + self.inverse.nbytes + 4 * self.b.nbytes
+        return total + sum(A.nbytes for A in (self.P, self.R) if A is not None)

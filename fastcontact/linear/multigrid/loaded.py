@@ -1,7 +1,7 @@
 """Multigrid solution under linear constraints, some of which have a compliance of their own.
 
 An equation with a compliance of its own is a spring along its row. Springs not much stiffer than the body become part of the
-matrix and of the hierarchy; stiffer ones are eliminated like equations that do not give way, see `reduced`.
+matrix and of the hierarchy; stiffer ones are eliminated like exact equations, see `reduced`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.linear.elimination.corner_functions import eliminated
+from fastcontact.linear.elimination.basis_transformation import eliminated
 from fastcontact.linear.elimination.elimination import Elimination, eliminate
 from fastcontact.linear.elimination.loaded import LoadedIteration
 from fastcontact.linear.elimination.pivot_order import RepeatedError
@@ -25,7 +25,7 @@ from fastcontact.linear.sparse_rows import scaled
 from fastcontact.linear.springs import Springs
 
 log = logging.getLogger("fastcontact")
-# Equations whose own stiffness is more than so many times that of the unknowns they act on are eliminated: as springs they
+# Equations whose own stiffness exceeds that of the unknowns they act on by this factor are eliminated: as springs they
 # take half as many iterations again there, and the root of the ratio as many beyond. The second where pivots are coupled,
 # whose weights are nearly right only.
 STIFF, STIFF_COUPLED = 10.0, 300.0
@@ -56,7 +56,7 @@ class LoadedMultigrid(LoadedIteration):
 
     @property
     def _functions(self) -> csr_array | None:
-        functions: csr_array | None = self._solver.corner_functions
+        functions: csr_array | None = self._solver.basis_transformation
         return functions
 
     @property
@@ -149,15 +149,15 @@ class LoadedMultigrid(LoadedIteration):
             return _Parts(np.ones(len(c), bool), elimination, None)
         diagonal = self._solver.diagonal()
         yielding = np.divide(1.0, diagonal, out=np.zeros(len(diagonal)), where=diagonal > 0.0)
-        own = B.multiply(B) @ yielding
+        softness = B.multiply(B) @ yielding
         for least in (STIFF, STIFF_COUPLED):
-            stiff = own > least * C
+            stiff = softness > least * C
             try:
-                found = _Parts.of(B, c, C, stiff, nodes, size, through, self._functions)
+                parts = _Parts.of(B, c, C, stiff, nodes, size, through, self._functions)
             except RepeatedError:
                 continue
-            if not found.coupled or least == STIFF_COUPLED:
-                return found
+            if not parts.coupled or least == STIFF_COUPLED:
+                return parts
         return _Parts.of(B, c, C, C == 0.0, nodes, size, through, self._functions)
 
 
@@ -212,10 +212,10 @@ class _Parts:
         """Return all multipliers (m,), given those of the equations eliminated."""
         if self.springs is None:
             return of_stiff
-        found = np.empty(len(c))
-        found[self.stiff] = of_stiff
-        found[~self.stiff] = self.springs.stiffness * (c[~self.stiff] - self.springs.rows @ u)
-        return found
+        multiplier = np.empty(len(c))
+        multiplier[self.stiff] = of_stiff
+        multiplier[~self.stiff] = self.springs.stiffness * (c[~self.stiff] - self.springs.rows @ u)
+        return multiplier
 
 
 @dataclass(frozen=True, eq=False)

@@ -49,10 +49,10 @@ class LocalChange:
 
     def coarser(self, P: BlockMatrix) -> LocalChange:
         """Return the Galerkin product ``P.T change P``."""
-        own = block_rows(P, self.nodes, (int(P.indices.max()) + 1) * len(P.cols))
-        below, columns = np.unique(own.indices, return_inverse=True)
-        own = bsr_array((own.data, columns, own.indptr), shape=(own.shape[0], len(below) * len(P.cols)))
-        product = bsr_array(own.T @ self.blocks @ own)
+        P_own = block_rows(P, self.nodes, (int(P.indices.max()) + 1) * len(P.cols))
+        below, columns = np.unique(P_own.indices, return_inverse=True)
+        P_own = bsr_array((P_own.data, columns, P_own.indptr), shape=(P_own.shape[0], len(below) * len(P.cols)))
+        product = bsr_array(P_own.T @ self.blocks @ P_own)
         product.sort_indices()
         return LocalChange(below, product)
 
@@ -65,21 +65,21 @@ class LocalChange:
 
     def spread(self, nodes: Indices) -> bsr_array:
         """Return the blocks on more `nodes` (l,), ascending."""
-        place = np.searchsorted(nodes, self.nodes)
+        index = np.searchsorted(nodes, self.nodes)
         count = np.zeros(len(nodes), np.intp)
-        count[place] = np.diff(self.blocks.indptr)
+        count[index] = np.diff(self.blocks.indptr)
         n = len(nodes) * self.size
-        return bsr_array((self.blocks.data, place[self.blocks.indices], np.r_[0, np.cumsum(count)]), shape=(n, n))
+        return bsr_array((self.blocks.data, index[self.blocks.indices], np.r_[0, np.cumsum(count)]), shape=(n, n))
 
 
-def merged(one: LocalChange, *others: LocalChange) -> LocalChange:
+def merged(change: LocalChange, *others: LocalChange) -> LocalChange:
     """Return the sum of changes."""
     for other in others:
-        nodes = np.union1d(one.nodes, other.nodes)
-        total = bsr_array(one.spread(nodes) + other.spread(nodes))
+        nodes = np.union1d(change.nodes, other.nodes)
+        total = bsr_array(change.spread(nodes) + other.spread(nodes))
         total.sort_indices()
-        one = LocalChange(nodes, total)
-    return one
+        change = LocalChange(nodes, total)
+    return change
 
 
 def block_rows(A: BlockMatrix, nodes: Indices, n: int) -> bsr_array:

@@ -30,7 +30,7 @@ class Reduced:
     springs : Springs, optional
         Added to K.
     diagonal : ndarray (n,), optional
-        That of K [force / length], where equations give way.
+        That of K [force / length], where equations have a compliance.
 
     Attributes
     ----------
@@ -122,7 +122,7 @@ class _Excess:
         self._elimination, self._pivots = elimination, elimination.pivots
         gives, self._compliance = compliance > 0.0, compliance
         self._stiffness = np.divide(1.0, compliance, out=np.zeros(len(compliance)), where=gives)
-        # Its own stiffness and that of the pivot; an equation that does not give way stays as it is.
+        # Its own stiffness and that of the pivot; an exact equation stays as it is.
         inverse = elimination.own_inverse
         if inverse is None:
             inverse = elimination.with_sparse_weights().inverse
@@ -144,13 +144,13 @@ class _Excess:
         return u
 
     def reduce(self, x: Array, r: Array, sign: float) -> None:
-        own = self._elimination.multiplier(r[self._pivots]) + sign * self._stiffness * x[self._pivots]
+        multiplier = self._elimination.multiplier(r[self._pivots]) + sign * self._stiffness * x[self._pivots]
         self._elimination.move_forces(r)
-        r[self._pivots] = np.where(self._gives, own, 0.0)
+        r[self._pivots] = np.where(self._gives, multiplier, 0.0)
 
     def precondition(self, r: Array, norm: float, z: Array, cycle: Callable[[Array, float, Array], None]) -> None:
-        own = r[self._pivots]
+        residual = r[self._pivots]
         r[self._pivots] = 0.0
         cycle(r, norm, z)
-        r[self._pivots] = own
-        z[self._pivots] = self._inverse * own
+        r[self._pivots] = residual
+        z[self._pivots] = self._inverse * residual

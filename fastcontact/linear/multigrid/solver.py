@@ -15,8 +15,8 @@ from scipy.sparse import bsr_array, csr_array
 from fastcontact._jit.decorators import check_threads
 from fastcontact.arrays import Array
 from fastcontact.errors import ConvergenceError, ModelError
+from fastcontact.linear.delassus import InverseColumns
 from fastcontact.linear.elimination.elimination import Elimination
-from fastcontact.linear.flexibility import FlexibilityColumns
 from fastcontact.linear.krylov import krylov_kernels
 from fastcontact.linear.krylov.iterations import (
     ConjugateGradients,
@@ -56,7 +56,7 @@ STOOD, LONGEST_WARM = 0.2, 40
 FALLS, STANDING = 0.99, 40
 # Smaller contrasts of materials are taken for none.
 MILD = 10.0
-# Where the smoother amplifies something, its bound of the spectrum is raised by this factor, so many times.
+# Where the smoother amplifies something, its bound of the spectrum is raised by this factor, at most so often.
 RAISE, RAISES = 1.3, 4
 
 
@@ -80,7 +80,7 @@ class Multigrid:
 
     Attributes
     ----------
-    contrast, corner_functions
+    contrast, basis_transformation
         See `LinearSolver`.
     patience : int
         Nonsymmetric iterations of one solution at most.
@@ -101,7 +101,7 @@ class Multigrid:
         self.tolerance, self.precision = tolerance, precision
         self.counters = Counters()
         self.contrast = 1.0
-        self.corner_functions: csr_array | None = None
+        self.basis_transformation: csr_array | None = None
         self.patience, self.work = MAX_NONSYMMETRIC, 0
         self.allowed: int | None = None
         self.begin()
@@ -126,7 +126,7 @@ class Multigrid:
         self._diagonal: Array | None = None
         self._solved: Array | None = None  # the right-hand side that iterate and residual belong to
         self._build(rigid_modes)
-        self.columns = FlexibilityColumns(n, self._solve_many, MOST_COLUMNS)
+        self.columns = InverseColumns(n, self._solve_many, MOST_COLUMNS)
 
     def _build(self, rigid_modes: Array) -> None:
         self.hierarchy = Hierarchy(self.K.scaled, rigid_modes)

@@ -46,9 +46,9 @@ def forces_at(dofs, indptr, indices, storage, K, factor, size, u, f, out):
         i, a = dofs[p] // size, dofs[p] % size
         s, part = 0.0, part_of(storage, i)
         for k in range(indptr[i], indptr[i + 1]):
-            place = place_of(storage, part, i, indices[k], k)
+            slot = place_of(storage, part, i, indices[k], k)
             for b in range(size):
-                s += entry_of(K, place, a, b, size) * u[indices[k] * size + b]
+                s += entry_of(K, slot, a, b, size) * u[indices[k] * size + b]
         out[p] = factor * s - f[dofs[p]]
 
 
@@ -59,6 +59,6 @@ def forces_of(dofs, values, indptr, indices, storage, K, factor, size, out):
         i, a = dofs[p] // size, dofs[p] % size
         part = part_of(storage, i)
         for k in range(indptr[i], indptr[i + 1]):
-            place = place_of(storage, part, i, indices[k], k)
+            slot = place_of(storage, part, i, indices[k], k)
             for b in range(size):
-                out[indices[k] * size + b] += factor * entry_of(K, place, a, b, size) * values[p]
+                out[indices[k] * size + b] += factor * entry_of(K, slot, a, b, size) * values[p]

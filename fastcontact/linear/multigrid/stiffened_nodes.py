@@ -7,7 +7,7 @@ of the other side become as stiff as that, and two things go wrong:
   corrects these by the stiffness of their body alone.
 - Aggregates that they share with softer neighbours would move the stiff body: such coarse motions cost far too much energy,
   and coarse levels correct neither side. Their corrections therefore see it the other way round: the unknowns of stiffened
-  nodes follow the pivots, ``u = S u`` (`followers`), and the pivots then follow them as ever, ``u = T u``. Coarse matrices
+  nodes follow the pivots, ``u = S u`` (`followers`), and the pivots then follow them as usual, ``u = T u``. Coarse matrices
   are Galerkin products with ``T S P`` (`composed`).
 """
 
@@ -56,11 +56,11 @@ class FreeMotions:
 
     def correct(self, r: AnyArray, factor: float, step: AnyArray, x: AnyArray) -> None:
         """Add `factor` times the correction for the residual r (n,) to the last `step` (n,) and to x (n,)."""
-        own = r[self._at].astype(float)
-        found = self._yielding @ own - self._moves @ self._factors.solve(self._pulls @ own)
-        found = (factor * found).astype(x.dtype)
-        step[self._at] += found
-        x[self._at] += found
+        residual = r[self._at].astype(float)
+        correction = self._yielding @ residual - self._moves @ self._factors.solve(self._pulls @ residual)
+        correction = (factor * correction).astype(x.dtype)
+        step[self._at] += correction
+        x[self._at] += correction
 
 
 def followers(elimination: Elimination, nodes: Indices, size: int) -> Elimination:
@@ -84,20 +84,20 @@ def followers(elimination: Elimination, nodes: Indices, size: int) -> Eliminatio
     opposite[pivots // size], stiffened[nodes] = False, True
     other, along = opposite[W.col // size], W.col % size
     through = stiffened[W.col // size] & (along == (pivots % size)[W.row]) & (W.data > 0.0)
-    unknowns, place = np.unique(W.col[through], return_inverse=True)
-    share = csr_array((W.data[through], (place, W.row[through])), shape=(len(unknowns), m))
+    unknowns, column = np.unique(W.col[through], return_inverse=True)
+    share = csr_array((W.data[through], (column, W.row[through])), shape=(len(unknowns), m))
     # What the opposite side moves each pivot by, if all of it moves by one along each direction.
     together = csr_array((W.data[other], (W.row[other], along[other])), shape=(m, size))
     moved = np.asarray((share @ together).toarray())
     enough = moved[np.arange(len(unknowns)), unknowns % size] >= LEAST * np.asarray(share.sum(axis=1))
     unknowns, share, moved = unknowns[enough], csr_array(share[enough]), moved[enough]
-    own = csr_array((-W.data[~other], (W.row[~other], W.col[~other])), shape=(m, n))
-    own = own + csr_array((np.ones(m), pivots, np.arange(m + 1)), shape=(m, n))
+    weights_of_followers = csr_array((-W.data[~other], (W.row[~other], W.col[~other])), shape=(m, n))
+    weights_of_followers = weights_of_followers + csr_array((np.ones(m), pivots, np.arange(m + 1)), shape=(m, n))
     beside = unknowns[:, None] // size * size + np.arange(size)
     at, direction = np.nonzero(~np.isin(beside, unknowns))
     across = csr_array((moved[at, direction], (at, beside[at, direction])), shape=(len(unknowns), n))
     by = moved[np.arange(len(unknowns)), unknowns % size]
-    weights = csr_array(diags_array(1.0 / by, format="csr") @ (share @ own - across))
+    weights = csr_array(diags_array(1.0 / by, format="csr") @ (share @ weights_of_followers - across))
     return Elimination(unknowns, weights, np.zeros(len(unknowns)), weights, csr_array((0, 0)))
 
 

@@ -60,10 +60,12 @@ class SymmetricChange:
         """Return its diagonal blocks."""
         D, G, size = self.D, self.G, self.size
         nodes = np.unique(D.indices // size)
-        place = np.full(D.shape[1] // size, -1, np.int32)
-        place[nodes] = np.arange(len(nodes))
+        row_of_node = np.full(D.shape[1] // size, -1, np.int32)
+        row_of_node[nodes] = np.arange(len(nodes))
         blocks = np.zeros(len(nodes) * size * size)
-        symmetric_change_kernels.diagonal(D.indptr, D.indices, D.data, G.indptr, G.indices, G.data, place, size, blocks)
+        symmetric_change_kernels.diagonal(
+            D.indptr, D.indices, D.data, G.indptr, G.indices, G.data, row_of_node, size, blocks
+        )
         return LocalChange.of_diagonal(nodes, blocks.reshape(-1, size, size))
 
     def on_finest(self) -> csc_array:
@@ -102,17 +104,17 @@ def _restricted(rows: csr_array, P: BlockMatrix) -> _Restricted:
 def _symmetric_product(E: _Restricted, H: _Restricted, cols: tuple[int, ...]) -> LocalChange:
     """Return ``E.T H + H.T E`` on the nodes that they reach."""
     nodes = np.unique(np.concatenate([E.nodes, H.nodes]))
-    place = np.empty(nodes[-1] + 1, np.int32)
-    place[nodes] = np.arange(len(nodes))
+    row_of_node = np.empty(nodes[-1] + 1, np.int32)
+    row_of_node[nodes] = np.arange(len(nodes))
     k, size, slots = len(nodes), len(cols), np.arange(len(E.nodes), dtype=np.int32)
-    by_column = csr_array((slots, place[E.nodes], E.indptr), shape=(len(E.indptr) - 1, k)).tocsc()
-    rows, found = (by_column.indptr, by_column.indices), (H.indptr, place[H.nodes])
+    by_column = csr_array((slots, row_of_node[E.nodes], E.indptr), shape=(len(E.indptr) - 1, k)).tocsc()
+    rows, pattern = (by_column.indptr, by_column.indices), (H.indptr, row_of_node[H.nodes])
     count = np.empty(k, np.int32)
-    symmetric_change_kernels.count_products(*rows, *found, k, count)
+    symmetric_change_kernels.count_products(*rows, *pattern, k, count)
     into = _pointers(count)
     columns, blocks = np.empty(into[-1], np.int32), np.zeros(int(into[-1]) * size * size)
     symmetric_change_kernels.products(
-        *rows, by_column.data, E.numbers, *found, H.numbers, k, into, columns, blocks, cols
+        *rows, by_column.data, E.numbers, *pattern, H.numbers, k, into, columns, blocks, cols
     )
     half = bsr_array((blocks.reshape(-1, size, size), columns, into), shape=(k * size, k * size))
     total = bsr_array(half + half.T)

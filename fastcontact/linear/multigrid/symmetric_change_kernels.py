@@ -22,26 +22,28 @@ def count_stiffness_rows(pivots, number, indptr, indices, start, columns, storag
     seen = np.full(number.shape[0], -1, np.int32)
     for p in range(pivots.shape[0]):
         i, a = pivots[p] // size, pivots[p] % size
-        found, part = 0, part_of(storage, i)
+        n_columns, part = 0, part_of(storage, i)
         for k in range(start[i], start[i + 1]):
-            place = place_of(storage, part, i, columns[k], k)
+            slot = place_of(storage, part, i, columns[k], k)
             for b in range(size):
                 u = columns[k] * size + b
-                if entry_of(numbers, place, a, b, size) == 0.0:
+                if entry_of(numbers, slot, a, b, size) == 0.0:
                     continue
                 if seen[u] != p:
                     seen[u] = p
-                    found += 1
+                    n_columns += 1
                 q = number[u]
                 for e in range(indptr[q], indptr[q + 1]) if q >= 0 else range(0):
                     if seen[indices[e]] != p:
                         seen[indices[e]] = p
-                        found += 1
-        count[p] = found
+                        n_columns += 1
+        count[p] = n_columns
 
 
 @kernel
-def stiffness_rows(pivots, number, indptr, indices, data, start, columns, storage, numbers, size, low, found, out):
+def stiffness_rows(
+    pivots, number, indptr, indices, data, start, columns, storage, numbers, size, low, columns_found, out
+):
     """Fill G = ``A[pivots] + A[pivots][:, pivots] D / 2``, A symmetric.
 
     Parameters
@@ -63,40 +65,40 @@ def stiffness_rows(pivots, number, indptr, indices, data, start, columns, storag
         i, a, at = pivots[p] // size, pivots[p] % size, low[p]
         part = part_of(storage, i)
         for k in range(start[i], start[i + 1]):
-            place = place_of(storage, part, i, columns[k], k)
+            slot = place_of(storage, part, i, columns[k], k)
             for b in range(size):
-                u, stiffness = columns[k] * size + b, entry_of(numbers, place, a, b, size)
+                u, stiffness = columns[k] * size + b, entry_of(numbers, slot, a, b, size)
                 if stiffness == 0.0:
                     continue
                 if seen[u] != p:
-                    seen[u], sums[u], found[at] = p, 0.0, u
+                    seen[u], sums[u], columns_found[at] = p, 0.0, u
                     at += 1
                 sums[u] += stiffness
                 q = number[u]
                 for e in range(indptr[q], indptr[q + 1]) if q >= 0 else range(0):
                     v = indices[e]
                     if seen[v] != p:
-                        seen[v], sums[v], found[at] = p, 0.0, v
+                        seen[v], sums[v], columns_found[at] = p, 0.0, v
                         at += 1
                     sums[v] += 0.5 * stiffness * data[e]
         for e in range(low[p], low[p + 1]):
-            out[e] = sums[found[e]]
+            out[e] = sums[columns_found[e]]
 
 
 @kernel
-def diagonal(indptr, indices, data, low, found, values, place, size, out):
+def diagonal(indptr, indices, data, low, found, values, slot, size, out):
     """Add the diagonal blocks of ``D.T G + G.T D`` to `out` (n_blocks * size * size,).
 
-    D are `indptr`, `indices`, `data`, G are `low`, `found`, `values`; `place` (n_nodes,) is where the block of each node
+    D are `indptr`, `indices`, `data`, G are `low`, `found`, `values`; `slot` (n_nodes,) is where the block of each node
     begins in `out`, in blocks.
     """
-    sums = np.zeros(place.shape[0] * size)
+    sums = np.zeros(slot.shape[0] * size)
     for p in range(indptr.shape[0] - 1):
         for e in range(low[p], low[p + 1]):
             sums[found[e]] = values[e]
         for e in range(indptr[p], indptr[p + 1]):
             node, a = indices[e] // size, indices[e] % size
-            block = place[node] * size * size
+            block = slot[node] * size * size
             for b in range(size):
                 part = data[e] * sums[node * size + b]
                 out[block + a * size + b] += part
@@ -112,14 +114,14 @@ def count_restricted(indptr, indices, start, columns, size, n_coarse, count):
     for c in prange((n + CHUNK - 1) // CHUNK):
         seen = np.full(n_coarse, -1, np.int32)
         for row in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
-            found = 0
+            n_columns = 0
             for e in range(indptr[row], indptr[row + 1]):
                 i = indices[e] // size
                 for k in range(start[i], start[i + 1]):
                     if seen[columns[k]] != row:
                         seen[columns[k]] = row
-                        found += 1
-            count[row] = found
+                        n_columns += 1
+            count[row] = n_columns
 
 
 @parallel_kernel
@@ -130,7 +132,7 @@ def restrict(indptr, indices, data, start, columns, P, size, n_coarse, low, foun
     """
     n, width = indptr.shape[0] - 1, len(cols)
     for c in prange((n + CHUNK - 1) // CHUNK):
-        seen, place = np.full(n_coarse, -1, np.int32), np.empty(n_coarse, np.int32)
+        seen, column_slot = np.full(n_coarse, -1, np.int32), np.empty(n_coarse, np.int32)
         for row in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
             at = low[row]
             for e in range(indptr[row], indptr[row + 1]):
@@ -138,9 +140,9 @@ def restrict(indptr, indices, data, start, columns, P, size, n_coarse, low, foun
                 for k in range(start[i], start[i + 1]):
                     J = columns[k]
                     if seen[J] != row:
-                        seen[J], place[J], found[at] = row, at, J
+                        seen[J], column_slot[J], found[at] = row, at, J
                         at += 1
-                    add_product(out, place[J] * width, (data,), e, P, (k * size + a) * width, ((0,), (0,), cols))
+                    add_product(out, column_slot[J] * width, (data,), e, P, (k * size + a) * width, ((0,), (0,), cols))
 
 
 @parallel_kernel
@@ -168,7 +170,7 @@ def products(start, origin, slot, E, low, found, H, n_coarse, into, columns, out
     """
     n, width = start.shape[0] - 1, len(cols)
     for c in prange((n + CHUNK - 1) // CHUNK):
-        seen, place = np.full(n_coarse, -1, np.int32), np.empty(n_coarse, np.int32)
+        seen, column_slot = np.full(n_coarse, -1, np.int32), np.empty(n_coarse, np.int32)
         for row in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
             at = into[row]
             for e in range(start[row], start[row + 1]):
@@ -178,8 +180,8 @@ def products(start, origin, slot, E, low, found, H, n_coarse, into, columns, out
                         at += 1
             columns[into[row] : at].sort()
             for k in range(into[row], at):
-                place[columns[k]] = k
+                column_slot[columns[k]] = k
             for e in range(start[row], start[row + 1]):
                 for k in range(low[origin[e]], low[origin[e] + 1]):
-                    to = place[found[k]] * width * width
+                    to = column_slot[found[k]] * width * width
                     add_transposed(out, to, (E,), slot[e] * width, H, k * width, (cols, (0,), cols))

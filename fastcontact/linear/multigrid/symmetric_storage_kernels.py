@@ -62,9 +62,9 @@ def place_of(storage, part, i, j, k):
 
 
 @innermost_kernel
-def entry_of(numbers, place, a, b, size):
-    """Return entry (a, b) of the block at `place`, from `place_of`, in double precision."""
-    k = (place[0] * size + b) * size + a if place[1] else (place[0] * size + a) * size + b
+def entry_of(numbers, slot, a, b, size):
+    """Return entry (a, b) of the block at `slot`, from `place_of`, in double precision."""
+    k = (slot[0] * size + b) * size + a if slot[1] else (slot[0] * size + a) * size + b
     if len(numbers) == 2:
         return np.float64(numbers[0][k]) + np.float64(numbers[-1][k])
     return np.float64(numbers[0][k])
@@ -77,15 +77,15 @@ def count_stored(indptr, indices, length, count):
     for c in prange((n + CHUNK - 1) // CHUNK):
         for i in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
             low = i // length * length
-            found, diagonal, ascending = 0, False, True
+            n_stored, diagonal, ascending = 0, False, True
             for k in range(indptr[i], indptr[i + 1]):
                 if indices[k] >= i or indices[k] < low:
-                    found += 1
+                    n_stored += 1
                 if indices[k] == i:
                     diagonal = True
                 if k > indptr[i] and indices[k] <= indices[k - 1]:
                     ascending = False
-            count[i] = found if diagonal and ascending else -1
+            count[i] = n_stored if diagonal and ascending else -1
 
 
 @parallel_kernel
@@ -160,10 +160,10 @@ def expand(indptr, indices, storage, numbers, size, out):
         for i in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
             part = part_of(storage, i)
             for k in range(indptr[i], indptr[i + 1]):
-                place = place_of(storage, part, i, indices[k], k)
+                slot = place_of(storage, part, i, indices[k], k)
                 for a in range(size):
                     for b in range(size):
-                        out[(k * size + a) * size + b] = entry_of(numbers, place, a, b, size)
+                        out[(k * size + a) * size + b] = entry_of(numbers, slot, a, b, size)
 
 
 @parallel_kernel
@@ -176,10 +176,10 @@ def row_sums(indptr, indices, storage, numbers, x, size, out):
             for a in range(size):
                 out[i * size + a] = 0.0
             for k in range(indptr[i], indptr[i + 1]):
-                place = place_of(storage, part, i, indices[k], k)
+                slot = place_of(storage, part, i, indices[k], k)
                 for a in range(size):
                     for b in range(size):
-                        out[i * size + a] += abs(entry_of(numbers, place, a, b, size) * x[indices[k] * size + b])
+                        out[i * size + a] += abs(entry_of(numbers, slot, a, b, size) * x[indices[k] * size + b])
 
 
 @kernel
@@ -189,10 +189,10 @@ def _multiply_part(low, high, storage, numbers, x, factor, share, z, y, rows):
     for i in range(m * low, m * high):
         y[i] = share * z[i] if share != 0.0 else share
     for i in range(low, high):
-        own = row_times(columns, numbers, x, start[i], upper[i], rows, rows)
+        of_row = row_times(columns, numbers, x, start[i], upper[i], rows, rows)
         both = row_times_both_ways(columns, numbers, x, upper[i], start[i + 1], i, factor, y, rows)
         for r in range(m):
-            y[m * i + r] += factor * (own[r] + both[r])
+            y[m * i + r] += factor * (of_row[r] + both[r])
 
 
 @parallel_kernel

@@ -18,8 +18,8 @@ from scipy.sparse import bsr_array, csr_array
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ConvergenceError
+from fastcontact.linear.delassus import TooManyColumnsError
 from fastcontact.linear.elimination.elimination import Elimination
-from fastcontact.linear.flexibility import TooManyColumnsError
 from fastcontact.linear.lower_tolerance import put_back_tolerance, tighten
 from fastcontact.linear.multigrid.loaded import LoadedMultigrid
 from fastcontact.linear.multigrid.reduced import Reduced
@@ -236,7 +236,7 @@ class _Loaded(LoadedMultigrid):
     """See `linear.protocol.LoadedNonsymmetric`."""
 
     solve = _or_by_factors(LoadedMultigrid.solve)
-    flexibility = _or_by_factors(LoadedMultigrid.flexibility)
+    delassus = _or_by_factors(LoadedMultigrid.delassus)
     involved_solution = _or_by_factors(LoadedMultigrid.involved_solution)
     full_solution = _or_by_factors(LoadedMultigrid.full_solution)
 

@@ -39,12 +39,12 @@ class Cholmod(FactorSolver):
             return None
         factor = factorised(lower_triangle(K.tocsr()), matrix(fill_reducing(K, last)))  # K's rows are its columns
         # CHOLMOD may reorder independent branches of the elimination, which leaves what depends on what as it is.
-        place = np.empty(self.n, np.intp)
-        place[_solved(factor, np.arange(self.n, dtype=float), PERMUTE).astype(np.intp)] = np.arange(self.n)
+        position = np.empty(self.n, np.intp)
+        position[_solved(factor, np.arange(self.n, dtype=float), PERMUTE).astype(np.intp)] = np.arange(self.n)
         start, rows, values = (np.asarray(part).ravel() for part in cholmod.getfactor(factor).CCS)
         diagonal = values[start[:-1]]
         values /= np.repeat(diagonal, np.diff(start))
-        return SymmetricFactors(by_supernodes(start, rows, values), diagonal**2, place, last)
+        return SymmetricFactors(by_supernodes(start, rows, values), diagonal**2, position, last)
 
 
 def by_supernodes(start: NDArray[np.int64], rows: NDArray[np.int64], values: Array) -> LowerTriangle:

@@ -16,9 +16,9 @@ from scipy.sparse.linalg import cg
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ConvergenceError
+from fastcontact.linear.delassus import InverseColumns
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.elimination.loaded import LoadedIteration
-from fastcontact.linear.flexibility import FlexibilityColumns
 from fastcontact.linear.lower_tolerance import put_back_tolerance, tighten
 from fastcontact.linear.protocol import Counters, LinearSolver, Monitor
 
@@ -60,7 +60,7 @@ class Pyamg(LinearSolver):
         """Build the hierarchy of K, and leave K as it is; see `LinearSolver.prepare`."""
         self.K, self._modes = K, rigid_modes
         self._constrain(None)
-        self.columns = FlexibilityColumns(K.shape[0], self._solve_many)
+        self.columns = InverseColumns(K.shape[0], self._solve_many)
         return K
 
     def _constrain(self, elimination: Elimination | None) -> None:

@@ -41,11 +41,11 @@ def gradient(xi: Array) -> Array:
 
 def _side(a: Array, b: Array, t: Array, axes: tuple[int, int]) -> Array:
     """Derivatives (m, 4, 3) of t^2 (1 - a^2) (1 + S b) / 2 for the four S of `SIDES`; `axes` of a and b."""
-    found = np.empty((len(a), 4, 3))
-    found[:, :, axes[0]] = -a * t * (1 + SIDES * b)
-    found[:, :, axes[1]] = t * (1 - a * a) * SIDES / 2
-    found[:, :, 2] = (1 - a * a) * t * SIDES * b / 2 - t * (1 + SIDES * b)
-    return found
+    functions = np.empty((len(a), 4, 3))
+    functions[:, :, axes[0]] = -a * t * (1 + SIDES * b)
+    functions[:, :, axes[1]] = t * (1 - a * a) * SIDES / 2
+    functions[:, :, 2] = (1 - a * a) * t * SIDES * b / 2 - t * (1 + SIDES * b)
+    return functions
 
 
 ELEMENT = Element(

@@ -102,9 +102,9 @@ class _Content:
     def add(self, keyword: str, line: int, words: list[Word]) -> None:
         """Take over one block."""
         if keyword in COORDINATES:
-            for name, *place in self._rows(keyword, line, words, 1 + COORDINATES[keyword]):
+            for name, *coordinates in self._rows(keyword, line, words, 1 + COORDINATES[keyword]):
                 self._points[name[0]] = len(self._places)
-                self._places.append([self._number(word) for word in place])
+                self._places.append([self._number(word) for word in coordinates])
         elif keyword in KINDS:
             count = 1 if KINDS[keyword] == VERTEX else elements.get(KINDS[keyword]).n_nodes
             block = self._cells.setdefault(keyword, {})
@@ -158,10 +158,10 @@ class _Content:
             raise self._refusal(word[1], f"there is no node '{word[0][:40]}' before this line")
         return word[0]
 
-    def _all_known(self, members: list[Word], known: Any, what: str) -> None:
+    def _all_known(self, members: list[Word], known: Any, kind: str) -> None:
         for word, line in members:
             if word not in known:
-                raise self._refusal(line, f"there is no {what} '{word[:40]}'")
+                raise self._refusal(line, f"there is no {kind} '{word[:40]}'")
 
     def _refusal(self, line: int, text: str) -> FileError:
         return FileError(f"'{self._path}', line {line}: {text}")

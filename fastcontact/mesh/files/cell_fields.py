@@ -38,15 +38,15 @@ def read_cell_field(path: PathLike, name: str) -> CellField:
 
     FileError if the file cannot be read, or has no such field, or one of several components.
     """
-    found = Path(existing_file(path))
-    suffix = found.suffix.lower()
+    file = Path(existing_file(path))
+    suffix = file.suffix.lower()
     if suffix in MED_SUFFIXES:
-        times, field, middles = med.read_med_cell_field(found, name)
+        times, field, middles = med.read_med_cell_field(file, name)
         return CellField(times, _one(path, name, field), middles)
     if suffix in VTKHDF_SUFFIXES:
-        field, middles = _vtkhdf(found, name)
+        field, middles = _vtkhdf(file, name)
     else:
-        field, middles = meshio_files.read_cell_data(found, name)
+        field, middles = meshio_files.read_cell_data(file, name)
     return CellField(None, _one(path, name, field[None]), middles)
 
 
@@ -78,7 +78,7 @@ def _vtkhdf(path: Path, name: str) -> tuple[AnyArray, Array]:
         return field, np.add.reduceat(points[nodes], starts[:-1], axis=0) / counts[:, None]
 
 
-def at_cells(field: CellField, middles: Array, size: float, what: str) -> Array:
+def at_cells(field: CellField, middles: Array, size: float, name: str) -> Array:
     """Return the values (n_instants, n_cells) of a field at cells of a mesh, by the places of their middles.
 
     Parameters
@@ -88,7 +88,7 @@ def at_cells(field: CellField, middles: Array, size: float, what: str) -> Array:
         Of the cells wanted [length].
     size : float
         Of the mesh [length].
-    what : str
+    name : str
         Names the field, for messages.
 
     Raises
@@ -104,11 +104,11 @@ def at_cells(field: CellField, middles: Array, size: float, what: str) -> Array:
     off = np.flatnonzero(~(distance <= SAME_PLACE * size))
     if len(off):
         raise MeshError(
-            f"{what} has no cell where {len(off)} cells of the mesh are (first: {middles[off[0]]}, {distance[off[0]]:.3g} "
+            f"{name} has no cell where {len(off)} cells of the mesh are (first: {middles[off[0]]}, {distance[off[0]]:.3g} "
             "from the next): write it on the cells of this mesh"
         )
-    found = field.values[:, rows]
-    missing = np.flatnonzero(~np.isfinite(found).all(axis=0))
+    values = field.values[:, rows]
+    missing = np.flatnonzero(~np.isfinite(values).all(axis=0))
     if len(missing):
-        raise MeshError(f"{what} has no value at {len(missing)} cells (first: at {middles[missing[0]]})")
-    return found
+        raise MeshError(f"{name} has no value at {len(missing)} cells (first: at {middles[missing[0]]})")
+    return values

@@ -88,8 +88,8 @@ class DriverFile:
         self._position += len(data)
         return len(data)
 
-    def _put(self, place: int, data: bytes) -> None:
-        self._file.seek(place)
+    def _put(self, offset: int, data: bytes) -> None:
+        self._file.seek(offset)
         view = memoryview(data)
         while view:
             view = view[self._file.write(view) :]

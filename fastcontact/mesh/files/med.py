@@ -400,12 +400,12 @@ def _field_size(file: Any, group: Any, instants: list[Any], n_components: int) -
 def _read_instant(file: Any, support: Any, n_points: int, n_components: int) -> Array:
     field = np.full((n_points, n_components), np.nan)
     for name, profile in support.items():
-        part = values(profile, "CO").reshape(n_components, -1).T
+        values_of_profile = values(profile, "CO").reshape(n_components, -1).T
         if name == NO_PROFILE:
-            field[:] = part
+            field[:] = values_of_profile
             continue
         rows = values(file["PROFILS"][name], "PFL").astype(np.int64) - 1
         if rows.min(initial=0) < 0 or rows.max(initial=0) >= n_points:
             raise FileError(f"profile '{name}' names point {rows.max() + 1} of {n_points}: write the file anew")
-        field[rows] = part
+        field[rows] = values_of_profile
     return field

@@ -41,13 +41,13 @@ def decoded(raw: bytes) -> str:
 
 def read_families(folder: Any, level: int = 0) -> Families:
     """Return the group names of each family number, from an HDF5 group and the folders below it that MED has."""
-    found: Families = {}
+    families: Families = {}
     for entry in folder.values():
         if "NUM" in entry.attrs:
-            found[int(attribute(entry, "NUM"))] = _group_names(entry)
+            families[int(attribute(entry, "NUM"))] = _group_names(entry)
         elif hasattr(entry, "values") and level < LEVELS:
-            found.update(read_families(entry, level + 1))
-    return found
+            families.update(read_families(entry, level + 1))
+    return families
 
 
 def _group_names(family: Any) -> tuple[str, ...]:
@@ -64,7 +64,7 @@ def _group_names(family: Any) -> tuple[str, ...]:
 
 def members(numbers: AnyArray, families: Families) -> dict[str, Indices]:
     """Return the rows of each group, from the family number of each row."""
-    found: dict[str, list[Indices]] = {}
+    members_by_group: dict[str, list[Indices]] = {}
     order = np.argsort(np.abs(numbers), kind="stable")
     starts = np.flatnonzero(np.diff(numbers[order])) + 1
     for rows in np.split(order, starts) if len(numbers) else []:
@@ -75,8 +75,8 @@ def members(numbers: AnyArray, families: Families) -> dict[str, Indices]:
                 "describe: they are in no group"
             )
         for name in families.get(number, ()):
-            found.setdefault(name, []).append(rows)
-    return {name: np.unique(np.concatenate(parts)) for name, parts in found.items()}
+            members_by_group.setdefault(name, []).append(rows)
+    return {name: np.unique(np.concatenate(parts)) for name, parts in members_by_group.items()}
 
 
 def families_of(groups: Mapping[str, AnyArray], count: int, sign: int) -> tuple[Numbers, Families]:

@@ -60,17 +60,17 @@ def read_field(
     """
     if over not in OVER:
         raise FileError(f"over must be {' or '.join(OVER)}, not '{over}'")
-    what = f"field '{field}' of '{file}'"
+    name = f"field '{field}' of '{file}'"
     cells = _cells(mesh, groups)
     if over == "cells":
         by_cell = read_cell_field(file, field)
         middles = np.concatenate([mesh.points[block].mean(axis=1) for block in cells])
         size = float(np.ptp(mesh.points, axis=0).max())
-        return at_cells(by_cell, middles, size, what)[_row(by_cell.times, by_cell.values, instant, what)][:, None]
+        return at_cells(by_cell, middles, size, name)[_row(by_cell.times, by_cell.values, instant, name)][:, None]
     by_point = read_point_field(file, field)
     wanted = np.unique(np.concatenate([block.ravel() for block in cells])).astype(np.intp)
-    found = at_points_of(by_point, mesh, wanted, what)[_row(by_point.times, by_point.values, instant, what)]
-    return np.where(np.isfinite(found), found, found[wanted].mean())
+    values = at_points_of(by_point, mesh, wanted, name)[_row(by_point.times, by_point.values, instant, name)]
+    return np.where(np.isfinite(values), values, values[wanted].mean())
 
 
 def _cells(mesh: Mesh, groups: Sequence[str] | str | None) -> list[Numbers]:
@@ -82,21 +82,21 @@ def _cells(mesh: Mesh, groups: Sequence[str] | str | None) -> list[Numbers]:
         if name not in mesh.cell_groups:
             raise MeshError(unknown("group of cells", name, list(mesh.cell_groups)))
     rows = mesh.split(np.unique(np.concatenate([mesh.cell_groups[name] for name in names])))
-    found = [block[rows[name]] for name, block in mesh.solids.items() if name in rows]
-    if not found:
+    blocks = [block[rows[name]] for name, block in mesh.solids.items() if name in rows]
+    if not blocks:
         raise MeshError(f"the groups {', '.join(names)} hold no solid cells")
-    return found
+    return blocks
 
 
-def _row(times: Array | None, values: Array, instant: float | None, what: str) -> int:
+def _row(times: Array | None, values: Array, instant: float | None, name: str) -> int:
     """Return which instant of a field is wanted."""
     if instant is None:
         if len(values) != 1:
-            raise FileError(f"{what} has {len(values)} instants: say which with instant")
+            raise FileError(f"{name} has {len(values)} instants: say which with instant")
         return 0
     if times is None:
-        raise FileError(f"{what} has no times: leave out instant")
+        raise FileError(f"{name} has no times: leave out instant")
     row = int(np.abs(times - instant).argmin())
     if abs(times[row] - instant) > SAME_TIME * np.abs(times).max():
-        raise FileError(f"{what} has no instant {instant:g}, the next is {times[row]:g}")
+        raise FileError(f"{name} has no instant {instant:g}, the next is {times[row]:g}")
     return row

@@ -81,18 +81,18 @@ def read_mesh(path: PathLike, *, mesh_name: str | None = None, orient: bool = Tr
 
 def read_mesh_report(path: PathLike, *, mesh_name: str | None = None, orient: bool = True) -> tuple[Mesh, MeshReport]:
     """Read a mesh and return it with a report; parameters and errors as in `read_mesh`."""
-    found = existing_file(path)
-    if found.suffix.lower() in MED_SUFFIXES:
-        content = med.read_med(found, mesh_name)
+    file = existing_file(path)
+    if file.suffix.lower() in MED_SUFFIXES:
+        content = med.read_med(file, mesh_name)
         mesh, file_format, name = content.mesh, f"MED {content.version}".strip(), content.name
         dropped = {"vertex": content.n_vertices}
     elif mesh_name is not None:
         raise FileError(f"'{path}' is no MED file, so its mesh has no name: leave out mesh_name='{mesh_name}'")
-    elif found.suffix.lower() == MAIL_SUFFIX:
-        mesh, dropped = aster_mail.read(found)
+    elif file.suffix.lower() == MAIL_SUFFIX:
+        mesh, dropped = aster_mail.read(file)
         file_format, name = "code_aster", ""
     else:
-        mesh, file_format, dropped = meshio_files.read(found)
+        mesh, file_format, dropped = meshio_files.read(file)
         name = ""
     mesh, n_turned = topology.oriented(mesh) if orient else (mesh, 0)
     left_out = MappingProxyType({kind: count for kind, count in dropped.items() if count})

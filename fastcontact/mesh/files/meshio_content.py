@@ -28,12 +28,12 @@ NODE_ORDER: dict[str, Orders] = {
 UNFIT = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
 
 
-def mesh_of(found: Mapping[str, Any], file_format: str = "") -> tuple[Mesh, dict[str, int]]:
+def mesh_of(content: Mapping[str, Any], file_format: str = "") -> tuple[Mesh, dict[str, int]]:
     """Return a mesh with its groups, and the numbers of cells left out as vertices and as duplicates.
 
     Parameters
     ----------
-    found : mapping
+    content : mapping
         See `meshio_process.plain_content`.
     file_format : str
         meshio's name of the format it comes from.
@@ -44,44 +44,44 @@ def mesh_of(found: Mapping[str, Any], file_format: str = "") -> tuple[Mesh, dict
         If it has no cells, or of a kind that fastcontact does not know. Arrays that do not fit together end in one of the
         exceptions `UNFIT`.
     """
-    blocks = merged(_blocks(found, NODE_ORDER.get(file_format, {})))
+    blocks = merged(_blocks(content, NODE_ORDER.get(file_format, {})))
     n_duplicates = sum(len(block.nodes) for block in blocks)
     if file_format == "gmsh":  # version 2 of that format repeats a cell for each of its groups
         blocks = [block if block.kind == VERTEX else without_duplicates(block) for block in blocks]
     n_duplicates -= sum(len(block.nodes) for block in blocks)
-    mesh = build_mesh(found["points"], blocks, _point_groups(found), _cell_group_names(found, file_format))
+    mesh = build_mesh(content["points"], blocks, _point_groups(content), _cell_group_names(content, file_format))
     n_vertices = sum(len(block.nodes) for block in blocks if block.kind == VERTEX)
     return mesh, {"vertex": n_vertices, "duplicate": n_duplicates}
 
 
-def _cell_group_names(found: Mapping[str, Any], file_format: str) -> list[str]:
+def _cell_group_names(content: Mapping[str, Any], file_format: str) -> list[str]:
     """Return the names of all groups of cells, also of those without any."""
-    names = [name for name in found["cell_sets"] if not name.startswith("gmsh:")]
-    names += [unquote(key[len(CELL_PREFIX) :]) for key in found["cell_data"] if key.startswith(CELL_PREFIX)]
+    names = [name for name in content["cell_sets"] if not name.startswith("gmsh:")]
+    names += [unquote(key[len(CELL_PREFIX) :]) for key in content["cell_data"] if key.startswith(CELL_PREFIX)]
     if file_format == "gmsh":
-        names += [name for name, (_, dim) in found["field_data"].items() if dim > 0]
+        names += [name for name, (_, dim) in content["field_data"].items() if dim > 0]
     return names
 
 
-def _blocks(found: Mapping[str, Any], order: Orders) -> list[Block]:
+def _blocks(content: Mapping[str, Any], order: Orders) -> list[Block]:
     foreign: dict[str, int] = {}
-    for kind, count, _ in found["cells"]:
+    for kind, count, _ in content["cells"]:
         if kind not in elements.BY_MESHIO and kind != VERTEX:
             foreign[kind] = foreign.get(kind, 0) + count
     check_known(foreign, elements.BY_MESHIO)
-    return [_block(found, index, kind, nodes, order) for index, (kind, _, nodes) in enumerate(found["cells"])]
+    return [_block(content, index, kind, nodes, order) for index, (kind, _, nodes) in enumerate(content["cells"])]
 
 
-def _block(found: Mapping[str, Any], index: int, kind: str, nodes: AnyArray, order: Orders) -> Block:
+def _block(content: Mapping[str, Any], index: int, kind: str, nodes: AnyArray, order: Orders) -> Block:
     kind = VERTEX if kind == VERTEX else elements.BY_MESHIO[kind].name
     dim = 0 if kind == VERTEX else elements.get(kind).dim
     groups: dict[str, AnyArray] = {}
-    for key, parts in found["cell_data"].items():
+    for key, parts in content["cell_data"].items():
         if key in TAGS:
-            _add(groups, _tagged(parts[index], dim, found["field_data"]))
+            _add(groups, _tagged(parts[index], dim, content["field_data"]))
         else:
             _add(groups, {unquote(key[len(CELL_PREFIX) :]): np.flatnonzero(parts[index])})
-    for name, sets in found["cell_sets"].items():
+    for name, sets in content["cell_sets"].items():
         if not name.startswith("gmsh:") and index < len(sets):
             _add(groups, {name: np.asarray(sets[index], np.intp).reshape(-1)})
     nodes = nodes[:, order[kind]] if kind in order else nodes
@@ -105,13 +105,13 @@ def _tagged(tags: AnyArray, dim: int, field_data: Mapping[str, Any]) -> dict[str
     }
 
 
-def _point_groups(found: Mapping[str, Any]) -> dict[str, AnyArray]:
+def _point_groups(content: Mapping[str, Any]) -> dict[str, AnyArray]:
     groups: dict[str, AnyArray] = {}
-    for key, data in found["point_data"].items():
+    for key, data in content["point_data"].items():
         if key in TAGS:
             _add(groups, _tagged(data, 0, {}))
         else:
             _add(groups, {unquote(key[len(POINT_PREFIX) :]): np.flatnonzero(data)})
-    for name, members in found["point_sets"].items():
+    for name, members in content["point_sets"].items():
         _add(groups, {name: np.asarray(members, np.intp).reshape(-1)})
     return groups

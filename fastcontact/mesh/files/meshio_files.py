@@ -98,10 +98,10 @@ def _read_with_field(path: Path, field: str) -> dict[str, Any]:
     _check_before(path, file_format)
     if file_format == "gmsh":
         raise FileError(f"'{path}': fields of Gmsh files are not read: write the field to a .vtu or .med file")
-    found = read_in_process(path, file_format, field)
-    if "error" in found:
-        raise _refusal("read", path, found["error"])
-    return found
+    content = read_in_process(path, file_format, field)
+    if "error" in content:
+        raise _refusal("read", path, content["error"])
+    return content
 
 
 def read_point_data(path: Path, field: str) -> tuple[AnyArray, AnyArray]:
@@ -109,12 +109,12 @@ def read_point_data(path: Path, field: str) -> tuple[AnyArray, AnyArray]:
 
     FileError if meshio cannot read the file, or it has no such field.
     """
-    found = _read_with_field(path, field)
-    if field not in found["fields"]:
-        raise FileError(f"'{path}': {unknown('field', field, found['fields'])}")
-    if found["field"] is None or found["points"] is None or len(found["field"]) != len(found["points"]):
+    content = _read_with_field(path, field)
+    if field not in content["fields"]:
+        raise FileError(f"'{path}': {unknown('field', field, content['fields'])}")
+    if content["field"] is None or content["points"] is None or len(content["field"]) != len(content["points"]):
         raise FileError(f"field '{field}' of '{path}' has no number for each point: write it anew")
-    return found["field"], found["points"]
+    return content["field"], content["points"]
 
 
 def read_cell_data(path: Path, field: str) -> tuple[AnyArray, AnyArray]:
@@ -122,10 +122,10 @@ def read_cell_data(path: Path, field: str) -> tuple[AnyArray, AnyArray]:
 
     FileError if meshio cannot read the file, or it has no such field.
     """
-    found = _read_with_field(path, field)
-    if field not in found["cell_fields"]:
-        raise FileError(f"'{path}': {unknown('field of cells', field, found['cell_fields'])}")
-    values, points, blocks = found["cell_field"], found["points"], found["cells"]
+    content = _read_with_field(path, field)
+    if field not in content["cell_fields"]:
+        raise FileError(f"'{path}': {unknown('field of cells', field, content['cell_fields'])}")
+    values, points, blocks = content["cell_field"], content["points"], content["cells"]
     fits = [part is not None and nodes is not None and len(part) == len(nodes)
             for part, (_, _, nodes) in zip(values, blocks, strict=True)]  # fmt: skip
     if points is None or not values or not all(fits):
@@ -141,14 +141,14 @@ def read(path: Path) -> tuple[Mesh, str, dict[str, int]]:
     _check_before(path, file_format)
     if file_format == "gmsh":
         with tempfile.TemporaryDirectory() as folder:
-            found = read_in_process(gmsh_versions.readable(path, Path(folder)), file_format)
+            content = read_in_process(gmsh_versions.readable(path, Path(folder)), file_format)
     else:
-        found = read_in_process(path, file_format)
-    if "error" in found:
-        raise _refusal("read", path, found["error"])
-    _log("read", path, found["said"])
+        content = read_in_process(path, file_format)
+    if "error" in content:
+        raise _refusal("read", path, content["error"])
+    _log("read", path, content["said"])
     try:
-        mesh, dropped = mesh_of(found, file_format)
+        mesh, dropped = mesh_of(content, file_format)
     except MeshError as error:
         raise MeshError(f"'{path}': {error}") from None
     except UNFIT as error:
@@ -305,8 +305,8 @@ def _with_vertices(
 def _check_complete(path: Path, temporary: Path, file_format: str, mesh: Mesh) -> None:
     """Read back what was written: several of meshio's writers leave out or change cells without an error."""
     with _contained("read back", path):
-        found = library().read(temporary, file_format=file_format)
-    wrong = [kind for kind, block in _meshio_cells(mesh, {}) if not np.array_equal(found.get_cells_type(kind), block)]
-    if wrong or len(found.points) != mesh.n_points:
+        content = library().read(temporary, file_format=file_format)
+    wrong = [kind for kind, block in _meshio_cells(mesh, {}) if not np.array_equal(content.get_cells_type(kind), block)]
+    if wrong or len(content.points) != mesh.n_points:
         listed = f"the {', '.join(wrong)} cells" if wrong else "the points"
         raise FileError(f"'{path}': meshio's {file_format} format does not keep {listed}; {OTHER_FORMATS}")

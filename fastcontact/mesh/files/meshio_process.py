@@ -95,37 +95,37 @@ def plain_content(path: Path, file_format: str, field: str = "") -> dict[str, An
     said = io.StringIO()
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-            found = library().read(path, file_format=file_format)
-            return {**plain_parts(found), **(_fields(found, field) if field else {}), "said": said.getvalue()}
+            content = library().read(path, file_format=file_format)
+            return {**plain_parts(content), **(_fields(content, field) if field else {}), "said": said.getvalue()}
     except MemoryError:
         return {"error": "it announces more than memory can hold"}
     except (Exception, SystemExit) as error:
         return {"error": (said.getvalue() if isinstance(error, SystemExit) else str(error)) or type(error).__name__}
 
 
-def _fields(found: Any, field: str) -> dict[str, Any]:
+def _fields(content: Any, field: str) -> dict[str, Any]:
     """Return the fields of a ``meshio.Mesh`` as `plain_content` tells."""
-    parts = found.cell_data.get(field)
+    parts = content.cell_data.get(field)
     return {
-        "fields": list(found.point_data),
-        "field": _numbers(found.point_data.get(field)),
-        "cell_fields": list(found.cell_data),
+        "fields": list(content.point_data),
+        "field": _numbers(content.point_data.get(field)),
+        "cell_fields": list(content.cell_data),
         "cell_field": None if parts is None else [_numbers(part) for part in parts],
     }
 
 
-def plain_parts(found: Any) -> dict[str, Any]:
+def plain_parts(content: Any) -> dict[str, Any]:
     """Return a ``meshio.Mesh`` as the plain data that `plain_content` tells of."""
-    cell_data = {key: data for key, data in found.cell_data.items() if key in TAGS or key.startswith(CELL_PREFIX)}
-    point_data = {key: data for key, data in found.point_data.items() if key in TAGS or key.startswith(POINT_PREFIX)}
+    cell_data = {key: data for key, data in content.cell_data.items() if key in TAGS or key.startswith(CELL_PREFIX)}
+    point_data = {key: data for key, data in content.point_data.items() if key in TAGS or key.startswith(POINT_PREFIX)}
     return {
-        "points": _numbers(found.points),
-        "cells": [[block.type, len(block.data), _numbers(block.data)] for block in found.cells],
+        "points": _numbers(content.points),
+        "cells": [[block.type, len(block.data), _numbers(block.data)] for block in content.cells],
         "cell_data": {key: [_numbers(part) for part in parts] for key, parts in cell_data.items()},
         "point_data": {key: _numbers(data) for key, data in point_data.items()},
-        "cell_sets": {name: [_numbers(part) for part in parts] for name, parts in found.cell_sets.items()},
-        "point_sets": {name: _numbers(part) for name, part in found.point_sets.items()},
-        "field_data": {name: _numbers(entry) for name, entry in found.field_data.items()},
+        "cell_sets": {name: [_numbers(part) for part in parts] for name, parts in content.cell_sets.items()},
+        "point_sets": {name: _numbers(part) for name, part in content.point_sets.items()},
+        "field_data": {name: _numbers(entry) for name, entry in content.field_data.items()},
     }
 
 

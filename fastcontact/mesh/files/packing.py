@@ -35,8 +35,8 @@ def unpacked(values: NDArray[np.uint8]) -> Any:
     Raises ValueError if the bytes are not whole, or not from `packed`.
     """
     raw = np.ascontiguousarray(values, np.uint8).data
-    line, found, _ = bytes(raw[:200]).partition(b"\n")
-    if not found:
+    line, separator, _ = bytes(raw[:200]).partition(b"\n")
+    if not separator:
         raise ValueError("no packed data")
     head = json.loads(line)
     body = raw[len(line) + 1 : len(line) + 1 + int(head["size"])]
@@ -48,9 +48,9 @@ def unpacked(values: NDArray[np.uint8]) -> Any:
 
 def _without_arrays(data: Any, arrays: io.BytesIO) -> Any:
     if isinstance(data, np.ndarray):
-        place = arrays.tell()
+        offset = arrays.tell()
         arrays.write(np.ascontiguousarray(data).data)
-        return {_ARRAY: [place, data.dtype.str, list(data.shape)]}
+        return {_ARRAY: [offset, data.dtype.str, list(data.shape)]}
     if isinstance(data, np.generic):
         return data.item()
     if isinstance(data, dict):
@@ -70,9 +70,9 @@ def _with_arrays(data: Any, raw: memoryview) -> Any:
     return data
 
 
-def _array(raw: memoryview, place: int, kind: str, shape: list[int]) -> AnyArray:
+def _array(raw: memoryview, offset: int, kind: str, shape: list[int]) -> AnyArray:
     dtype = np.dtype(kind)
     if dtype.kind not in _KINDS:
-        raise ValueError(f"an array of {kind} is none of ours")
+        raise ValueError(f"an array of {kind} is not one of ours")
     count = int(np.prod(shape, dtype=np.int64))
-    return np.frombuffer(raw, dtype, count, place).reshape(shape).copy()
+    return np.frombuffer(raw, dtype, count, offset).reshape(shape).copy()

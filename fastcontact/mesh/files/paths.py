@@ -22,9 +22,9 @@ _DESCRIPTOR = re.compile(r"/(?:dev|proc/(?:self|thread-self|\d+))/fd/(\d+)")
 
 def existing_file(path: PathLike) -> Path:
     """Return `path` as a Path, or raise FileError if there is no such file or it is no plain one."""
-    found = Path(path)
+    file = Path(path)
     try:
-        found.stat()
+        file.stat()
     except FileNotFoundError:
         pass
     except (OSError, ValueError) as error:  # a name too long, a folder that is none, a zero in it
@@ -32,13 +32,13 @@ def existing_file(path: PathLike) -> Path:
         raise FileError(
             f"'{str(path)[:200]}' cannot be looked for ({reason}): check its name and the folder"
         ) from error
-    if found.is_dir():
+    if file.is_dir():
         raise FileError(f"'{path}' is a folder: name a file in it")
-    if not found.exists():
+    if not file.exists():
         raise FileError(f"there is no file '{path}': check its name and the folder you are in")
-    if not found.is_file():
+    if not file.is_file():
         raise FileError(f"'{path}' is a device or a pipe: name a plain file")
-    return found
+    return file
 
 
 def checked_target(path: PathLike) -> Path:

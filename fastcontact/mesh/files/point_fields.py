@@ -43,15 +43,15 @@ def read_point_field(path: PathLike, name: str) -> PointField:
 
     FileError if the file cannot be read, or has no such field, or one of several components.
     """
-    found = Path(existing_file(path))
-    suffix = found.suffix.lower()
+    file = Path(existing_file(path))
+    suffix = file.suffix.lower()
     if suffix in MED_SUFFIXES:
-        times, field = med.read_med_field(found, name)
-        result = PointField(times, _one(path, name, field), med.read_field_points(found, name))
+        times, field = med.read_med_field(file, name)
+        result = PointField(times, _one(path, name, field), med.read_field_points(file, name))
     elif suffix in VTKHDF_SUFFIXES:
-        result = _vtkhdf(found, name)
+        result = _vtkhdf(file, name)
     else:
-        field, points = meshio_files.read_point_data(found, name)
+        field, points = meshio_files.read_point_data(file, name)
         result = PointField(None, _one(path, name, field[None]), points)
     if not result.values.shape[0]:
         raise FileError(f"field '{name}' of '{path}' has no instant")
@@ -94,7 +94,7 @@ def _vtkhdf(path: Path, name: str) -> PointField:
         )
 
 
-def at_points_of(field: PointField, mesh: Mesh, wanted: Indices, what: str) -> Array:
+def at_points_of(field: PointField, mesh: Mesh, wanted: Indices, name: str) -> Array:
     """Return the values (n_instants, n_points) of a field at the `wanted` (k,) points of a mesh, elsewhere NaN.
 
     A file with the points of the mesh, in its order, gives the value of each point itself, any other one that of the point
@@ -103,20 +103,20 @@ def at_points_of(field: PointField, mesh: Mesh, wanted: Indices, what: str) -> A
     Raises
     ------
     MeshError
-        If a point has no value, or two of different size; `what` names the field.
+        If a point has no value, or two of different size; `name` names the field.
     """
-    found = np.full((len(field.values), mesh.n_points), np.nan)
-    rows = _rows(field, mesh, wanted, what)
-    found[:, wanted] = field.values[:, rows]
-    missing = wanted[~np.isfinite(found[:, wanted]).all(axis=0)]
+    values = np.full((len(field.values), mesh.n_points), np.nan)
+    rows = _rows(field, mesh, wanted, name)
+    values[:, wanted] = field.values[:, rows]
+    missing = wanted[~np.isfinite(values[:, wanted]).all(axis=0)]
     if len(missing):
         raise MeshError(
-            f"{what} has no value at {len(missing)} points (first: point {missing[0]} {mesh.points[missing[0]]})"
+            f"{name} has no value at {len(missing)} points (first: point {missing[0]} {mesh.points[missing[0]]})"
         )
-    return found
+    return values
 
 
-def _rows(field: PointField, mesh: Mesh, wanted: Indices, what: str) -> Indices:
+def _rows(field: PointField, mesh: Mesh, wanted: Indices, name: str) -> Indices:
     """Return the rows (k,) of a field for the wanted points."""
     from scipy.spatial import cKDTree
 
@@ -124,34 +124,34 @@ def _rows(field: PointField, mesh: Mesh, wanted: Indices, what: str) -> Indices:
     size = float(np.ptp(mesh.points, axis=0).max())
     if field.points is None:
         if n_points != mesh.n_points:
-            raise MeshError(f"{what} has {n_points} points and no coordinates, the mesh has {mesh.n_points}")
+            raise MeshError(f"{name} has {n_points} points and no coordinates, the mesh has {mesh.n_points}")
         return wanted
     places = np.zeros((len(field.points), 3))
     places[:, : field.points.shape[1]] = field.points
-    own = np.zeros((mesh.n_points, 3))
-    own[:, : mesh.dim] = mesh.points
-    if n_points == mesh.n_points and np.abs(places - own).max(initial=0.0) <= SAME_PLACE * size:
+    coordinates = np.zeros((mesh.n_points, 3))
+    coordinates[:, : mesh.dim] = mesh.points
+    if n_points == mesh.n_points and np.abs(places - coordinates).max(initial=0.0) <= SAME_PLACE * size:
         return wanted
-    distance, rows = cKDTree(places).query(own[wanted])
+    distance, rows = cKDTree(places).query(coordinates[wanted])
     off = np.flatnonzero(~(distance <= SAME_PLACE * size))
     if len(off):
         first = wanted[off[0]]
         raise MeshError(
-            f"{what} has no point where {len(off)} points of the mesh are (first: point {first} {mesh.points[first]}, "
+            f"{name} has no point where {len(off)} points of the mesh are (first: point {first} {mesh.points[first]}, "
             f"{distance[off[0]]:.3g} from the next): write it on the nodes of this mesh"
         )
-    _refuse_two(field, places, own[wanted], SAME_PLACE * size, what)
+    _refuse_two(field, places, coordinates[wanted], SAME_PLACE * size, name)
     return np.asarray(rows, np.intp)
 
 
-def _refuse_two(field: PointField, places: Array, wanted: Array, reach: float, what: str) -> None:
+def _refuse_two(field: PointField, places: Array, wanted: Array, reach: float, name: str) -> None:
     """Raise MeshError where points of the file at one place have different values."""
     from scipy.spatial import cKDTree
 
     near = cKDTree(places).query_ball_point(wanted, reach)
-    for place, members in zip(wanted, near, strict=True):
+    for point, members in zip(wanted, near, strict=True):
         if len(members) > 1 and np.ptp(field.values[:, members], axis=1).max() > 0.0:
             raise MeshError(
-                f"{what} has {len(members)} different values at {place}, where bodies touch: write it on the nodes of this "
+                f"{name} has {len(members)} different values at {point}, where bodies touch: write it on the nodes of this "
                 "mesh, in their order"
             )

@@ -24,8 +24,8 @@ def parsed(text: str) -> dict[str, Any]:
     """
     if len(text) > LARGEST:
         raise ValueError(f"it is larger than {LARGEST >> 20} MB")
-    if found := LONG_KEY.search(text):
-        line = text.count("\n", 0, found.start()) + 1
+    if match := LONG_KEY.search(text):
+        line = text.count("\n", 0, match.start()) + 1
         raise ValueError(f"a key of more than {PARTS} parts in line {line}: no key is that long")
     try:
         return tomllib.loads(text)

@@ -90,8 +90,8 @@ def _solids(solid: Element, shape: Indices) -> tuple[Indices, Indices]:
     weights = np.array([n_y * n_z, n_z, 1])
     first = STEPS * np.indices(tuple(shape.tolist())).reshape(3, -1).T @ weights
     places = first[:, None, None] + np.rint(local).astype(np.int64) @ weights
-    found, block = np.unique(places, return_inverse=True)
-    lattice = np.column_stack([found // (n_y * n_z), found // n_z % n_y, found % n_z])
+    used, block = np.unique(places, return_inverse=True)
+    lattice = np.column_stack([used // (n_y * n_z), used // n_z % n_y, used % n_z])
     return block.reshape(-1, solid.n_nodes), lattice
 
 

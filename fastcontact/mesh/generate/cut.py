@@ -103,26 +103,26 @@ def _cells_beyond(
     joined = np.array([pair for facet, pair in owners.items() if len(pair) == 2 and facet not in section], int)
     joined = joined.reshape(-1, 2)
     graph = coo_array((np.ones(len(joined)), (joined[:, 0], joined[:, 1])), shape=(len(number), len(number)))
-    part = connected_components(graph, directed=False)[1]
+    component = connected_components(graph, directed=False)[1]
     middle = np.array([mesh.points[mesh.cells[name][row]].mean(axis=0) for name, row in number])
-    side = _sides_of_parts(mesh, group, {facet: owners[facet] for facet in section}, part, middle, direction)
-    found: dict[str, list[int]] = {}
-    for (name, row), own, place in zip(number, part, middle, strict=True):
+    side = _sides_of_parts(mesh, group, {facet: owners[facet] for facet in section}, component, middle, direction)
+    cells: dict[str, list[int]] = {}
+    for (name, row), body, centre in zip(number, component, middle, strict=True):
         nodes = mesh.cells[name][row]
         at = mesh.points[nodes[touched[nodes]]].mean(axis=0)  # of a cell that touches the section in an edge or a node
-        if side.get(int(own), bool((place - at) @ direction > 0)):
-            found.setdefault(name, []).append(row)
-    return found
+        if side.get(int(body), bool((centre - at) @ direction > 0)):
+            cells.setdefault(name, []).append(row)
+    return cells
 
 
 def _sides_of_parts(
-    mesh: Mesh, group: str, between: dict[Facet, list[int]], part: Numbers, middle: Array, direction: Array
+    mesh: Mesh, group: str, between: dict[Facet, list[int]], component: Numbers, middle: Array, direction: Array
 ) -> dict[int, bool]:
     """Return by part of the cells at a section whether it lies beyond it; MeshError if one lies on both sides."""
     side: dict[int, bool] = {}
     for facet, pair in between.items():
         here, there = sorted(pair, key=lambda cell: float(middle[cell] @ direction))
-        for own, beyond in ((int(part[here]), False), (int(part[there]), True)):
+        for own, beyond in ((int(component[here]), False), (int(component[there]), True)):
             if side.setdefault(own, beyond) != beyond:
                 where = mesh.points[list(facet)].mean(axis=0)
                 raise MeshError(

@@ -105,8 +105,8 @@ class Forest:
         """Points in the middle of edges, -1 where an edge is not divided."""
         if not len(self._divided):
             return np.full(keys.shape, -1)
-        place = np.minimum(np.searchsorted(self._divided, keys), len(self._divided) - 1)
-        return np.where(self._divided[place] == keys, self._middle[place], -1)
+        index = np.minimum(np.searchsorted(self._divided, keys), len(self._divided) - 1)
+        return np.where(self._divided[index] == keys, self._middle[index], -1)
 
     def _divide(self, keys: AnyArray) -> None:
         """Put a point in the middle of edges that have none yet."""
@@ -199,7 +199,7 @@ class Forest:
             return [(name, corners, np.arange(len(corners)))]
         middles = self._middles(edges_of(name, corners))
         count = (middles >= 0).sum(axis=1)
-        found = [(name, corners[count == 0], np.flatnonzero(count == 0))]
+        blocks = [(name, corners[count == 0], np.flatnonzero(count == 0))]
         sides = CORNERS[name]
         for turn in range(sides):
             turned = (np.arange(sides) + turn) % sides
@@ -210,5 +210,5 @@ class Forest:
                 lattice = np.concatenate([corners[:, turned], middles[:, turned]], axis=1)[here]
                 for kind, pattern in GREEN[name, number].items():
                     cells = lattice[:, pattern].reshape(-1, CORNERS[kind])
-                    found.append((kind, cells, np.repeat(np.flatnonzero(here), len(pattern))))
-        return found
+                    blocks.append((kind, cells, np.repeat(np.flatnonzero(here), len(pattern))))
+        return blocks

@@ -43,13 +43,13 @@ def with_reference_points(mesh: Mesh, places: Mapping[str, ArrayLike]) -> Mesh:
     """
     points = [mesh.points]
     groups: dict[str, list[int]] = {}
-    for name, place in places.items():
-        position = np.asarray(place, float)
+    for name, coordinates in places.items():
+        position = np.asarray(coordinates, float)
         if position.shape != (mesh.dim,) or not np.isfinite(position).all():
-            raise MeshError(f"the place {place!r} of reference point '{name}' must be {mesh.dim} numbers")
-        for own in (name, name + ROTATION):
-            if own in mesh.group_names:
-                raise MeshError(f"there is already a group '{own}': give the reference point another name")
-            groups[own] = [mesh.n_points + len(groups)]
+            raise MeshError(f"the place {coordinates!r} of reference point '{name}' must be {mesh.dim} numbers")
+        for group in (name, name + ROTATION):
+            if group in mesh.group_names:
+                raise MeshError(f"there is already a group '{group}': give the reference point another name")
+            groups[group] = [mesh.n_points + len(groups)]
             points.append(position[None])
     return mesh.replace(points=np.concatenate(points), point_groups={**mesh.point_groups, **groups})

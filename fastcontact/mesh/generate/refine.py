@@ -61,8 +61,8 @@ def _pattern(name: str) -> _Pattern:
     for corners in _CHILDREN[element.linear]:
         places = element.corner_shape(element.nodes) @ np.array(corners)
         child = []
-        for place in np.round(places * 8.0).tolist():  # eighths are exact
-            node = tuple(x / 8.0 for x in place)
+        for fraction_of_edge in np.round(places * 8.0).tolist():  # eighths are exact
+            node = tuple(x / 8.0 for x in fraction_of_edge)
             if node not in points:
                 points.append(node)
             child.append(points.index(node))
@@ -71,10 +71,10 @@ def _pattern(name: str) -> _Pattern:
     on_edge, along = np.full(len(points), -1), np.zeros(len(points), int)
     for number, (a, b) in enumerate(element.edges):
         start, way = element.nodes[a], element.nodes[b] - element.nodes[a]
-        part = (lattice - start) @ way / (way @ way)
-        there = np.abs(lattice - start - part[:, None] * way).max(axis=1) < 1e-12
+        fraction = (lattice - start) @ way / (way @ way)
+        there = np.abs(lattice - start - fraction[:, None] * way).max(axis=1) < 1e-12
         there[: element.n_nodes] = False
-        on_edge[there], along[there] = number, np.round(4 * part[there]).astype(int)
+        on_edge[there], along[there] = number, np.round(4 * fraction[there]).astype(int)
     return _Pattern(element.shape(lattice), np.array(children), on_edge, along)
 
 
@@ -168,11 +168,11 @@ def _edge_nodes(name: str) -> list[list[int]]:
 
 def _facets_on(mesh: Mesh, curve: Curve) -> list[AnyArray]:
     """Facets of the curve's group, block by block, all of whose nodes lie on the curve."""
-    found = [block[all_on(mesh, curve, block)] for block in facets_of(mesh, curve).values()]
-    if not sum(map(len, found)):
+    facets = [block[all_on(mesh, curve, block)] for block in facets_of(mesh, curve).values()]
+    if not sum(map(len, facets)):
         where = "outer facet" if curve.group is None else f"facet of group '{curve.group}'"
         raise MeshError(f"no {where} has all its nodes on {curve}: check its centre and radius")
-    return found
+    return facets
 
 
 def _on_curve(mesh: Mesh, curve: Curve, keys: AnyArray) -> AnyArray:
@@ -232,11 +232,11 @@ def linearised(mesh: Mesh) -> Mesh:
         parts = [name for name in cells if elements.get(name).linear == linear]
         merged[linear] = number[np.concatenate([cells[name] for name in parts])]
         order += [mesh.offsets[name] + np.arange(len(cells[name])) for name in parts]
-    place = np.argsort(np.concatenate(order)) if order else np.empty(0, np.int64)
+    order_of_cells = np.argsort(np.concatenate(order)) if order else np.empty(0, np.int64)
     return Mesh(
         mesh.points[used],
         merged,
-        {group: place[members] for group, members in mesh.cell_groups.items()},
+        {group: order_of_cells[members] for group, members in mesh.cell_groups.items()},
         {group: number[members[used[members]]] for group, members in mesh.point_groups.items()},
     )
 
@@ -248,15 +248,15 @@ def circles(mesh: Mesh) -> list[Circle]:
     A circle through the nodes is found by least squares. It counts if all nodes lie on it to rounding, there are more than
     three, and the line turns gently: four corners of a square lie on a circle, too.
     """
-    found = []
+    circles_of_curves = []
     for group in mesh.cell_groups:
         blocks = mesh.cells_of(group, dim=1)
         solids = any(elements.get(name).dim == 2 for name in mesh.split(mesh.cell_groups[group]))
         if blocks and not solids:
             circle = _circle(mesh, group, list(blocks.values()))
             if circle is not None:
-                found.append(circle)
-    return found
+                circles_of_curves.append(circle)
+    return circles_of_curves
 
 
 def _circle(mesh: Mesh, group: str, blocks: list[AnyArray]) -> Circle | None:

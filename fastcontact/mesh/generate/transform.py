@@ -126,11 +126,11 @@ def union(*meshes: Mesh) -> Mesh:
 
 def _joined(parts: Iterable[Groups]) -> Groups:
     """Return the arrays of the same name, one after the other."""
-    found: dict[str, list[AnyArray]] = {}
-    for part in parts:
-        for name, values in part.items():
-            found.setdefault(name, []).append(values)
-    return {name: np.concatenate(arrays) for name, arrays in found.items()}
+    groups_of_all: dict[str, list[AnyArray]] = {}
+    for groups_of_mesh in parts:
+        for name, values in groups_of_mesh.items():
+            groups_of_all.setdefault(name, []).append(values)
+    return {name: np.concatenate(arrays) for name, arrays in groups_of_all.items()}
 
 
 def _starts(cells: Mapping[str, AnyArray]) -> dict[str, int]:
@@ -189,9 +189,7 @@ def merge_points(mesh: Mesh, tolerance: float) -> Mesh:
 
 def with_points_at(mesh: Mesh, places: Mapping[str, Sequence[float]]) -> Mesh:
     """Return the mesh with a point group for the point nearest to each place [length]."""
-    nearest = {
-        name: [int(((mesh.points - np.asarray(place)) ** 2).sum(axis=1).argmin())] for name, place in places.items()
-    }
+    nearest = {name: [int(((mesh.points - np.asarray(x)) ** 2).sum(axis=1).argmin())] for name, x in places.items()}
     return mesh.with_groups(points=nearest)
 
 
@@ -202,5 +200,5 @@ def with_cells_inside(mesh: Mesh, name: str, group: str, inside: Callable[[Array
     """
     near = inside(mesh.points)
     rows = mesh.split(mesh.cell_groups[group])
-    parts = [mesh.offsets[kind] + own[near[mesh.cells[kind][own]].all(axis=1)] for kind, own in rows.items()]
+    parts = [mesh.offsets[kind] + chosen[near[mesh.cells[kind][chosen]].all(axis=1)] for kind, chosen in rows.items()]
     return mesh.with_groups(cells={name: np.concatenate(parts)})

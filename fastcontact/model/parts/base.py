@@ -12,8 +12,8 @@ from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.elasticity.initial_states import InitialState
 from fastcontact.elasticity.loads import Load, Value
 from fastcontact.elasticity.materials import KINEMATICS, Material
+from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, stacked_rows
 from fastcontact.elasticity.nonlinear_materials import STRAINS
-from fastcontact.elasticity.relations import Relation, stacked_rows
 from fastcontact.elasticity.springs import Springs, stacked
 from fastcontact.elasticity.temperature import Temperature
 from fastcontact.elasticity.varying_constants import Cells
@@ -23,7 +23,7 @@ from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
 from fastcontact.model.contact_pair import ContactPair
-from fastcontact.model.periodicity import Seam
+from fastcontact.model.periodicity import PeriodicInterface
 from fastcontact.model.pretension import Pretension
 from fastcontact.model.ramp import Table
 from fastcontact.model.units import named_units
@@ -100,11 +100,13 @@ class ModelBase:
         self.temperatures: list[Temperature] = []
         self.heat_loads: list[FixedTemperature | Heating | Film] = []
         self.initial_states: list[InitialState] = []
-        self.relations: list[Relation] = []
-        self.related_supports: list[tuple[str, Relation]] = []  # those of the relations that support a group
+        self.relations: list[MultiPointConstraint] = []
+        self.related_supports: list[
+            tuple[str, MultiPointConstraint]
+        ] = []  # those of the relations that support a group
         self.springs: list[Springs] = []
         self.pretensions: list[Pretension] = []
-        self.seams: list[Seam] = []  # nodes that are one place of a part that repeats itself
+        self.periodic_interfaces: list[PeriodicInterface] = []  # nodes that are one place of a part that repeats itself
         self.contact: list[ContactPair] = []
 
     @property
@@ -124,20 +126,20 @@ class ModelBase:
         """Return the solid cells of groups, or all."""
         if groups is None:
             return Cells(self.mesh, {name: np.arange(len(block)) for name, block in self.mesh.solids.items()})
-        found = self.mesh.split(np.unique(np.concatenate([self.mesh.cell_groups[name] for name in groups])))
-        return Cells(self.mesh, {name: found[name] for name in self.mesh.solids if name in found})
+        cells = self.mesh.split(np.unique(np.concatenate([self.mesh.cell_groups[name] for name in groups])))
+        return Cells(self.mesh, {name: cells[name] for name in self.mesh.solids if name in cells})
 
     def _points_of_cells(self, groups: Sequence[str] | None) -> Indices:
         """Return the points of the solid cells of groups, or of all."""
         cells = self._cells_of(groups)
         return np.unique(np.concatenate([self.mesh.cells[name][rows].ravel() for name, rows in cells.rows.items()]))
 
-    def _nodes(self, place: str | int) -> AnyArray:
-        if isinstance(place, str):
-            return self.mesh.points_of(place)
-        if place != int(place) or not 0 <= place < self.mesh.n_points:
-            raise ModelError(f"point {place} is not in the mesh of {self.mesh.n_points} points (numbers from 0)")
-        return np.array([place])
+    def _nodes(self, point: str | int) -> AnyArray:
+        if isinstance(point, str):
+            return self.mesh.points_of(point)
+        if point != int(point) or not 0 <= point < self.mesh.n_points:
+            raise ModelError(f"point {point} is not in the mesh of {self.mesh.n_points} points (numbers from 0)")
+        return np.array([point])
 
     def _direction(
         self, name: str, along: Mapping[str, float], joined: bool, direction: Sequence[float] | None

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import csr_array, vstack
 
 from fastcontact.elasticity.loads import axes_of, check_number
-from fastcontact.elasticity.relations import Relation
+from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.elasticity.springs import grounded, joined
 from fastcontact.errors import ModelError
 from fastcontact.mesh.argument_types import typed
@@ -67,14 +67,16 @@ class ModelConnections(ModelInitialStates):
         if name in {other.label for other in self.pretensions}:
             raise ModelError(f"there is already a pretension '{name}': names must differ")
         table = table_of(ramp, f"the ramp of pretension '{name}'")
-        own = pretension(self.mesh, name, section, opposite, normal, (force, shortening, locked_from), table)
+        section_of_bolt = pretension(
+            self.mesh, name, section, opposite, normal, (force, shortening, locked_from), table
+        )
         for other in self.pretensions:
-            if np.isin(own.nodes, [other.nodes, other.opposite]).any():
-                raise ModelError(f"{own.name} and {other.name} are in one section, which has one force")
-        self.pretensions.append(own)
-        self.relations.extend(own.relations(self.n_dofs))
+            if np.isin(section_of_bolt.nodes, [other.nodes, other.opposite]).any():
+                raise ModelError(f"{section_of_bolt.name} and {other.name} are in one section, which has one force")
+        self.pretensions.append(section_of_bolt)
+        self.relations.extend(section_of_bolt.relations(self.n_dofs))
         if force is not None:
-            self._add(PretensionForce(own))
+            self._add(PretensionForce(section_of_bolt))
 
     @typed(ModelError)
     def couple(self, group: str, component: str) -> None:
@@ -88,13 +90,13 @@ class ModelConnections(ModelInitialStates):
         if component == NORMAL:
             rows = along(*normals_of(self.mesh, group), self.n_dofs)
             first = csr_array(vstack([rows[[0]]] * (rows.shape[0] - 1), format="csr"))
-            self.relations.append(Relation(f"couple('{group}', 'normal')", csr_array(rows[1:] - first)))
+            self.relations.append(MultiPointConstraint(f"couple('{group}', 'normal')", csr_array(rows[1:] - first)))
             return
         for axis in axes_of(f"couple('{group}')", dict.fromkeys(component, 1.0), self.mesh.dim):
             m = len(nodes) - 1
             dofs = np.column_stack([np.full(m, nodes[0]), nodes[1:]]).astype(np.intp) * self.mesh.dim + axis
             rows = csr_array((np.tile([-1.0, 1.0], m), dofs.ravel(), 2 * np.arange(m + 1)), shape=(m, self.n_dofs))
-            self.relations.append(Relation(f"couple('{group}', '{'xyz'[axis]}')", rows))
+            self.relations.append(MultiPointConstraint(f"couple('{group}', '{'xyz'[axis]}')", rows))
 
     @typed(ModelError)
     def relate_groups(
@@ -135,12 +137,14 @@ class ModelConnections(ModelInitialStates):
             axes_of(name, dict.fromkeys(component, 1.0), self.mesh.dim)
         sides = [directions_of(self.mesh, group, component) for group in (first, second)]
         for (nodes, ours), (opposite, theirs) in zip(*sides, strict=True):
-            place = matched(self.mesh, (first, nodes), (second, opposite), translation)
+            match = matched(self.mesh, (first, nodes), (second, opposite), translation)
             rows = coefficients[0] * along(nodes, ours, self.n_dofs)
-            rows = csr_array(rows + coefficients[1] * along(opposite[place], theirs[place], self.n_dofs))
+            rows = csr_array(rows + coefficients[1] * along(opposite[match], theirs[match], self.n_dofs))
             rows.eliminate_zeros()
             self.relations.append(
-                Relation(name, rows[np.diff(rows.indptr) > 0], float(value), table_of(ramp, f"the ramp of {name}"))
+                MultiPointConstraint(
+                    name, rows[np.diff(rows.indptr) > 0], float(value), table_of(ramp, f"the ramp of {name}")
+                )
             )
 
     @typed(ModelError)
@@ -187,11 +191,11 @@ class ModelConnections(ModelInitialStates):
         loose = sorted(axes_of(name, dict.fromkeys(free, 1.0), self.mesh.dim)) if free else []
         if any(axis in jump for axis in loose):
             raise ModelError(f"{name}: '{free}' is free, so no displacement can be given there")
-        relations, seam = periodic(
+        relations, interface = periodic(
             self.mesh, (first, second), jump, loose, translation, table_of(ramp, f"the ramp of {name}")
         )
         self.relations.extend(relations)
-        self.seams.append(seam)
+        self.periodic_interfaces.append(interface)
 
     @typed(ModelError)
     def add_cyclic_symmetry(
@@ -229,16 +233,22 @@ class ModelConnections(ModelInitialStates):
         name = f"the cyclic symmetry of '{first}' and '{second}'"
         if self.kinematics == "axisymmetric":
             raise ModelError(f"{name}: an axisymmetric model is the whole ring already")
-        place = (0.0,) * self.mesh.dim if origin is None else tuple(origin)
+        origin_given = (0.0,) * self.mesh.dim if origin is None else tuple(origin)
         along = (0.0, 0.0, 1.0) if self.mesh.dim == 2 else tuple(direction)
-        if sectors < 2 or sectors != int(sectors) or len(place) != self.mesh.dim or len(along) != 3 or not any(along):
+        if (
+            sectors < 2
+            or sectors != int(sectors)
+            or len(origin_given) != self.mesh.dim
+            or len(along) != 3
+            or not any(along)
+        ):
             raise ModelError(
                 f"{name} needs two sectors at least, a whole number, an origin of {self.mesh.dim} numbers and a direction of "
-                f"three, not {sectors}, {place} and {along}"
+                f"three, not {sectors}, {origin_given} and {along}"
             )
-        relations, seam = cyclic(self.mesh, (first, second), sectors, place, along)
+        relations, interface = cyclic(self.mesh, (first, second), sectors, origin_given, along)
         self.relations.extend(relations)
-        self.seams.append(seam)
+        self.periodic_interfaces.append(interface)
 
     @typed(ModelError)
     def relate(
@@ -255,13 +265,13 @@ class ModelConnections(ModelInitialStates):
             [length times the unit of the coefficients].
         """
         row: dict[int, float] = {}
-        listed = [(place, component, coefficient) for place, component, coefficient in terms]
-        name = "the relation of " + ", ".join(f"{component} of '{place}'" for place, component, _ in listed)
+        listed = [(point, component, coefficient) for point, component, coefficient in terms]
+        name = "the relation of " + ", ".join(f"{component} of '{point}'" for point, component, _ in listed)
         check_number(f"the value of {name}", value)
-        for place, component, coefficient in listed:
+        for point, component, coefficient in listed:
             check_number(f"a coefficient of {name}", coefficient)
             (axis,) = axes_of(name, {component: coefficient}, self.mesh.dim)
-            for node in self._nodes(place):
+            for node in self._nodes(point):
                 dof = int(node) * self.mesh.dim + axis
                 row[dof] = row.get(dof, 0.0) + float(coefficient)
         row = {dof: coefficient for dof, coefficient in row.items() if coefficient}
@@ -270,7 +280,7 @@ class ModelConnections(ModelInitialStates):
         dofs = np.array(sorted(row), np.intp)
         values = np.array([row[dof] for dof in dofs])
         rows = csr_array((values, dofs, np.array([0, len(dofs)])), shape=(1, self.n_dofs))
-        self.relations.append(Relation(name, rows, float(value), table_of(ramp, f"the ramp of {name}")))
+        self.relations.append(MultiPointConstraint(name, rows, float(value), table_of(ramp, f"the ramp of {name}")))
 
     @typed(ModelError)
     def add_coupling(
@@ -350,8 +360,8 @@ class ModelConnections(ModelInitialStates):
         """
         name = f"the spring on '{group}'" if to is None else f"the spring between '{group}' and '{to}'"
         given = {"x": x, "y": y, "z": z}
-        own = {"axial": axial, "transverse": transverse}
-        along = {key: value for key, value in own.items() if value is not None}
+        stiffness = {"axial": axial, "transverse": transverse}
+        along = {key: value for key, value in stiffness.items() if value is not None}
         vector = self._direction(name, along, to is not None, direction)
         axes = {} if along and set(given.values()) == {None} else axes_of(name, given, self.mesh.dim)
         for value in [*axes.values(), *along.values()]:
@@ -368,8 +378,8 @@ class ModelConnections(ModelInitialStates):
         if not len(opposite):
             raise ModelError(f"group '{to}' is empty: no spring can be there")
         if len(nodes) > 1 < len(opposite):
-            place = matched(self.mesh, (str(group), nodes), (str(to), opposite), translation)
-            opposite = opposite[place]
+            match = matched(self.mesh, (str(group), nodes), (str(to), opposite), translation)
+            opposite = opposite[match]
         elif translation is not None:
             raise ModelError(f"{name} joins all nodes with a single one: leave out the translation")
         first, second = np.broadcast_arrays(nodes, opposite)

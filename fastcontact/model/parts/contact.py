@@ -86,7 +86,7 @@ class ModelContact(ModelConnections):
               takes its ``energy`` by area [pressure length]: a mapping of these, and of ``shear_strength``, ``shear_energy``
               (by default as in opening), ``stiffness`` (by default the strength is reached at a hundredth of the opening at
               break) [pressure / length], and ``exponent``, that of Benzeggagh and Kenane between the modes (2) [-]. It is
-              without stress as the sides lie, also across gaps, and gives way by its stiffness where it is pressed. Damage
+              without stress as the sides lie, also across gaps, and has its stiffness where it is pressed. Damage
               is in the results. ``adhesion``: attraction without memory, a mapping of ``work``, of adhesion by area,
               ``strength`` and ``stiffness``, likewise; along the sides it has no resistance.
             - ``slip``: ``"symmetric"`` (default): closing a gap along the mean of both sides' normals is no slip;
@@ -145,13 +145,13 @@ class ModelContact(ModelConnections):
         """
         moduli = None
         if self.materials:
-            own = np.array([material.contact_modulus for material, _ in self.materials])
-            moduli = {name: own[rows] for name, rows in self.material_of_cells().items()}
-        found = find_contacts(self.mesh, distance=distance, angle=angle, groups=groups, moduli=moduli)
-        if not found.pairs:
+            stiffness = np.array([material.contact_modulus for material, _ in self.materials])
+            moduli = {name: stiffness[rows] for name, rows in self.material_of_cells().items()}
+        contacts = find_contacts(self.mesh, distance=distance, angle=angle, groups=groups, moduli=moduli)
+        if not contacts.pairs:
             raise ContactError(nothing_found(self.mesh, distance, angle, groups))
-        self.mesh, added = found.mesh, []
-        for pair in found:
+        self.mesh, added = contacts.mesh, []
+        for pair in contacts:
             sides = {"secondary": pair.secondary, "primary": pair.primary}
             ends = [self.mesh.points_of(group) for group in sides.values()]
             if any(np.isin(side, [cut.nodes, cut.opposite]).all() for cut in self.pretensions for side in ends):
@@ -190,10 +190,10 @@ class ModelContact(ModelConnections):
         if contact not in names:
             raise ModelError(unknown("contact", contact, names))
         fluid = FluidPressure(float(pressure), source, table_of(ramp, f"the ramp of the fluid in contact '{contact}'"))
-        place = names.index(contact)
-        changed = dataclasses.replace(self.contact[place], fluid=fluid)
+        index = names.index(contact)
+        changed = dataclasses.replace(self.contact[index], fluid=fluid)
         self.bind(changed)
-        self.contact[place] = changed
+        self.contact[index] = changed
 
     @typed(ModelError)
     def add_obstacle(
@@ -336,8 +336,8 @@ class ModelContact(ModelConnections):
         for option in pair.options:
             if option not in known:
                 raise ContactError(unknown(f"option of {pair.formulation}", option, known))
-        own = {key: value for key, value in pair.options.items() if key not in SHARED_OPTIONS}
-        check_fields(f"contact '{pair.name}'", own, kind, ContactError)
+        specific = {key: value for key, value in pair.options.items() if key not in SHARED_OPTIONS}
+        check_fields(f"contact '{pair.name}'", specific, kind, ContactError)
         secondary = surface(self.mesh, pair.secondary)
         options = pair_options(
             pair.name, pair.options, self.mesh, secondary, against_obstacle=pair.obstacle is not None
@@ -349,15 +349,18 @@ class ModelContact(ModelConnections):
                     f"contact '{pair.name}': mortar in the plane needs multipliers='dual' at an obstacle"
                 )
             primary = RigidSide(pair.obstacle, np.array(pair.motion), pair.rotation)
-            own.setdefault("surface_smoothing", False)
+            specific.setdefault("surface_smoothing", False)
         else:
             primary = surface(self.mesh, pair.primary)
             check_sides(self.mesh, pair.name, secondary, primary, options.excluded)
         modulus = min((m.contact_modulus for m, _ in self.materials), default=1.0)
         axisymmetric = self.kinematics == "axisymmetric"
         # Tangential fields that turn from one end to the other are not one field of components.
-        seams = [seam for seam in self.seams if seam.turn is None or not pair.options.get("friction")]
+        friction = pair.options.get("friction")
+        interfaces = [end for end in self.periodic_interfaces if end.turn is None or not friction]
         options = dataclasses.replace(
-            options, same_place=same_place(seams, self.mesh.n_points), source=self._source(pair, secondary, options)
+            options,
+            same_place=same_place(interfaces, self.mesh.n_points),
+            source=self._source(pair, secondary, options),
         )
-        return kind(secondary, primary, self.mesh.points, axisymmetric, modulus, options=options, held=held, **own)
+        return kind(secondary, primary, self.mesh.points, axisymmetric, modulus, options=options, held=held, **specific)

@@ -101,8 +101,8 @@ class ModelHeat(ModelMaterials):
     def same_temperature(self) -> Indices:
         """Return for each node (n_points,) the first one of the same temperature: ends of periods, sides of sections."""
         cuts = [(cut.nodes, cut.opposite) for cut in self.pretensions]
-        found = same_place([*self.seams, *cuts], self.mesh.n_points)  # type: ignore[list-item]
-        return np.arange(self.mesh.n_points) if found is None else found
+        representative = same_place([*self.periodic_interfaces, *cuts], self.mesh.n_points)  # type: ignore[list-item]
+        return np.arange(self.mesh.n_points) if representative is None else representative
 
     def fixed_temperatures(self) -> tuple[Mask, dict[Table | None, Array]]:
         """Return which nodes (n_points,) have a prescribed temperature, and by history their rises at multiplier 1.

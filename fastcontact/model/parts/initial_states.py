@@ -64,12 +64,12 @@ class ModelInitialStates(ModelLoads):
                 raise ModelError("a temperature has either times of its instants or a ramp, not both")
             if not isinstance(checked, np.ndarray) or checked.ndim != 2:
                 raise ModelError("a temperature with times must be an array (n_instants, n_points)")
-            found = histories(names, checked, reference, times)
+            temperatures = histories(names, checked, reference, times)
         else:
-            found = [Temperature(names, checked, reference, table_of(ramp, "the ramp of the temperature"))]
-        for own in found:
+            temperatures = [Temperature(names, checked, reference, table_of(ramp, "the ramp of the temperature"))]
+        for own in temperatures:
             own.check(self.mesh)
-        self.temperatures += found
+        self.temperatures += temperatures
 
     @typed(ModelError)
     def add_temperature_file(
@@ -112,7 +112,7 @@ class ModelInitialStates(ModelLoads):
         from fastcontact.model.temperature_files import read_temperatures
 
         names = self._solid_groups(groups, ": it has no temperature")
-        values, own = read_temperatures(self.mesh, file, field, self._points_of_cells(names), instant)
+        values, times_of_file = read_temperatures(self.mesh, file, field, self._points_of_cells(names), instant)
         values = np.where(np.isfinite(values), values, reference)
         if len(values) == 1:
             if times is not None:
@@ -121,7 +121,7 @@ class ModelInitialStates(ModelLoads):
             return
         if ramp is not None:
             raise ModelError(f"field '{field}' has {len(values)} instants and thus no ramp: give times, or one instant")
-        when = times if own is None or times is not None else own.tolist()
+        when = times if times_of_file is None or times is not None else times_of_file.tolist()
         if when is None:
             raise ModelError(f"field '{field}' has {len(values)} instants without times: give the load factor of each")
         self.add_temperature(values, names, reference=reference, times=when)
@@ -203,7 +203,9 @@ class ModelInitialStates(ModelLoads):
         """
         if not self.temperatures or not len(factors):
             return None
-        rises = [factor * own.rise(self.mesh) for factor, own in zip(factors, self.temperatures, strict=True)]
+        rises = [
+            factor * temperature.rise(self.mesh) for factor, temperature in zip(factors, self.temperatures, strict=True)
+        ]
         return np.asarray(np.sum(rises, axis=0))
 
     @typed(ModelError)

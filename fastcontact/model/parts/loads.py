@@ -118,13 +118,13 @@ class ModelLoads(ModelHeat):
         names = group_names(groups)
         if direction is None:
             direction = (0.0, 1.0, 0.0) if self.kinematics == "axisymmetric" else (0.0, 0.0, 1.0)
-        place = (*origin, 0.0) if len(origin) == 2 else tuple(origin)
-        if len(place) != 3 or len(direction) != 3:
+        origin_in_space = (*origin, 0.0) if len(origin) == 2 else tuple(origin)
+        if len(origin_in_space) != 3 or len(direction) != 3:
             raise ModelError(
                 f"the axis of the centrifugal force needs three components, not origin {origin} and direction {direction}"
             )
         table = table_of(ramp, "the ramp of the centrifugal force")
-        self._add(Centrifugal(names, speed, place, tuple(direction), table))  # type: ignore[arg-type]
+        self._add(Centrifugal(names, speed, origin_in_space, tuple(direction), table))  # type: ignore[arg-type]
 
     @typed(ModelError)
     def add_hydrostatic_pressure(

@@ -36,12 +36,12 @@ class ModelMaterials(ModelBase):
         """Return the solid cells as nonlinear bodies; None where they are linear."""
         return nonlinear_bodies(self.mesh, self.kinematics, self.strain, field)
 
-    def refuse_nonlinear(self, what: str) -> None:
-        """Raise ModelError if bodies are nonlinear, for `what` is there for linear elasticity alone."""
+    def refuse_nonlinear(self, feature: str) -> None:
+        """Raise ModelError if bodies are nonlinear, for `feature` is there for linear elasticity alone."""
         nonlinear = [type(law).__name__ for law, _ in self.materials if isinstance(law, NonlinearElastic)]
         if self.strain != "small" or nonlinear:
             named = nonlinear[0] if nonlinear else f"strain='{self.strain}'"
-            raise ModelError(f"{what} there for linear elasticity alone, not with {named}")
+            raise ModelError(f"{feature} there for linear elasticity alone, not with {named}")
 
     def material_numbers(self) -> tuple[Array, dict[str, Numbers]]:
         """Return moduli (n_moduli, 4, 4), in 3D (n_moduli, 6, 6) [pressure], and by element every solid cell's number there.

@@ -13,7 +13,7 @@ import numpy as np
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.elasticity.loads import Value, axes_of, check_value, evaluated
 from fastcontact.elasticity.material_axes import Axes, checked_axes, frames
-from fastcontact.elasticity.relations import Relation
+from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.elasticity.symmetry_axis import ON_AXIS, axis_nodes
 from fastcontact.errors import ModelError
 from fastcontact.mesh.argument_types import typed
@@ -75,7 +75,9 @@ class ModelSupports(ModelContact):
             nodes, directions = normals_of(self.mesh, group)
             values = evaluated(normal, self.mesh.points[nodes], name)
             table = table_of(ramp, f"the ramp of {name}")
-            self._related_support(group, Relation(name, along(nodes, directions, self.n_dofs), values, table))
+            self._related_support(
+                group, MultiPointConstraint(name, along(nodes, directions, self.n_dofs), values, table)
+            )
         if components or normal is None:
             self._support(group, components, ramp)
 
@@ -87,20 +89,21 @@ class ModelSupports(ModelContact):
             raise ModelError(f"group '{group}' is empty: no displacement can be prescribed on it")
         places = self.mesh.points[nodes]
         try:
-            own = frames(checked_axes(axes), places, self.kinematics)
+            frame = frames(checked_axes(axes), places, self.kinematics)
         except ModelError as error:
             raise ModelError(str(error).replace("a material", name).replace("a point of a cell", "a node")) from None
         for axis, value in axes_of(f"prescribe('{group}')", components, dim).items():
-            what = f"the displacement {'xyz'[axis]} prescribed on '{group}'"
-            check_value(what, value)
-            direction = own[:, axis]
+            caption = f"the displacement {'xyz'[axis]} prescribed on '{group}'"
+            check_value(caption, value)
+            direction = frame[:, axis]
             if dim == 2 and np.abs(direction[:, 2]).max() > ON_AXIS:
                 raise ModelError(f"{name}: its axes leave the plane, where nothing moves")
             rows = along(nodes, np.ascontiguousarray(direction[:, :dim]), self.n_dofs)
-            table = table_of(ramp, f"the ramp of {what}")
-            self._related_support(group, Relation(f"{what} along axes", rows, evaluated(value, places, what), table))
+            table = table_of(ramp, f"the ramp of {caption}")
+            values = evaluated(value, places, caption)
+            self._related_support(group, MultiPointConstraint(f"{caption} along axes", rows, values, table))
 
-    def _related_support(self, group: str, relation: Relation) -> None:
+    def _related_support(self, group: str, relation: MultiPointConstraint) -> None:
         self.relations.append(relation)
         self.related_supports.append((group, relation))
 

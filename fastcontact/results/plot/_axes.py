@@ -22,15 +22,15 @@ UNITS: Units = {"length": "mm", "force": "N", "pressure": "MPa"}
 UNKNOWN: Units = {}
 
 
-def placed(place: Array, size: float) -> str:
+def placed(points: Array, size: float) -> str:
     """Return a place (dim,) as text; coordinates below a millionth of the `size` of the body are zero [length]."""
-    kept = np.where(np.abs(place) <= 1e-6 * size, 0.0, place)
+    kept = np.where(np.abs(points) <= 1e-6 * size, 0.0, points)
     return f"({', '.join(f'{x:.4g}' for x in kept)})"
 
 
-def part_shown(middle: Array, half: float, place: Array) -> tuple[Array, Array]:
+def part_shown(middle: Array, half: float, points: Array) -> tuple[Array, Array]:
     """Return the corners of a square around its middle (2,), of a half width, without what lies beyond places (n, 2)."""
-    low, high = place.min(axis=0) - 0.05 * half, place.max(axis=0) + 0.05 * half
+    low, high = points.min(axis=0) - 0.05 * half, points.max(axis=0) + 0.05 * half
     return np.maximum(middle - half, low), np.minimum(middle + half, high)
 
 
@@ -53,8 +53,8 @@ def png(figure: Any) -> bytes:
 
 def displayed(figure: Any) -> None:
     """Let a figure, and each of its axes, show itself where it ends a cell of a notebook."""
-    for part in (figure, *figure.axes):
-        part._repr_png_ = partial(png, figure)
+    for artist in (figure, *figure.axes):
+        artist._repr_png_ = partial(png, figure)
 
 
 class Panels(tuple[Any, ...]):
@@ -67,7 +67,7 @@ class Panels(tuple[Any, ...]):
 
 
 def drawable(ax: Any) -> Any:
-    """Return axes that were given; FastcontactError if they are none."""
+    """Return axes that were given; FastcontactError if they are not axes."""
     if not (hasattr(ax, "plot") and hasattr(ax, "figure")):
         raise FastcontactError(
             f"pictures are drawn on axes of matplotlib, not on {ax!r}: leave the argument out for new ones"
@@ -104,21 +104,21 @@ def new_panels(rows: int, columns: int, size: tuple[float, float], dpi: int = 15
     return panels
 
 
-def size_around(place: Array) -> tuple[float, float]:
+def size_around(points: Array) -> tuple[float, float]:
     """Return width and height of a picture that the body fills, beside colours, labels and title [inches]."""
-    width, height = np.ptp(place, axis=0) / np.ptp(place, axis=0).max()
+    width, height = np.ptp(points, axis=0) / np.ptp(points, axis=0).max()
     return max(4.2 * float(width) + 1.9, 5.0), max(4.2 * float(height) + 2.0, 3.2)
 
 
-def legend_below(place: Array) -> float:
+def legend_below(points: Array) -> float:
     """Return where the legend begins, in heights of such axes: half an inch leaves room for the label of the axis."""
-    width, height = np.ptp(place, axis=0)
+    width, height = np.ptp(points, axis=0)
     return -0.5 / max(4.2 * float(height) / max(float(width), float(height)), 0.2)
 
 
-def bar_beside(place: Array) -> float:
+def bar_beside(points: Array) -> float:
     """Return the length of the colour bar by that of the room: as high as slender bodies are, but for its label."""
-    width, height = np.ptp(place, axis=0)
+    width, height = np.ptp(points, axis=0)
     return float(np.clip(2.0 * height / max(width, 1e-300), 0.45, 0.8))
 
 

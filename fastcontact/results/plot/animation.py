@@ -170,8 +170,8 @@ def _over_all(
     for step in steps:
         smallest, largest = field_of(mesh, step, field).range
         colours = min(colours[0], smallest), max(colours[1], largest)
-        place = scaled(mesh.points, scale, step.displacement)
-        low, high = np.minimum(low, place.min(axis=0)), np.maximum(high, place.max(axis=0))
+        points = scaled(mesh.points, scale, step.displacement)
+        low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
     if mirrored and mesh.dim == 2:
         low[0], high[0] = min(low[0], -high[0]), max(high[0], -low[0])
     margin = 0.03 * float((high - low).max())

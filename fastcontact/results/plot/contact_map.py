@@ -112,13 +112,13 @@ def _panels(axes: Sequence[Any] | None, both: bool) -> list[Any]:
 def _facets(mesh: Mesh, contact: ContactResult) -> dict[str, Indices]:
     """Return by element the facets (n, m) of the secondary surface, as places in the arrays of the contact."""
     inside = contact.points.max(initial=-1) < mesh.n_points
-    place = np.full(max(mesh.n_points, int(contact.points.max(initial=-1)) + 1), -1)
-    place[contact.points] = np.arange(len(contact.points))
-    here = {name: place[facets] for name, facets in outer_facets(mesh).items()}
-    found = {name: facets[(facets >= 0).all(axis=1)] for name, facets in here.items()}
-    if not inside or not any(map(len, found.values())):
+    row = np.full(max(mesh.n_points, int(contact.points.max(initial=-1)) + 1), -1)
+    row[contact.points] = np.arange(len(contact.points))
+    here = {name: row[facets] for name, facets in outer_facets(mesh).items()}
+    facets_of_kind = {name: facets[(facets >= 0).all(axis=1)] for name, facets in here.items()}
+    if not inside or not any(map(len, facets_of_kind.values())):
         raise FastcontactError(f"contact '{contact.name}' is not on the surface of this mesh")
-    return found
+    return facets_of_kind
 
 
 def _seen_along(contact: ContactResult, blocks: dict[str, Indices]) -> tuple[Array, tuple[str, str] | None]:

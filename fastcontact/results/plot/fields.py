@@ -107,8 +107,8 @@ def _of_cells(mesh: Mesh, values: Array) -> Array:
     """Return numbers of solid cells (n_solids,) at the points (n_points,): the mean of the cells around each."""
     total, count, first = np.zeros(mesh.n_points), np.zeros(mesh.n_points), 0
     for block in mesh.solids.values():
-        own = values[first : first + len(block)]
-        np.add.at(total, block, own[:, None])
+        block_values = values[first : first + len(block)]
+        np.add.at(total, block, block_values[:, None])
         np.add.at(count, block, 1.0)
         first += len(block)
     return total / np.maximum(count, 1.0)

@@ -23,21 +23,23 @@ Array = NDArray[np.float64]
 
 
 @typed(FastcontactError)
-def contacts(found: FoundContacts, *, view: tuple[float, float] = (25.0, -60.0), ax: Axes | None = None) -> Axes:
+def contacts(
+    found_contacts: FoundContacts, *, view: tuple[float, float] = (25.0, -60.0), ax: Axes | None = None
+) -> Axes:
     """Draw the contacts that `find_contacts` has found: a colour for each, the secondary side strong, the primary one pale.
 
     Parameters
     ----------
-    found : FoundContacts
+    found_contacts : FoundContacts
     view : (float, float)
         In 3D, height of the eye over the x-y plane and its direction around z [degrees].
     ax : matplotlib Axes, optional
         In 3D with ``projection="3d"``.
     """
-    mesh = found.mesh
+    mesh = found_contacts.mesh
     axes = new_axes(ax, size_around(mesh.points) if mesh.dim == 2 else (6.4, 6.2), "3d" if mesh.dim == 3 else None)
     draw = _draw_2d if mesh.dim == 2 else _draw_3d
-    draw(axes, found)
+    draw(axes, found_contacts)
     if mesh.dim == 2:
         axes.set_aspect("equal")
         axes.autoscale_view()
@@ -46,33 +48,33 @@ def contacts(found: FoundContacts, *, view: tuple[float, float] = (25.0, -60.0),
         axes.view_init(elev=view[0], azim=view[1])
         show_box(axes, mesh.points.min(axis=0), mesh.points.max(axis=0), view)
     axes.set(**{f"{axis}label": axis for axis in "xyz"[: mesh.dim]})
-    axes.set_title("1 contact" if len(found) == 1 else f"{len(found)} contacts")
-    if len(found):
+    axes.set_title("1 contact" if len(found_contacts) == 1 else f"{len(found_contacts)} contacts")
+    if len(found_contacts):
         axes.legend(loc="upper left", fontsize="small")
     return axes if mesh.dim == 2 or ax is not None else settled(axes)
 
 
-def _sides(found: FoundContacts) -> list[tuple[str, str, Any, float]]:
+def _sides(found_contacts: FoundContacts) -> list[tuple[str, str, Any, float]]:
     """Return group, label, colour and opacity of each side."""
     from matplotlib import colormaps
 
     colours = colormaps["tab10"].colors  # type: ignore[attr-defined]
     return [
         (group, f"{pair.name}, {side}", colours[number % len(colours)], opacity)
-        for number, pair in enumerate(found)
+        for number, pair in enumerate(found_contacts)
         for group, side, opacity in ((pair.primary, "primary", 0.4), (pair.secondary, "secondary", 1.0))
     ]
 
 
-def _draw_2d(axes: Any, found: FoundContacts) -> None:
+def _draw_2d(axes: Any, found_contacts: FoundContacts) -> None:
     from matplotlib.collections import LineCollection, PolyCollection
 
-    mesh = found.mesh
+    mesh = found_contacts.mesh
     for name, cells in mesh.solids.items():
         axes.add_collection(
             PolyCollection(list(outlines(name, mesh.points[cells])), facecolors="0.95", edgecolors="0.8", lw=0.3)
         )
-    for group, label, colour, opacity in _sides(found):
+    for group, label, colour, opacity in _sides(found_contacts):
         # From end to end, by way of the node in the middle if there is one.
         lines = [mesh.points[b[:, [0, 2, 1] if b.shape[1] == 3 else [0, 1]]] for b in mesh.cells_of(group, 1).values()]
         strokes = [line for block in lines for line in block]
@@ -80,14 +82,14 @@ def _draw_2d(axes: Any, found: FoundContacts) -> None:
         axes.add_collection(LineCollection(strokes, colors=[colour], alpha=opacity, lw=width, label=label))
 
 
-def _draw_3d(axes: Any, found: FoundContacts) -> None:
+def _draw_3d(axes: Any, found_contacts: FoundContacts) -> None:
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    mesh = found.mesh
+    mesh = found_contacts.mesh
     for facets in outer_facets(mesh).values():
         shape = mesh.points[facets][:, flat_triangles(facets.shape[1])].reshape(-1, 3, 3)
         axes.add_collection3d(Poly3DCollection(shape, facecolors="0.6", alpha=0.12))
-    for group, label, colour, opacity in _sides(found):
+    for group, label, colour, opacity in _sides(found_contacts):
         shapes = [
             mesh.points[block][:, flat_triangles(block.shape[1])].reshape(-1, 3, 3)
             for block in mesh.cells_of(group, 2).values()

@@ -46,8 +46,8 @@ class Screen:
         self.members = number[order]
         self.starts = np.searchsorted(square[order], np.arange(self.n_bins**2 + 1))
 
-    def _square(self, place: Array) -> NDArray[np.int64]:
-        return np.clip(((place - self.origin) / self.bin).astype(np.int64), 0, self.n_bins - 1)
+    def _square(self, points: Array) -> NDArray[np.int64]:
+        return np.clip(((points - self.origin) / self.bin).astype(np.int64), 0, self.n_bins - 1)
 
     def hidden(self, places: Array) -> Mask:
         """Return which places (..., 3) [length] lie behind a triangle."""
@@ -55,12 +55,12 @@ class Screen:
         column, row = self._square(flat[:, :2]).T
         square = column * self.n_bins + row
         first, count = self.starts[square], self.starts[square + 1] - self.starts[square]
-        place = np.repeat(np.arange(len(flat)), count)
+        index = np.repeat(np.arange(len(flat)), count)
         triangle = self.members[
             np.repeat(first, count) + np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
         ]
-        behind = self._behind(flat[place], triangle)
-        return np.asarray(np.bincount(place[behind], minlength=len(flat)).astype(bool).reshape(places.shape[:-1]))
+        behind = self._behind(flat[index], triangle)
+        return np.asarray(np.bincount(index[behind], minlength=len(flat)).astype(bool).reshape(places.shape[:-1]))
 
     def _behind(self, flat: Array, triangle: NDArray[np.int64]) -> Mask:
         """Return which places (n, 3) on the screen lie within and behind their triangle (n,)."""

@@ -133,8 +133,8 @@ def contact_zones(
             axes.plot(x[here], y[here], "o" if name != "open" else ".", ms=4, color=STATES[name], label=name)
     every = -(-len(contacts) // MOST_COUNTS)
     for step, contact in list(zip(steps, contacts, strict=True))[(len(contacts) - 1) % every :: every]:
-        place = {"xycoords": ("data", "axes fraction"), "ha": "center", "va": "bottom"}
-        axes.annotate(str(int(contact.active.sum())), (step.load_factor, 1.0), fontsize=8, **place)
+        anchor = {"xycoords": ("data", "axes fraction"), "ha": "center", "va": "bottom"}
+        axes.annotate(str(int(contact.active.sum())), (step.load_factor, 1.0), fontsize=8, **anchor)
     reach, farthest = 1.5 * np.abs(y[closed]).max(initial=0.0), np.abs(y).max(initial=0.0)
     top = reach if 0.0 < reach < farthest else None
     axes.set_ylim((-top if top else None) if y.min(initial=0.0) < 0 else 0.0, top)

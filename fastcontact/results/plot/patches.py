@@ -18,7 +18,7 @@ FEW = 5000
 
 
 def fill(
-    ax: Any, blocks: Mapping[str, AnyArray], place: Array, values: Array, colours: str, ends: tuple[float, float]
+    ax: Any, blocks: Mapping[str, AnyArray], points: Array, values: Array, colours: str, ends: tuple[float, float]
 ) -> Any:
     """Fill cells by their shape functions; return what carries the colours.
 
@@ -27,7 +27,7 @@ def fill(
     ax : matplotlib Axes
     blocks : mapping of str to ndarray of int (n_cells, n_nodes)
         Cells by element.
-    place : ndarray (n_points, 2)
+    points : ndarray (n_points, 2)
         [length]
     values : ndarray (n_points,)
         Of any unit.
@@ -43,7 +43,7 @@ def fill(
     for name, cells in blocks.items():
         xi, pieces = _lattice(name) if few and name != "tri3" else (None, flat_triangles(cells.shape[1]))
         shape = elements.get(name).shape(xi) if xi is not None else np.eye(cells.shape[1])
-        places.append(np.einsum("ps,nsd->npd", shape, place[cells]).reshape(-1, 2))
+        places.append(np.einsum("ps,nsd->npd", shape, points[cells]).reshape(-1, 2))
         heights.append((values[cells] @ shape.T).ravel())
         triangles.append((start + len(shape) * np.arange(len(cells))[:, None, None] + pieces).reshape(-1, 3))
         start += len(shape) * len(cells)
@@ -68,7 +68,7 @@ def _lattice(name: str) -> tuple[Array, AnyArray]:
     corner = elements.get(name).n_corners == 3
     last = CUTS if corner else 2 * CUTS
     places = [(i, j) for i in range(CUTS + 1) for j in range(CUTS + 1) if i + j <= last]
-    number = {place: k for k, place in enumerate(places)}
+    number = {lattice_point: k for k, lattice_point in enumerate(places)}
     squares = [(i, j) for i in range(CUTS) for j in range(CUTS)]
     xi = np.array(places, float) / CUTS
     lower = [(i, j) for i, j in squares if not corner or i + j < CUTS]

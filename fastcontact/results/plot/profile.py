@@ -54,23 +54,23 @@ def pressure_profile(
     """
     ax, units = new_axes(ax, (6.4, 4.4)), units or contact.units
     order = np.argsort(contact.place, kind="stable")
-    place, flat = contact.place[order], contact.coordinates.shape[1] == 2
+    position, flat = contact.place[order], contact.coordinates.shape[1] == 2
     curves = _curves(theory, other_theories or {})
     low, high = _shown_range(contact, curves)
-    shown = (place >= low) & (place <= high)
+    shown = (position >= low) & (position <= high)
     for style, (legend, curve) in zip(("-", "--", ":", "-."), curves.items(), strict=False):
         end = min(curve.radius, high)
         x = np.unique(np.concatenate([[low, high], np.linspace(max(-end, low), end, 400)]))
         label = f"{legend}: {_largest(curve, units)}"
         ax.plot(x, curve.pressure(np.abs(x)), style, color="black", lw=1.1, label=label)
-    found = f"$p_{{max}}$ = {valued(contact.pressure_max, units, 'pressure')}"
-    label = f"{contact.formulation.replace('_', '-')}: {found}"
+    peak = f"$p_{{max}}$ = {valued(contact.pressure_max, units, 'pressure')}"
+    label = f"{contact.formulation.replace('_', '-')}: {peak}"
     pressure = contact.pressure[order][shown]
-    ax.plot(place[shown], pressure, "o-" if flat else "o", color="tab:blue", ms=4, lw=0.8, label=label)
+    ax.plot(position[shown], pressure, "o-" if flat else "o", color="tab:blue", ms=4, lw=0.8, label=label)
     if stress is not None:
         label = r"$-n \cdot \sigma \cdot n$ at the nodes"
-        ax.plot(place[shown], -stress[order][shown], "x", color="tab:red", ms=5, label=label)
-    _mark_edges(ax, contact, place, units)
+        ax.plot(position[shown], -stress[order][shown], "x", color="tab:red", ms=5, label=label)
+    _mark_edges(ax, contact, position, units)
     start = "axis" if contact.measured_from_axis else "middle of the contact"
     along = "distance along the surface" if flat and not contact.measured_from_axis else "distance"
     ax.set(xlabel=labelled(f"{along} from the {start}", units, "length"), xlim=(low, high))
@@ -95,9 +95,9 @@ def _curves(theory: Any, others: Mapping[str, Any]) -> dict[str, PressureCurve]:
             raise FastcontactError(
                 f"a theory has a pressure, as those of fastcontact.analytic do, which {given!r} has not"
             )
-    found = {legend: pressure_curve(other) for legend, other in others.items()}
-    own = pressure_curve(theory)
-    return {**({own.name: own} if own is not None else {}), **{k: c for k, c in found.items() if c is not None}}
+    curves = {legend: pressure_curve(other) for legend, other in others.items()}
+    curve = pressure_curve(theory)
+    return {**({curve.name: curve} if curve is not None else {}), **{k: c for k, c in curves.items() if c is not None}}
 
 
 def _shown_range(contact: ContactResult, curves: Mapping[str, PressureCurve]) -> tuple[float, float]:
@@ -113,13 +113,13 @@ def _shown_range(contact: ContactResult, curves: Mapping[str, PressureCurve]) ->
     return (max(-reach, 1.02 * float(low)) if low < 0 else 0.0), reach
 
 
-def _mark_edges(ax: Axes, contact: ContactResult, place: Array, units: Units) -> None:
+def _mark_edges(ax: Axes, contact: ContactResult, position: Array, units: Units) -> None:
     """Shade where the edge of the contact lies: between the outermost closed place and the first open one."""
     inside, outside = half_width(contact.place, contact.active)
     if not (np.isfinite(inside) and np.isfinite(outside)):
         return
     centre = 0.0
-    if place.min(initial=0.0) < 0:
+    if position.min(initial=0.0) < 0:
         closed = contact.place[contact.active]
         centre = 0.5 * float(closed.min() + closed.max()) if len(closed) else 0.0
         ax.axvspan(centre - outside, centre - inside, color="tab:blue", alpha=0.15, lw=0)

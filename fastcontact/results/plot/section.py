@@ -81,24 +81,24 @@ def section(
     shown, units = field_of(mesh, step, field), units or step.units
     triangles, lines = _touching(shown, step, at, direction)
     basis, labels = _plane_axes(direction)
-    place = scaled(triangles[..., :3], scale, triangles[..., 3:6])
-    flat, values = place @ basis.T - (0.0 if labels else at @ basis.T), triangles[..., 6]
+    corners = scaled(triangles[..., :3], scale, triangles[..., 3:6])
+    flat, values = corners @ basis.T - (0.0 if labels else at @ basis.T), triangles[..., 6]
     best = np.unravel_index(int(np.argmax(np.abs(values))), values.shape)
-    part = flat.reshape(-1, 2)
-    part = part if zoom is None else np.array(part_shown(flat[best], zoom, part))
-    axes = new_axes(ax, size_around(part))
+    points = flat.reshape(-1, 2)
+    points = points if zoom is None else np.array(part_shown(flat[best], zoom, points))
+    axes = new_axes(ax, size_around(points))
     drawn = _fill(axes, flat, values, shown)
     strokes = scaled(lines[..., :3], scale, lines[..., 3:6]) @ basis.T - (0.0 if labels else at @ basis.T)
     if edges if edges is not None else len(strokes) <= 4 * MOST_EDGES:
         _stroke(axes, strokes)
     before = triangles[best][:3] - ((triangles[best][:3] - at) @ direction) * direction
-    _mark(axes, flat[best], values[best], before, place.reshape(-1, 3), units, shown)
+    _mark(axes, flat[best], values[best], before, corners.reshape(-1, 3), units, shown)
     if zoom is not None:
-        axes.set(xlim=part[:, 0], ylim=part[:, 1])
+        axes.set(xlim=points[:, 0], ylim=points[:, 1])
     plane = f"section through {placed(at, float(np.ptp(mesh.points, axis=0).max()))}, normal {placed(direction, 1.0)}"
     state = f"load factor {step.load_factor:g}, displacements x {scale:g}"
     axes.set_title(title or f"{plane}\n{state}", fontsize="medium")
-    _frame(axes, drawn, shown, units, labels or ("along the section", "across it"), part if ax is None else None)
+    _frame(axes, drawn, shown, units, labels or ("along the section", "across it"), points if ax is None else None)
     return axes
 
 
@@ -116,10 +116,10 @@ def _plane(mesh: Mesh, point: Sequence[float], normal: Sequence[float]) -> tuple
 
 
 def _frame(
-    axes: Any, drawn: Any, shown: Field, units: Units, labels: tuple[str, str], part: Array | None
+    axes: Any, drawn: Any, shown: Field, units: Units, labels: tuple[str, str], points: Array | None
 ) -> None:  # fmt: skip
-    """Give axes their colour bar, labels and legend; in a figure of their own, which `part` (n, 2) fills, by its size."""
-    bar, below = (0.8, -0.14) if part is None else (bar_beside(part), legend_below(part))
+    """Give axes their colour bar, labels and legend; in a figure of their own, which `points` (n, 2) fills, by its size."""
+    bar, below = (0.8, -0.14) if points is None else (bar_beside(points), legend_below(points))
     axes.figure.colorbar(drawn, ax=axes, label=labelled(shown.caption, units, shown.quantity), shrink=bar)
     axes.set_aspect("equal")
     axes.set(xlabel=labelled(labels[0], units, "length"), ylabel=labelled(labels[1], units, "length"))
@@ -224,9 +224,9 @@ def _stroke(axes: Any, strokes: Array) -> None:
     axes.add_collection(LineCollection(list(strokes), colors="black", linewidths=0.2, alpha=0.6))
 
 
-def _mark(axes: Any, at: Array, value: float, before: Array, place: Array, units: Units, shown: Field) -> None:
+def _mark(axes: Any, at: Array, value: float, before: Array, points: Array, units: Units, shown: Field) -> None:
     """Mark the largest value of the section, at (2,) in the picture, at `before` (3,) on the undeformed bodies."""
-    size = float(np.ptp(place, axis=0).max())
+    size = float(np.ptp(points, axis=0).max())
     kind = "maximum" if value >= 0.0 else "minimum"
     label = (
         f"{kind} on the section {valued(float(value), units, shown.quantity, 5)}\nundeformed at {placed(before, size)}"

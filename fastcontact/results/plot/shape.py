@@ -36,11 +36,11 @@ LARGEST = 1e30  # of coordinates that can be drawn: the libraries multiply them
 def scaled(points: Array, scale: float, displacement: Array) -> Array:
     """Return displaced points (n, dim) [length]; FastcontactError if `scale` moves them out of what can be drawn."""
     with np.errstate(all="ignore"):
-        place = points + scale * displacement
-        drawn = np.isfinite(scale) and (np.abs(place) < LARGEST).all()
+        position = points + scale * displacement
+        drawn = np.isfinite(scale) and (np.abs(position) < LARGEST).all()
     if not drawn:
         raise FastcontactError(f"scale = {scale:g} must be a finite number, and not so large that nothing can be drawn")
-    return place
+    return position
 
 
 @typed(FastcontactError)
@@ -89,25 +89,25 @@ def deformed_shape(
     if zoom is not None and (mesh.dim == 3 or not 0.0 < zoom < LARGEST):
         raise FastcontactError(f"zoom = {zoom:g}: in the plane half a width > 0 can be drawn; in 3D draw a section")
     shown, units = field_of(mesh, step, field), units or step.units
-    place = scaled(shown.mesh.points, scale, step.displacement[shown.node])
+    points = scaled(shown.mesh.points, scale, step.displacement[shown.node])
     heading = title or f"Deformed shape (displacements x {scale:g}), load factor {step.load_factor:g}"
     if mesh.dim == 3:
         axes = new_axes(ax, (6.4, 6.2), "3d")
-        view = view or view_of_extreme(shown, place)
-        drawn = draw_solid(axes, shown, place, edges, view, limits or shown.range)
-        _mark(axes, shown, place, mesh, units, hidden=not is_seen(shown, place, view))
+        view = view or view_of_extreme(shown, points)
+        drawn = draw_solid(axes, shown, points, edges, view, limits or shown.range)
+        _mark(axes, shown, points, mesh, units, hidden=not is_seen(shown, points, view))
         framed = _framed(axes, drawn, shown, heading, units, 0.02)
         return framed if ax is not None else settled(framed)
-    part = np.concatenate([place, place * [-1.0, 1.0]]) if mirrored else place
-    part = part if zoom is None else np.array(part_shown(place[shown.extreme], zoom, part))
-    axes = new_axes(ax, size_around(part))
-    for turned in (place, place * [-1.0, 1.0]) if mirrored else (place,):
-        drawn = _draw(axes, shown, turned, edges, limits or shown.range, part)
+    extent = np.concatenate([points, points * [-1.0, 1.0]]) if mirrored else points
+    extent = extent if zoom is None else np.array(part_shown(points[shown.extreme], zoom, extent))
+    axes = new_axes(ax, size_around(extent))
+    for turned in (points, points * [-1.0, 1.0]) if mirrored else (points,):
+        drawn = _draw(axes, shown, turned, edges, limits or shown.range, extent)
     if zoom is not None:
-        axes.set(xlim=part[:, 0], ylim=part[:, 1])
-    _mark(axes, shown, place, mesh, units)
+        axes.set(xlim=extent[:, 0], ylim=extent[:, 1])
+    _mark(axes, shown, points, mesh, units)
     return _framed(
-        axes, drawn, shown, heading, units, -0.09 if ax is not None else legend_below(part), bar_beside(part)
+        axes, drawn, shown, heading, units, -0.09 if ax is not None else legend_below(extent), bar_beside(extent)
     )
 
 
@@ -126,10 +126,10 @@ def _framed(axes: Any, drawn: Any, shown: Field, heading: str, units: Units, bel
     return axes
 
 
-def _mark(axes: Any, shown: Field, place: Array, mesh: Mesh, units: Units, hidden: bool = False) -> None:
+def _mark(axes: Any, shown: Field, points: Array, mesh: Mesh, units: Units, hidden: bool = False) -> None:
     """Mark the extreme value: where it stands in the picture, and in another line where it was before the load."""
     before = mesh.points[shown.node[shown.extreme]]
-    at, size = place[shown.extreme], float(np.ptp(place, axis=0).max())
+    at, size = points[shown.extreme], float(np.ptp(points, axis=0).max())
     value = shown.values[shown.extreme]
     here, there = placed(at, size), placed(before, size)
     label = f"{'maximum' if value >= 0.0 else 'minimum'} {valued(value, units, shown.quantity, 5)} at {here}"
@@ -140,17 +140,17 @@ def _mark(axes: Any, shown: Field, place: Array, mesh: Mesh, units: Units, hidde
 
 
 def _draw(
-    ax: Axes, shown: Field, place: Array, edges: bool | None, colours: tuple[float, float], part: Array
+    ax: Axes, shown: Field, nodes: Array, edges: bool | None, colours: tuple[float, float], box: Array
 ) -> Any:  # fmt: skip
-    """Draw the cells of a mesh in the plane at positions `place` (n_points, 2) in `colours` from one value to the other.
+    """Draw the cells of a mesh in the plane at positions `nodes` (n_points, 2) in `colours` from one value to the other.
 
-    By default edges are drawn where there are few cells within the box around `part` (n, 2). Return what carries the colours.
+    By default edges are drawn where there are few cells within the box around `box` (n, 2). Return what carries the colours.
     """
     from matplotlib.collections import PolyCollection
 
-    drawn = fill(ax, shown.mesh.solids, place, shown.values, shown.colours, colours)
-    loops = [outlines(name, place[cells]) for name, cells in shown.mesh.solids.items()]
-    low, high = part.min(axis=0), part.max(axis=0)
+    drawn = fill(ax, shown.mesh.solids, nodes, shown.values, shown.colours, colours)
+    loops = [outlines(name, nodes[cells]) for name, cells in shown.mesh.solids.items()]
+    low, high = box.min(axis=0), box.max(axis=0)
     inside = [((loop.max(axis=1) >= low) & (loop.min(axis=1) <= high)).all(axis=1) for loop in loops]
     if edges if edges is not None else sum(int(kept.sum()) for kept in inside) <= MOST_EDGES:
         for loop in loops:

@@ -31,11 +31,11 @@ TICKS = 14
 
 
 def draw_solid(
-    ax: Any, shown: Field, place: Array, edges: bool | None, view: tuple[float, float], colours: tuple[float, float]
+    ax: Any, shown: Field, points: Array, edges: bool | None, view: tuple[float, float], colours: tuple[float, float]
 ) -> Any:
     """Draw what is seen of the outer surface; return what a colour bar is made of.
 
-    The points stand at `place` (n_points, 3) [length]; `colours` are the values of the first and the last colour. Outlines
+    The points stand at `points` (n_points, 3) [length]; `colours` are the values of the first and the last colour. Outlines
     of facets are drawn if `edges` says so, by default up to MOST_EDGES. `view` is height and direction of the eye [degrees].
     """
     from matplotlib import colormaps
@@ -44,7 +44,7 @@ def draw_solid(
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
     eye = towards(view)
-    facing = _facing(shown, place, eye)
+    facing = _facing(shown, points, eye)
     screen = Screen(np.concatenate([corners[:, flat].reshape(-1, 3, 3) for _, corners, _, flat in facing]), eye)
     pieces, values, strokes = [], [], []
     for name, corners, field, flat in facing:
@@ -61,14 +61,14 @@ def draw_solid(
     lines = faces.copy()  # the colour of the face itself closes the hair cracks between neighbours
     if edges if edges is not None else sum(len(corners) for _, corners, _, _ in facing) <= MOST_EDGES:
         # Whatever is nearer is drawn later: all strokes are moved to the eye, in a parallel projection along themselves.
-        drawn = np.concatenate(strokes) + 4.0 * np.ptp(place, axis=0).max() * eye
+        drawn = np.concatenate(strokes) + 4.0 * np.ptp(points, axis=0).max() * eye
         polygons += list(drawn)
         faces = np.vstack([faces, np.zeros((len(drawn), 4))])
         lines = np.vstack([lines, np.tile([0.0, 0.0, 0.0, 0.6], (len(drawn), 1))])
     ax.add_collection3d(Poly3DCollection(polygons, facecolors=faces, edgecolors=lines, linewidths=0.3))
     ax.set_proj_type("ortho")
     ax.view_init(elev=view[0], azim=view[1])
-    show_box(ax, place.min(axis=0), place.max(axis=0), view)
+    show_box(ax, points.min(axis=0), points.max(axis=0), view)
     return ScalarMappable(norm, shown.colours)
 
 
@@ -81,8 +81,8 @@ def show_box(ax: Any, low: Array, high: Array, view: tuple[float, float]) -> Non
     diagonal = float(np.linalg.norm(size))
     level = np.array([-np.sin(np.radians(view[1])), np.cos(np.radians(view[1])), 0.0])
     widest = float((np.abs([level, np.cross(eye, level)]) @ size).max()) / diagonal
-    part = size * np.sqrt(1.0 - eye**2) / diagonal
-    for name, begin, end, along in zip("xyz", low, high, part):
+    fraction = size * np.sqrt(1.0 - eye**2) / diagonal
+    for name, begin, end, along in zip("xyz", low, high, fraction):
         getattr(ax, f"set_{name}lim")(begin, end)
         locator = getattr(ax, f"{name}axis").get_major_locator()
         # The first number on y stands where the last one on x does.
@@ -91,12 +91,12 @@ def show_box(ax: Any, low: Array, high: Array, view: tuple[float, float]) -> Non
     ax.set_box_aspect(size, zoom=ROOM * min(1.0, WIDEST / widest))
 
 
-def is_seen(shown: Field, place: Array, view: tuple[float, float]) -> bool:
-    """Return whether nothing hides the extreme value of a field, on points at `place` (n_points, 3) [length]."""
+def is_seen(shown: Field, points: Array, view: tuple[float, float]) -> bool:
+    """Return whether nothing hides the extreme value of a field, on points at `points` (n_points, 3) [length]."""
     eye = towards(view)
-    facing = _facing(shown, place, eye)
+    facing = _facing(shown, points, eye)
     screen = Screen(np.concatenate([corners[:, flat].reshape(-1, 3, 3) for _, corners, _, flat in facing]), eye)
-    return not bool(screen.hidden(place[[shown.extreme]])[0])
+    return not bool(screen.hidden(points[[shown.extreme]])[0])
 
 
 def view_of_extreme(shown: Field, place: Array) -> tuple[float, float]:
@@ -110,15 +110,15 @@ def towards(view: tuple[float, float]) -> Array:
     return np.array([np.cos(height) * np.cos(direction), np.cos(height) * np.sin(direction), np.sin(height)])
 
 
-def _facing(shown: Field, place: Array, eye: Array) -> list[tuple[str, Array, Array, Indices]]:
+def _facing(shown: Field, points: Array, eye: Array) -> list[tuple[str, Array, Array, Indices]]:
     """Return of each kind of facet, for those that face the eye: name, corners, values of the field, flat triangles."""
     cut = len(shown.node) != shown.node.max(initial=-1) + 1
     found = []
     for name, facets in (_without_cuts(shown.mesh, shown.node) if cut else outer_facets(shown.mesh)).items():
         flat = flat_triangles(facets.shape[1])
-        a, b, c = np.moveaxis(place[facets][:, flat], -2, 0)
+        a, b, c = np.moveaxis(points[facets][:, flat], -2, 0)
         kept = facets[np.cross(b - a, c - a).sum(axis=1) @ eye > 0]
-        found.append((name, place[kept], shown.values[kept], flat))
+        found.append((name, points[kept], shown.values[kept], flat))
     return found
 
 
@@ -156,11 +156,11 @@ def _seen_strokes(strokes: Array, screen: Screen) -> Array:
 
 def _without_cuts(mesh: Mesh, node: Numbers) -> dict[str, Numbers]:
     """Return the outer facets but for those along cuts inside, where two facets have the same nodes."""
-    found = {}
+    blocks = {}
     for name, facets in outer_facets(mesh).items():
         _, back, count = np.unique(np.sort(node[facets], axis=1), axis=0, return_inverse=True, return_counts=True)
-        found[name] = facets[count[back.ravel()] == 1]
-    return {name: facets for name, facets in found.items() if len(facets)}
+        blocks[name] = facets[count[back.ravel()] == 1]
+    return {name: facets for name, facets in blocks.items() if len(facets)}
 
 
 def _cut(n: int) -> Array:

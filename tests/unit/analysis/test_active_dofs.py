@@ -118,7 +118,7 @@ def test_the_condensed_problem_is_that_of_all_unknowns():
     free, none = condensed.solve(own[:0], c[:0])
     np.testing.assert_array_equal(free, loaded.solve(B[:0], c[:0])[0][solver.last])
     assert not len(none)
-    for found, expected in zip(condensed.flexibility(own), loaded.flexibility(B), strict=True):
+    for found, expected in zip(condensed.delassus(own), loaded.delassus(B), strict=True):
         np.testing.assert_allclose(found, expected, atol=1e-10 * np.abs(expected).max())
     force = rng.normal(size=k)
     near = condensed.involved_solution(force, None)

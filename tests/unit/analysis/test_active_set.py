@@ -31,14 +31,14 @@ class Dense:
 
 def enumerate_solutions(K, f, B, gap0, C):
     """Return the multipliers of the only active set that satisfies all inequalities."""
-    flexibility, free = B @ np.linalg.solve(K, B.T) + C, gap0 + B @ np.linalg.solve(K, f)
+    delassus, free = B @ np.linalg.solve(K, B.T) + C, gap0 + B @ np.linalg.solve(K, f)
     m = len(gap0)
     for size in range(m + 1):
         for rows in itertools.combinations(range(m), size):
             rows = list(rows)
             multiplier = np.zeros(m)
-            multiplier[rows] = np.linalg.solve(flexibility[np.ix_(rows, rows)], -free[rows])
-            if (multiplier >= -1e-12).all() and (free + flexibility @ multiplier >= -1e-10).all():
+            multiplier[rows] = np.linalg.solve(delassus[np.ix_(rows, rows)], -free[rows])
+            if (multiplier >= -1e-12).all() and (free + delassus @ multiplier >= -1e-10).all():
                 return multiplier
     raise AssertionError("a strictly convex problem has a solution")
 

@@ -83,7 +83,7 @@ def test_closing_slip_is_finite_where_both_normals_are_the_same():
     displacement = turned * ([1.0, 0.0] - 2.0 * points)
     constraints = pair.constraints(Configuration.displaced(displacement))
     assert constraints.usable.any()
-    assert np.abs(constraints.drift).max() == 0.0
+    assert np.abs(constraints.slip0).max() == 0.0
 
 
 @pytest.mark.filterwarnings("ignore:.*across its radius")

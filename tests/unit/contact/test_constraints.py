@@ -52,7 +52,7 @@ def parts():
             4,
             compliance=True,
             tangents=2,
-            drift=random.normal(size=(2, 2)),
+            slip0=random.normal(size=(2, 2)),
             low_rank_compliance=random.normal(size=(3, 2, 1)),
         ),
     ]
@@ -75,8 +75,8 @@ def test_rows_and_numbers_follow_each_other(parts):
     assert whole.friction.tolist() == [0.0] * 2 + [0.3] * 3 + [0.0] * 6
     assert whole.equality.tolist() == [True] + [False] * 10
     assert whole.softness.tolist() == [0.0] * 5 + [0.1] * 4 + [0.0] * 2
-    np.testing.assert_array_equal(whole.drift[:, 9:], parts[3].drift)
-    assert not whole.drift[:, :9].any()
+    np.testing.assert_array_equal(whole.slip0[:, 9:], parts[3].slip0)
+    assert not whole.slip0[:, :9].any()
     for k in range(2):
         rows = whole.tangents[k].toarray()
         np.testing.assert_array_equal(rows[2:5], parts[1].tangents[k].toarray())
@@ -91,7 +91,7 @@ def test_what_no_part_has_the_whole_has_not():
     whole = stack([part(2, 1), part(3, 2)])
     assert whole.compliance is None
     assert whole.tangents == whole.directions == ()
-    assert whole.drift is whole.equality is whole.softness is whole.low_rank_compliance is None
+    assert whole.slip0 is whole.equality is whole.softness is whole.low_rank_compliance is None
 
 
 def test_compliances_do_not_couple_parts(parts):

@@ -8,7 +8,7 @@ from scipy.sparse import csr_array
 
 import fastcontact as fc
 from fastcontact.elasticity.constrained_system import ConstrainedMotion
-from fastcontact.elasticity.relations import eliminate
+from fastcontact.elasticity.multipoint_constraints import eliminate
 from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.topology import outer_facets
 

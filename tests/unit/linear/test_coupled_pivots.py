@@ -9,9 +9,9 @@ from fastcontact.analysis.load_step import load_step
 from fastcontact.analysis.problem import prepare
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 from fastcontact.errors import ConvergenceError
+from fastcontact.linear.delassus import TooManyColumnsError
 from fastcontact.linear.elimination.coupled_pivots import CoupledError, CoupledPivots, block_inverse, lumped
 from fastcontact.linear.elimination.elimination import eliminate
-from fastcontact.linear.flexibility import TooManyColumnsError
 from fastcontact.linear.solvers import amg
 
 
@@ -161,7 +161,7 @@ def test_constraints_that_cannot_be_eliminated_go_to_factors_and_not_through_man
     monkeypatch.setattr("fastcontact.linear.multigrid.solver.MOST_COLUMNS", 20)
     monkeypatch.setattr("fastcontact.linear.elimination.pivot_order.LARGEST_BLOCK", 8)
     monkeypatch.setattr("fastcontact.linear.elimination.pivot_order.FULL_UP_TO", 8)
-    monkeypatch.setattr("fastcontact.linear.elimination.corner_functions.eliminate_corners", lambda *_: None)
+    monkeypatch.setattr("fastcontact.linear.elimination.basis_transformation.eliminate_transformed", lambda *_: None)
     model = pressed(5, element, **options)
     solver, found = solved(model, "amg")
     assert "columns of the inverse stiffness" in solver.gave_up
@@ -184,7 +184,7 @@ def test_auto_knows_which_constraints_multigrid_cannot_eliminate():
 @pytest.mark.parametrize(("solver", "friction"), [("direct", 0.0), ("direct", 0.3), ("amg", 0.3)])
 def test_a_full_compliance_that_would_take_hours_is_refused_with_the_alternative(solver, friction, monkeypatch):
     model = pressed(5, formulation="continuous", friction=friction)
-    monkeypatch.setattr("fastcontact.linear.flexibility.MOST_ROWS", 100)
+    monkeypatch.setattr("fastcontact.linear.delassus.MOST_ROWS", 100)
     monkeypatch.setattr("fastcontact.analysis.friction.solve.MOST_ROWS_WITH_FRICTION", 100)
     expected = r"full compliance of \d+ constraints, .*GB .*formulation=\"mortar\" with multipliers=\"dual\""
     with pytest.raises(fc.ContactError, match=expected):

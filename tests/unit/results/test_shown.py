@@ -52,7 +52,7 @@ def test_steps_are_a_list_with_a_short_repr(steps):
 
 
 def test_answers_and_estimates_show_tables(model, steps):
-    answers = fc.contact_answers(model, steps, "hertz & co")[-1]
+    answers = fc.contact_resultants(model, steps, "hertz & co")[-1]
     assert f"{answers.normal_force:.6g}" in answers._repr_html_()
     assert np.isnan(answers.centre[0])  # forces all round have no middle off the axis
     estimate = fc.estimate_error(model, steps[-1])

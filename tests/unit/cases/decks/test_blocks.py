@@ -16,9 +16,9 @@ def test_a_block_has_keyword_parameters_and_lines(tmp_path):
     assert found.keyword == "CONTACT PAIR"
     assert found.parameters == {"TYPE": "a, b", "SMALL SLIDING": None}
     assert [row.entries for row in found.rows] == [("1", "2"), ("3",)]
-    assert [row.place.line for row in found.rows] == [4, 6]
+    assert [row.location.line for row in found.rows] == [4, 6]
     assert found.rows[0].goes_on
-    assert str(found.place) == "a.inp, line 2, *CONTACT PAIR"
+    assert str(found.location) == "a.inp, line 2, *CONTACT PAIR"
 
 
 def test_names_in_quotation_marks_keep_commas(tmp_path):
@@ -44,7 +44,7 @@ def test_included_files_stand_in_place_with_their_own_lines(tmp_path):
     (tmp_path / "sub" / "mesh.inc").write_text("*Node\n1, 0.\n", encoding="utf-8")
     found = read(tmp_path, "*Heading\n*Include, input=sub/mesh.inc\n*Step\n")
     places = ["a.inp, line 1, *HEADING", "sub/mesh.inc, line 1, *NODE", "a.inp, line 3, *STEP"]
-    assert [str(block.place) for block in found] == places
+    assert [str(block.location) for block in found] == places
 
 
 @pytest.mark.parametrize(

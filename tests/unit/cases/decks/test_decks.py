@@ -62,7 +62,7 @@ def test_two_cubes_are_a_bar(tmp_path):
         ("roof, P, 100.\n", "roof, P, 100.\nroof, P, 50.\n", "roof, P, 50.", "second value here in one step"),
         ("*Dsload\n", "*Dsload, amplitude=none\n", "*Dsload", "amplitude 'none' is not defined"),
         ("roof, P, 100.\n", "roof, P, 100.\n*Dload\nup, GRAV, 9.81, 0, 0, -1\n", "up, GRAV", r"no \*DENSITY"),
-        ("bottom, 3\n", "bottom, 11\n", "bottom, 11", "none of 1 to 6"),
+        ("bottom, 3\n", "bottom, 11\n", "bottom, 11", "not within 1 to 6"),
         ("type=C3D8, elset=up", "type=S4, elset=up", "*Element, type=S4",
          r"S4 \(shell\) is not supported; 1 element in set 'up'"),
     ],
@@ -367,7 +367,7 @@ def test_a_deck_with_a_line_left_out_cut_or_twice_is_read_or_refused_in_one_line
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("bottom, 3\n", "bottom, 3, 2000000000\n", r"\*BOUNDARY: components 3 to 2000000000 are none of 1 to 6"),
+        ("bottom, 3\n", "bottom, 3, 2000000000\n", r"\*BOUNDARY: components 3 to 2000000000 are not within 1 to 6"),
         ("bottom, 3\n", "bottom, 3, 9223372036854775808\n", "'9223372036854775808' is no whole number"),
         ("bottom, 3\n", "bottom, 1e308\n", "'1e308' is no whole number"),
         ("generate\n1, 4\n", "generate\n1, 9223372036854775808\n", "'9223372036854775808' is no whole number"),

@@ -191,12 +191,12 @@ RELATIONS = {
         before("*Boundary", "*Equation\n1\n15, 1, 1., 16, 1, 1.\n"),
         "the equation has 2 terms, 1 are announced",
     ),
-    "equation of a rotation": (before("*Boundary", "*Equation\n1\n15, 4, 1.\n"), "component 4 of '15' is none of 1 to 3"),
+    "equation of a rotation": (before("*Boundary", "*Equation\n1\n15, 4, 1.\n"), "component 4 of '15' is not within 1 to 3"),
     "equation of zeros": (before("*Boundary", "*Equation\n1\n15, 1, 0.\n"), "all coefficients of the equation are zero"),
     "equation of a set": (before("*Boundary", "*Equation\n1\ntop, 1, 1.\n"), "'top' holds 4 nodes where one is needed"),
     "coupling of component 7": (
         before("*Boundary", "*Coupling, ref node=15, surface=roof\n*Kinematic\n7\n"),
-        "the components 7 to 7 are none of 1 to 6",
+        "the components 7 to 7 are not within 1 to 6",
     ),
     "rigid body of its own node": (
         before("*Boundary", "*Rigid Body, nset=alone, ref node=15\n", before("*Nset, nset=top", "*Nset, nset=alone\n15\n")),

@@ -8,7 +8,7 @@ from test_coupled_pivots import pressed, solved
 import fastcontact as fc
 from fastcontact.analysis.problem import prepare
 from fastcontact.linear.elimination import elimination_kernels
-from fastcontact.linear.elimination.corner_functions import CornerElimination, eliminated
+from fastcontact.linear.elimination.basis_transformation import BasisTransformation, eliminated
 from fastcontact.linear.elimination.elimination import eliminate
 
 SIZE = 3
@@ -45,7 +45,7 @@ def test_equations_of_corners_hold_and_forces_do_the_same_work(parts, nonsymmetr
     c, u, r = rng.normal(size=B.shape[0]), rng.normal(size=B.shape[1]), rng.normal(size=B.shape[1])
     F = csr_array(B + 0.2 * quadratic_line(n, parts, seed=5)[0]) if nonsymmetric else None
     found = eliminated(B, c, F, nodes, SIZE, functions)
-    assert isinstance(found, CornerElimination)
+    assert isinstance(found, BasisTransformation)
     assert (found.coupled is None) == (n == 8)
     assert set(found.pivots // SIZE) == set(range(2 * n + 1))  # corners and mid nodes, nothing of the other side
     others = np.setdiff1d(np.arange(B.shape[1]), found.pivots)
@@ -117,10 +117,10 @@ def test_equations_without_mid_nodes_are_eliminated_by_nodal_unknowns():
     c = np.zeros(B.shape[0])
     for given in (None, elsewhere):
         found, plain = eliminated(B, c, None, nodes, SIZE, given), eliminate(B, c, None, nodes, SIZE)
-        assert not isinstance(found, CornerElimination)
+        assert not isinstance(found, BasisTransformation)
         assert np.array_equal(found.pivots, plain.pivots)
-    assert not isinstance(eliminated(B, c, None, None, SIZE, functions), CornerElimination)
-    assert isinstance(eliminated(B, c, None, nodes, SIZE, functions), CornerElimination)
+    assert not isinstance(eliminated(B, c, None, None, SIZE, functions), BasisTransformation)
+    assert isinstance(eliminated(B, c, None, nodes, SIZE, functions), BasisTransformation)
 
 
 def test_corners_with_next_to_no_entries_are_left_to_other_ways():
@@ -129,7 +129,7 @@ def test_corners_with_next_to_no_entries_are_left_to_other_ways():
     weak[3, SIZE * 3 : SIZE * 4] *= 1e-3
     weak[3, SIZE * (9 + 2) : SIZE * (9 + 4)] *= 1e-3  # and the mid nodes beside
     found = eliminated(csr_array(weak), np.zeros(len(weak)), None, nodes, SIZE, functions)
-    assert not isinstance(found, CornerElimination)
+    assert not isinstance(found, BasisTransformation)
     u = np.random.default_rng(8).normal(size=B.shape[1])
     found.complete(u)
     assert np.abs(weak @ u).max() < 1e-10 * np.abs(u).max()
@@ -163,14 +163,14 @@ def test_kernels_take_weights_of_pivots_themselves(kind):
 def test_functions_of_corners_are_those_of_linear_facets(element, values):
     model = pressed(4, element, multipliers="standard")
     pair = prepare(model, fc.linear_ramp(1), fc.Criteria(), linear_solver="amg").pairs["c"]
-    functions, points = pair.corner_functions, model.mesh.points
+    functions, points = pair.basis_transformation, model.mesh.points
     assert set(np.round(functions.data, 12)) == values
     mid = np.flatnonzero(np.diff(functions.indptr))
     assert len(mid)
     assert functions[mid] @ points == pytest.approx(points[mid], abs=1e-12)
     dual = prepare(pressed(4, element, multipliers="dual"), fc.linear_ramp(1), fc.Criteria(), linear_solver="amg")
-    assert dual.pairs["c"].corner_functions is None
-    assert dual.solver.corner_functions is None
+    assert dual.pairs["c"].basis_transformation is None
+    assert dual.solver.basis_transformation is None
 
 
 @pytest.mark.parametrize("element", ["tet10", "hex20", "hex27", "wedge15"])

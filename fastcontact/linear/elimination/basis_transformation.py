@@ -22,7 +22,7 @@ from fastcontact.linear.sparse_rows import scaled
 
 
 @dataclass(frozen=True, eq=False)
-class CornerElimination(Elimination):
+class BasisTransformation(Elimination):
     """``u[pivots] += moves (B moves)^-1 (c - B u)``.
 
     Its `pivots` (q,) are all unknowns that move, its `weights` (m, n) are -B, its `force_weights` the rows that multipliers
@@ -82,8 +82,8 @@ class CornerElimination(Elimination):
     def _following(self, inverse: csr_array, rows: csr_array) -> csr_array:
         """Return the weights (q, n) that the pivots are of all unknowns."""
         q = len(self.pivots)
-        own = csr_array((np.ones(q), self.pivots, np.arange(q + 1)), shape=(q, rows.shape[1]))
-        W = csr_array(own + self.moves @ csr_array(inverse @ rows))
+        identity = csr_array((np.ones(q), self.pivots, np.arange(q + 1)), shape=(q, rows.shape[1]))
+        W = csr_array(identity + self.moves @ csr_array(inverse @ rows))
         W.sort_indices()
         return W
 
@@ -93,17 +93,17 @@ def eliminated(
 ) -> Elimination:
     """Eliminate equations along the `functions` of corners where they are of that kind, by nodal unknowns elsewhere.
 
-    See `eliminate_corners` and `elimination.eliminate`.
+    See `eliminate_transformed` and `elimination.eliminate`.
     """
-    found = None
+    elimination = None
     if functions is not None and nodes is not None:
-        found = eliminate_corners(B, c, force_rows, nodes, size, functions)
-    return eliminate(B, c, force_rows, nodes, size) if found is None else found
+        elimination = eliminate_transformed(B, c, force_rows, nodes, size, functions)
+    return eliminate(B, c, force_rows, nodes, size) if elimination is None else elimination
 
 
-def eliminate_corners(
+def eliminate_transformed(
     B: csr_array, c: Array, force_rows: csr_array | None, nodes: Indices, size: int, functions: csr_array
-) -> CornerElimination | None:
+) -> BasisTransformation | None:
     """Return the elimination of equations along the functions of corners, None where they are not of that kind.
 
     Parameters
@@ -139,12 +139,12 @@ def eliminate_corners(
     D = csr_array(beside[:, corners] + csr_array((np.ones(m), (corners, np.arange(m))), shape=(n, m)))
     pivots = np.flatnonzero(np.diff(D.indptr))
     moves, weights = csr_array(D[pivots]), csr_array(-B)
-    coupled, own = (inverse, None) if isinstance(inverse, CoupledPivots) else (None, inverse)
+    coupled, sparse_inverse = (inverse, None) if isinstance(inverse, CoupledPivots) else (None, inverse)
     offset = moves @ (inverse.solve(c) if isinstance(inverse, CoupledPivots) else inverse @ c)
     force_weights = weights
     if force_rows is not None:
         force_weights = csr_array(-force_rows)
         inverse = pivot_order.inverse_of(csr_array(force_rows + force_rows @ beside), corners, size)
-    return CornerElimination(
-        pivots, weights, offset, force_weights, inverse, coupled, own, moves=moves, corners=corners
+    return BasisTransformation(
+        pivots, weights, offset, force_weights, inverse, coupled, sparse_inverse, moves=moves, corners=corners
     )

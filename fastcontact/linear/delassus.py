@@ -54,7 +54,7 @@ def check_rows(count: int, most: int | None = None) -> None:
         )
 
 
-class FlexibilityColumns:
+class InverseColumns:
     """Rows and columns of ``K^-1`` for the degrees of freedom asked for so far.
 
     Parameters
@@ -91,9 +91,9 @@ class FlexibilityColumns:
         """Return ``R K^-1 R.T`` (m, m) [length / force] for sparse rows R (m, n)."""
         check_rows(R.shape[0])
         used = R.data != 0.0
-        place = self._places(R.indices[used])
+        column = self._places(R.indices[used])
         starts = np.concatenate([[0], np.cumsum(used)])[R.indptr]
-        rows = csr_array((R.data[used], place, starts), shape=(R.shape[0], len(self._dofs)))
+        rows = csr_array((R.data[used], column, starts), shape=(R.shape[0], len(self._dofs)))
         return symmetric(np.asarray(rows @ (rows @ self._values).T))
 
     def put_back(self, asked: Sequence[Indices]) -> None:
@@ -138,13 +138,13 @@ class FlexibilityColumns:
         self._values = grown
 
 
-def symmetric(flexibility: Array) -> Array:
+def symmetric(delassus: Array) -> Array:
     """Return the symmetric part of a matrix (m, m)."""
-    return 0.5 * (flexibility + flexibility.T)
+    return 0.5 * (delassus + delassus.T)
 
 
 def multipliers(
-    columns: FlexibilityColumns, B: csr_array, wanted: Array, C: Array | FieldCompliance | None
+    columns: InverseColumns, B: csr_array, wanted: Array, C: Array | FieldCompliance | None
 ) -> Array:  # fmt: skip
     """Return the multipliers (m,) [force] with ``(B K^-1 B.T + C) multiplier = wanted`` (m,) [length].
 
@@ -153,26 +153,26 @@ def multipliers(
     return solve_multipliers(columns.of_rows(B), wanted, C)
 
 
-def solve_multipliers(flexibility: Array, wanted: Array, C: Array | FieldCompliance | None) -> Array:
-    """Return the multipliers (m,) with ``(flexibility + C) multiplier = wanted``; `flexibility` (m, m) is overwritten."""
+def solve_multipliers(delassus: Array, wanted: Array, C: Array | FieldCompliance | None) -> Array:
+    """Return the multipliers (m,) with ``(delassus + C) multiplier = wanted``; `delassus` (m, m) is overwritten."""
     C = C.dense() if isinstance(C, FieldCompliance) else C
     if C is not None and C.ndim == 1:
-        flexibility[np.diag_indices(len(C))] += C
+        delassus[np.diag_indices(len(C))] += C
     elif C is not None:
-        flexibility += C
+        delassus += C
     try:
-        factor = cho_factor(flexibility)
+        factor = cho_factor(delassus)
     except LinAlgError:
-        return _smallest(flexibility, wanted)
-    repeated = factor[0].diagonal() ** 2 <= _round_off(flexibility) * flexibility.diagonal()
-    return _smallest(flexibility, wanted) if repeated.any() else cho_solve(factor, wanted)
+        return _smallest(delassus, wanted)
+    repeated = factor[0].diagonal() ** 2 <= _round_off(delassus) * delassus.diagonal()
+    return _smallest(delassus, wanted) if repeated.any() else cho_solve(factor, wanted)
 
 
-def _smallest(flexibility: Array, wanted: Array) -> Array:
+def _smallest(delassus: Array, wanted: Array) -> Array:
     """Return the minimum-norm multipliers (m,) of linearly dependent rows."""
-    return np.asarray(lstsq(flexibility, wanted, cond=_round_off(flexibility))[0])
+    return np.asarray(lstsq(delassus, wanted, cond=_round_off(delassus))[0])
 
 
-def _round_off(flexibility: Array) -> float:
+def _round_off(delassus: Array) -> float:
     """Return the rounding error of a factorisation (m, m) over its diagonal."""
-    return 10.0 * len(flexibility) * float(np.finfo(float).eps)
+    return 10.0 * len(delassus) * float(np.finfo(float).eps)

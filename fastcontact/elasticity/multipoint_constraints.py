@@ -17,7 +17,7 @@ Row = dict[int, float]
 
 
 @dataclass(frozen=True, eq=False)
-class Relation:
+class MultiPointConstraint:
     """Equations ``rows @ u = value`` between displacement components.
 
     Parameters
@@ -39,13 +39,13 @@ class Relation:
 
 
 @dataclass(frozen=True, eq=False)
-class TemporaryRelation(Relation):
+class TemporaryConstraint(MultiPointConstraint):
     """A relation of the load steps between two instants, from the values that it finds when it begins.
 
     Parameters
     ----------
     name, ramp
-        As in `Relation`.
+        As in `MultiPointConstraint`.
     rows : csr_array (m, n_dofs)
         Coefficients [unit of the caller].
     value : float or ndarray (m,)
@@ -65,14 +65,14 @@ class TemporaryRelation(Relation):
         """Return whether it holds in the load step that begins at an instant."""
         return self.begins <= begin < self.ends
 
-    def after(self, reached: Array) -> list[Relation]:
+    def after(self, reached: Array) -> list[MultiPointConstraint]:
         """Return the relations that follow on ``rows @ u``, `reached` (m,) [length] where it begins."""
         if self.keeps:
-            return [Relation(self.name, self.rows, reached, ((0.0, 1.0),))]
+            return [MultiPointConstraint(self.name, self.rows, reached, ((0.0, 1.0),))]
         value, table = np.broadcast_to(self.value, reached.shape), self.ramp or ()
         later = [[(t, v * factor) for t, factor in table if t > self.begins] for v in value.tolist()]
         return [
-            Relation(self.name, self.rows[[row]], 1.0, ((self.begins, start), *points))
+            MultiPointConstraint(self.name, self.rows[[row]], 1.0, ((self.begins, start), *points))
             for row, (start, points) in enumerate(zip(reached.tolist(), later, strict=True))
         ]
 
@@ -103,7 +103,7 @@ class Elimination:
     origin: Indices
 
 
-def stacked_rows(relations: Sequence[Relation], n_dofs: int) -> csr_array:
+def stacked_rows(relations: Sequence[MultiPointConstraint], n_dofs: int) -> csr_array:
     """Return the rows of all relations as one matrix R (m, n_dofs) [unit of the rows]."""
     if not relations:
         return csr_array((0, n_dofs))
@@ -150,8 +150,8 @@ def _substituted(R: csr_array, k: int, expressed: dict[int, Row]) -> Row:
     """Return row `k` of R with pivots replaced by their expressions."""
     row: Row = {}
     size = 0.0
-    for place in range(R.indptr[k], R.indptr[k + 1]):
-        key, c = int(R.indices[place]), float(R.data[place])
+    for entry in range(R.indptr[k], R.indptr[k + 1]):
+        key, c = int(R.indices[entry]), float(R.data[entry])
         size = max(size, abs(c))
         for other, d in expressed.get(key, {key: 1.0}).items():
             row[other] = row.get(other, 0.0) + c * d
@@ -180,11 +180,11 @@ def _matrices(expressed: dict[int, Row], n: int, m: int) -> tuple[csr_array, csr
     rows = np.array([entry[0] for entry in entries], np.intp)
     columns = np.array([entry[1] for entry in entries], np.intp)
     values = np.array([entry[2] for entry in entries], np.float64)
-    own = columns < n
+    free = columns < n
     T = csr_array(
-        (np.r_[np.ones(len(kept)), values[own]], (np.r_[kept, rows[own]], np.r_[kept, columns[own]])), shape=(n, n)
+        (np.r_[np.ones(len(kept)), values[free]], (np.r_[kept, rows[free]], np.r_[kept, columns[free]])), shape=(n, n)
     )
-    S = csr_array((values[~own], (rows[~own], columns[~own] - n)), shape=(n, m))
+    S = csr_array((values[~free], (rows[~free], columns[~free] - n)), shape=(n, m))
     return T, S
 
 

@@ -34,7 +34,7 @@ WORTH_A_STEP = 1e-10
 MAX_POSITIONS = 100
 # Lengths tried along one step.
 TRIALS = 20
-# A step that leaves more than this part of the elongations meets nothing yet; the next length is so many times as long.
+# A step that leaves more than this part of the elongations meets no resistance yet; the next one is longer by a factor.
 UNCHANGED = 0.9
 FARTHER = 10.0
 # A motion that resists less than this fraction of its spring does not resist.
@@ -69,7 +69,7 @@ class RigidPosition:
     derivative: Array | None = None
 
 
-class UnsupportedBodies:
+class FloatingBodies:
     """Springs on the free motions of a system.
 
     Parameters
@@ -111,29 +111,29 @@ class UnsupportedBodies:
         for dof in self.dofs:
             row, component = divmod(int(dof), size)
             first, end = matrix.indptr[row], matrix.indptr[row + 1]
-            place = first + int(np.flatnonzero(matrix.indices[first:end] == row)[0])
-            data[place, component, component] += self.stiffness
+            slot = first + int(np.flatnonzero(matrix.indices[first:end] == row)[0])
+            data[slot, component, component] += self.stiffness
         return bsr_array((data, matrix.indices, matrix.indptr), shape=matrix.shape)
 
     def rigid(self, position: Array) -> Array:
         """Return the displacements (n_dofs,) of the rigid position (k,)."""
         return np.asarray(self.motions.displacement @ position)
 
-    def report(self, found: RigidPosition, load: float) -> dict[str, Any]:
+    def report(self, rigid: RigidPosition, load: float) -> dict[str, Any]:
         """Return a report of the regularisation, as plain numbers and strings.
 
         Keys: ``motions``, names of the free motions; ``springs``, their places; ``spring_stiffness`` [force / length];
         ``force_left``, what each spring still carries [force]; ``relative_to_load``, the largest over the load;
         ``positions``, rigid positions tried.
         """
-        left = np.abs(found.spring_force)
+        left = np.abs(rigid.spring_force)
         return {
             "motions": self.names,
             "springs": self._places,
             "spring_stiffness": self.stiffness,
             "force_left": left.tolist(),
             "relative_to_load": float(left.max() / load) if load else 0.0,
-            "positions": found.positions,
+            "positions": rigid.positions,
         }
 
     def _owner(self, motions: FreeMotions, dof: int, weightless: Mask) -> str:
@@ -143,9 +143,9 @@ class UnsupportedBodies:
         column = int(np.argmax(np.abs(motions.displacement[dof])))
         return motions.labels[int(np.argmax(np.abs(motions.parts[:, column])))][0]
 
-    def moving(self, found: RigidPosition) -> list[str]:
+    def moving(self, rigid: RigidPosition) -> list[str]:
         """Return the names of the free motions that the springs still resist most."""
-        work = np.abs(self._at_springs.T @ found.spring_force)
+        work = np.abs(self._at_springs.T @ rigid.spring_force)
         return [name for name, w in zip(self.names, work, strict=True) if w > 0.1 * work.max()]
 
     def settle(
@@ -260,12 +260,12 @@ class _Search:
             there = float(elongation @ step)
             if there < -0.5 * abs(slope):
                 high = length, there
-                part = min(max(low[1] / (low[1] - there), 0.1), 0.9) if low[1] > there else 0.5
+                fraction = min(max(low[1] / (low[1] - there), 0.1), 0.9) if low[1] > there else 0.5
             elif there <= (UNCHANGED if high is None else 0.5) * slope or not (farther or high):
                 break
             else:
-                low, part = (length, there), 0.5
-            length = FARTHER * length if high is None else low[0] + part * (high[0] - low[0])
+                low, fraction = (length, there), 0.5
+            length = FARTHER * length if high is None else low[0] + fraction * (high[0] - low[0])
         self.position, self.state, self.elongation = position, state, elongation
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
+from fastcontact.analysis.floating_bodies import TRIALS, FloatingBodies, _Search
 from fastcontact.analysis.solution import Equilibrium
-from fastcontact.analysis.unsupported_bodies import TRIALS, UnsupportedBodies, _Search
 
 DOFS = np.array([0])
 
@@ -36,7 +36,7 @@ def test_position_and_state_belong_together_when_no_length_will_do():
 
 def test_the_contact_problem_that_fails_is_the_one_returned():
     """A probe that does not settle is no sign that contact does not hold the body."""
-    bodies = UnsupportedBodies.__new__(UnsupportedBodies)
+    bodies = FloatingBodies.__new__(FloatingBodies)
     bodies.dofs, bodies.stiffness = DOFS, 1.0
     calls = []
 
@@ -82,7 +82,7 @@ def test_what_nothing_resists_goes_as_far_as_something_does():
 
 def three_springs():
     """Return bodies with three springs, and a smooth problem of theirs: elongations (3,) by the position, and its calls."""
-    bodies = UnsupportedBodies.__new__(UnsupportedBodies)
+    bodies = FloatingBodies.__new__(FloatingBodies)
     bodies.dofs, bodies.stiffness = np.arange(3), 1.0
     matrix = np.array([[2.0, 0.5, 0.0], [0.5, 1.0, 0.2], [0.0, 0.2, 0.7]])
     calls = []
@@ -170,7 +170,7 @@ def test_plates_that_lie_loose_on_each_other_cost_few_solutions(friction, linear
 @pytest.mark.parametrize("force", [0.0, 1e5])
 def test_slack_is_in_units_of_the_contact_forces(force):
     """Where motions drive the bodies there is no load: what round-off leaves is compared with what presses on them."""
-    bodies = UnsupportedBodies.__new__(UnsupportedBodies)
+    bodies = FloatingBodies.__new__(FloatingBodies)
     bodies.dofs, bodies.stiffness = DOFS, 1.0
 
     def solve_at(position):

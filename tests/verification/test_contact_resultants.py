@@ -35,7 +35,7 @@ def test_a_uniform_pressure(element, kinematics):
     pressed(model, 0.01)
     model.fix("TOP", "x")
     steps = fc.solve(model, 2)
-    first, last = fc.contact_answers(model, steps, "plane")
+    first, last = fc.contact_resultants(model, steps, "plane")
     area = 4.0 * np.pi if kinematics == "axisymmetric" else 2.0
     assert last.area == pytest.approx(area, rel=1e-12)
     assert last.force == pytest.approx([0.0, E * 0.01 / HEIGHT * area], rel=1e-9, abs=1e-9)
@@ -85,7 +85,7 @@ def test_a_punch_off_the_middle_has_a_moment():
     model.fix("BOTTOM_LEFT", "x")
     model.add_traction("TOP", y=lambda x: -(1.0 + 0.6 * (x[:, 0] - 1.0)))  # moment about the middle 0.6 * 2 / 3
     (step,) = fc.solve(model, 1)
-    (found,) = fc.contact_answers(model, [step], "plane")
+    (found,) = fc.contact_resultants(model, [step], "plane")
     assert found.force[1] == pytest.approx(2.0, rel=1e-9)
     assert fc.contact_moment(step.contact["plane"], (1.0, 0.0)) == pytest.approx([0.4], rel=1e-8)
     assert found.centre[0] == pytest.approx(1.2, rel=1e-9)
@@ -103,7 +103,7 @@ def test_in_space_the_moment_has_three_components():
     model.fix("BOTH", "y")
     model.add_traction("ZMAX", z=lambda x: -(1.0 + 0.3 * (x[:, 0] - 1.0) - 0.6 * (x[:, 1] - 1.0)))
     (step,) = fc.solve(model, 1)
-    (found,) = fc.contact_answers(model, [step], "plane")
+    (found,) = fc.contact_resultants(model, [step], "plane")
     assert found.area == pytest.approx(4.0, rel=1e-9)
     assert found.force == pytest.approx([0.0, 0.0, 4.0], abs=1e-9)
     assert fc.contact_moment(step.contact["plane"], (1.0, 1.0, 0.0)) == pytest.approx([-0.8, -0.4, 0.0], abs=1e-9)
@@ -118,7 +118,7 @@ def test_the_area_of_hertz_lies_between_the_brackets_of_the_radius():
     case.prescribe("A1B1", y=2.0)
     case.add_contact("hertz", secondary="CONT1", primary="CONT2")
     steps = fc.solve(case, 4)
-    for step, found in zip(steps, fc.contact_answers(case, steps, "hertz"), strict=True):
+    for step, found in zip(steps, fc.contact_resultants(case, steps, "hertz"), strict=True):
         low, high = step.contact["hertz"].radius
         assert np.pi * low**2 < found.area < np.pi * high**2 * 1.02
         assert found.moment == pytest.approx(0.0)
@@ -184,7 +184,7 @@ def test_with_friction_the_volume_of_wear_is_the_work_over_the_coefficient(eleme
     model.prescribe("TOP", x=0.05, ramp=RAMP_ALONG)
     steps = fc.solve(model, [1.0, 3.0, 5.0, 7.0, 9.0])
     depth = fc.wear(model, steps, "plane", WEAR)
-    answers = fc.contact_answers(model, steps, "plane")
+    answers = fc.contact_resultants(model, steps, "plane")
     assert answers[-1].friction_work == pytest.approx(sum(a.dissipation for a in answers))
     contact = steps[-1].contact["plane"]
     assert contact.active.sum() > 6
@@ -214,7 +214,7 @@ def test_history_is_a_table_and_the_summary_tells(tmp_path, root):
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (lambda m, s: fc.contact_answers(m, s, "plan"), "unknown contact pair 'plan': did you mean 'plane'"),
+        (lambda m, s: fc.contact_resultants(m, s, "plan"), "unknown contact pair 'plan': did you mean 'plane'"),
         (lambda m, s: fc.wear(m, s, "plane", -1.0), "coefficient of wear -1.0 must be"),
         (lambda m, s: fc.contact_moment(s[0].contact["plane"], (0.0, 0.0, 0.0)), "needs a place of the space"),
     ],

@@ -36,17 +36,17 @@ def contact_moment(contact: ContactResult, about: ArrayLike | None = None) -> Ar
         In the plane about z, in space about x, y and z [force times length]. In axisymmetry no moment is left over the
         circle, and this one means nothing.
     """
-    place = contact.middle if about is None else np.asarray(about, float)
-    if place.shape != (contact.coordinates.shape[1],) or not np.isfinite(place).all():
+    centre = contact.middle if about is None else np.asarray(about, float)
+    if centre.shape != (contact.coordinates.shape[1],) or not np.isfinite(centre).all():
         raise ContactError(f"the moment of contact '{contact.name}' about {about!r} needs a place of the space")
-    arm, force = contact.coordinates - place, contact.force_vectors
+    arm, force = contact.coordinates - centre, contact.force_vectors
     if arm.shape[1] == 2:
         return np.array([float((arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]).sum())])
     return np.asarray(np.cross(arm, force).sum(axis=0))
 
 
 @dataclass(frozen=True, eq=False)
-class ContactAnswers:
+class ContactResultants:
     """Contact summary of one pair in one load step.
 
     Attributes
@@ -88,7 +88,7 @@ class ContactAnswers:
 
 
 @typed(ContactError)
-def contact_answers(model: Model, steps: Iterable[StepResult], name: str) -> list[ContactAnswers]:
+def contact_resultants(model: Model, steps: Iterable[StepResult], name: str) -> list[ContactResultants]:
     """Return the contact summary of a pair in each load step.
 
     Parameters
@@ -102,17 +102,17 @@ def contact_answers(model: Model, steps: Iterable[StepResult], name: str) -> lis
     ContactError if the model has no such pair.
     """
     pair = _bound(model, name)
-    areas, work, found = lumped_areas(pair.secondary, pair.points, pair.axisymmetric), 0.0, []
+    areas, work, resultants = lumped_areas(pair.secondary, pair.points, pair.axisymmetric), 0.0, []
     for step in steps:
         contact = _of_pair(pair, step, name)
         if model.strain == "finite":
             areas = lumped_areas(pair.secondary, pair.points + step.displacement, pair.axisymmetric)
         work += contact.dissipation
-        found.append(_answers(contact, areas, pair.axisymmetric, work))
-    return found
+        resultants.append(_resultants(contact, areas, pair.axisymmetric, work))
+    return resultants
 
 
-def _answers(contact: ContactResult, areas: Array, axisymmetric: bool, work: float) -> ContactAnswers:
+def _resultants(contact: ContactResult, areas: Array, axisymmetric: bool, work: float) -> ContactResultants:
     closed, facing = contact.active, np.isfinite(contact.gap)
     normal = np.where(np.isfinite(contact.normal), contact.normal, 0.0)
     pushed = np.einsum("nd,nd->n", contact.force_vectors, normal)
@@ -122,7 +122,7 @@ def _answers(contact: ContactResult, areas: Array, axisymmetric: bool, work: flo
     centre = pushed @ contact.coordinates / total if pressed else np.full(contact.coordinates.shape[1], np.nan)
     if axisymmetric:
         centre[0] = np.nan
-    return ContactAnswers(
+    return ContactResultants(
         force=contact.force,
         normal_force=contact.normal_force,
         moment=np.zeros_like(moment) if axisymmetric else moment,
@@ -138,7 +138,7 @@ def _answers(contact: ContactResult, areas: Array, axisymmetric: bool, work: flo
 
 @typed(ContactError)
 def contact_history(model: Model, steps: Sequence[StepResult], name: str) -> NDArray[np.void]:
-    """Return `contact_answers` as a table, one row for each load step, for `write_csv` and pandas.
+    """Return `contact_resultants` as a table, one row for each load step, for `write_csv` and pandas.
 
     Returns
     -------
@@ -146,13 +146,13 @@ def contact_history(model: Model, steps: Sequence[StepResult], name: str) -> NDA
         ``step``, ``load_factor``; ``force_x`` ...; ``moment_z``, in space ``moment_x`` ...; ``area``; ``centre_x`` ...;
         ``normal_force``, ``mean_gap``, ``pressure_mean``, ``pressure_max``, ``dissipation``, ``friction_work``.
     """
-    answers = contact_answers(model, steps, name)
+    answers = contact_resultants(model, steps, name)
     axes = "xyz"[: model.mesh.dim]
     turns = "z" if model.mesh.dim == 2 else axes
     rows = [
-        (step.index, step.load_factor, *own.force, *own.moment, own.area, *own.centre, own.normal_force, own.mean_gap,
-         own.pressure_mean, own.pressure_max, own.dissipation, own.friction_work)
-        for step, own in zip(steps, answers, strict=True)
+        (step.index, step.load_factor, *r.force, *r.moment, r.area, *r.centre, r.normal_force, r.mean_gap,
+         r.pressure_mean, r.pressure_max, r.dissipation, r.friction_work)
+        for step, r in zip(steps, answers, strict=True)
     ]  # fmt: skip
     names = [
         "load_factor", *(f"force_{axis}" for axis in axes), *(f"moment_{axis}" for axis in turns), "area",
@@ -197,7 +197,7 @@ def wear(model: Model, steps: Iterable[StepResult], name: str, coefficient: floa
     if not (np.isfinite(coefficient) and coefficient >= 0.0):
         raise ContactError(f"the coefficient of wear {coefficient} must be a number, zero or more")
     pair = _bound(model, name)
-    depth, found = np.zeros(len(pair.secondary.points)), []
+    depth, depths = np.zeros(len(pair.secondary.points)), []
     before: StepResult | None = None
     for number, step in enumerate(steps, 1):
         _of_pair(pair, step, name)
@@ -208,32 +208,36 @@ def wear(model: Model, steps: Iterable[StepResult], name: str, coefficient: floa
             )
         pressure = 0.0 if before is None else before.contact[name].pressure
         depth = depth + worn_in_step(pair, _end_of(before, step, name), step.contact[name], pressure, coefficient)
-        found.append(depth)
+        depths.append(depth)
         before = step
-    return np.array(found).reshape(len(found), len(depth))
+    return np.array(depths).reshape(len(depths), len(depth))
 
 
 def _end_of(before: StepResult | None, step: StepResult, name: str) -> Configuration:
     """Return the configuration of a contact pair at the end of a step."""
     dim = step.displacement.shape[1]
     start = np.zeros_like(step.displacement) if before is None else before.displacement
-    pairs = [None if own is None else own.contact[name] for own in (step, before)]
+    pairs = [None if end is None else end.contact[name] for end in (step, before)]
     now, then = (
-        np.zeros(dim) if own is None or own.obstacle_displacement is None else np.asarray(own.obstacle_displacement)
-        for own in pairs
+        np.zeros(dim) if end is None or end.obstacle_displacement is None else np.asarray(end.obstacle_displacement)
+        for end in pairs
     )
-    angles = [0.0 if own is None else own.obstacle_angle or 0.0 for own in pairs]
+    angles = [0.0 if end is None else end.obstacle_angle or 0.0 for end in pairs]
     return Configuration(step.displacement, start, now, then, angle=angles[0], angle_start=angles[1])
 
 
 def _of_pair(pair: Formulation, step: StepResult, name: str) -> ContactResult:
     """Return the result of a contact pair in a step; ContactError if that is of another model."""
-    found = step.contact.get(name)
-    if found is None or len(step.displacement) != len(pair.points) or len(found.points) != len(pair.secondary.points):
+    contact = step.contact.get(name)
+    if (
+        contact is None
+        or len(step.displacement) != len(pair.points)
+        or len(contact.points) != len(pair.secondary.points)
+    ):
         raise ContactError(
             f"load step {step.index} is of another model: it has no such contact pair '{name}' on this mesh"
         )
-    return found
+    return contact
 
 
 def _bound(model: Model, name: str) -> Formulation:

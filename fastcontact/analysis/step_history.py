@@ -20,7 +20,7 @@ from fastcontact.contact.cohesive_layer import Layer
 from fastcontact.results.step import ContactResult
 
 
-def keep_contact(problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State) -> State:
+def save_contact_history(problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State) -> State:
     """Return the state at the end of a step with its contact.
 
     Parameters
@@ -53,7 +53,7 @@ def keep_path(
     displacement, told, works = problem.displacement(end.u), dict(results), np.zeros(3)
     worn, slipped, forces = dict(start.worn), dict(start.slipped), dict(start.forces)
     for name, rows in settled.constraints.rows().items():
-        pair, contact, part = problem.pairs[name], results[name], settled.constraints.parts[name]
+        pair, contact, constraints = problem.pairs[name], results[name], settled.constraints.parts[name]
         at = problem.configuration(name, start, load, displacement, end.u)
         slip = slip_in_step(pair, at, contact)
         slipped[name] = slip + start.slipped.get(name, 0.0)
@@ -65,12 +65,12 @@ def keep_path(
         if name in end.bonds:
             told[name] = replace(told[name], damage=end.bonds[name].at(contact.coordinates)[1])
         elif not (pair.options.tied or pair.options.gap_only):
-            given = part, settled.solution, rows, at, contact, start.forces.get(name)
-            forces[name], found = contact_work(pair, *given)
-            told[name] = replace(told[name], dissipation=found[0])
-            works += found
-    stored = sum(own.stored for own in forces.values()) + sum(own.stored for own in end.bonds.values())
-    released = sum(own.released for own in end.bonds.values())
+            given = constraints, settled.solution, rows, at, contact, start.forces.get(name)
+            forces[name], work_of_pair = contact_work(pair, *given)
+            told[name] = replace(told[name], dissipation=work_of_pair[0])
+            works += work_of_pair
+    stored = sum(entry.stored for entry in forces.values()) + sum(entry.stored for entry in end.bonds.values())
+    released = sum(entry.released for entry in end.bonds.values())
     work = None if start.work is None else start.work.after(energy, stored, works.tolist(), released)
     return replace(end, worn=worn, slipped=slipped, forces=forces, work=work), told
 
@@ -92,26 +92,26 @@ def first_contacts(problem: Problem, start: State, load: StepLoad, u: Array) -> 
 
 def never_opening(problem: Problem, start: State, settled: SettledContact) -> dict[str, tuple[Array, Mask]]:
     """Return, for pairs without separation, the positions of their constraints and which of them have closed."""
-    found = dict(start.never_opening)
+    positions = dict(start.never_opening)
     for name, rows in settled.constraints.rows().items():
         if problem.pairs[name].options.kind == "bilateral_once_closed":
-            part, closed = settled.constraints.parts[name], settled.solution.active[rows].copy()
-            if part.equality is not None:  # what stands beside the other side now may come back to it
-                closed |= part.equality
-            found[name] = part.positions, closed
-    return found
+            constraints, closed = settled.constraints.parts[name], settled.solution.active[rows].copy()
+            if constraints.equality is not None:  # what stands beside the other side now may come back to it
+                closed |= constraints.equality
+            positions[name] = constraints.positions, closed
+    return positions
 
 
 def tractions(problem: Problem, settled: SettledContact) -> dict[str, tuple[Array, Array]]:
     """Return, for pairs with a tangential penalty, the positions of their constraints and the tangential tractions there."""
-    found = {}
+    tractions_of_pairs = {}
     for name, rows in settled.constraints.rows().items():
-        part, solution = settled.constraints.parts[name], settled.solution
+        constraints, solution = settled.constraints.parts[name], settled.solution
         if problem.pairs[name].options.tangential_penalty is not None and isinstance(solution, FrictionalEquilibrium):
-            assert part.areas is not None
-            forces = np.einsum("nk,ndk->nd", solution.tangential[rows], np.stack(part.directions, axis=2))
-            found[name] = part.positions, forces / part.areas[:, None]
-    return found
+            assert constraints.areas is not None
+            forces = np.einsum("nk,ndk->nd", solution.tangential[rows], np.stack(constraints.directions, axis=2))
+            tractions_of_pairs[name] = constraints.positions, forces / constraints.areas[:, None]
+    return tractions_of_pairs
 
 
 def bonds(settled: SettledContact, u: Array) -> dict[str, Bond]:
