@@ -26,11 +26,12 @@ from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.elasticity.multipoint_constraints import stacked_rows
 from fastcontact.elasticity.springs import stiffened
 from fastcontact.elasticity.stiffness import stiffness
-from fastcontact.errors import FileError, ModelError
+from fastcontact.errors import ModelError
 from fastcontact.linear import choice
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.html_table import html_table
 from fastcontact.model.model import Model
+from fastcontact.results.conversions import data_frame
 from fastcontact.results.step import StepResult
 
 if TYPE_CHECKING:
@@ -108,12 +109,8 @@ class Modes(Sequence[StepResult]):
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return frequencies and effective masses as a ``pandas.DataFrame``; FileError if pandas is not installed."""
-        try:
-            import pandas
-        except ImportError as error:
-            raise FileError("to_pandas needs pandas: pip install pandas") from error
         data = np.column_stack([np.arange(1, len(self) + 1), self.frequencies, self.effective_mass])
-        return pandas.DataFrame(data, columns=list(self._columns)).astype({"mode": int})
+        return data_frame(data, {}, self._columns).astype({"mode": int})
 
 
 @typed(ModelError)

@@ -82,7 +82,7 @@ def _animate(options: argparse.Namespace, results: Any, case: dict[str, Any]) ->
 
     plot.animate(
         results.mesh, list(results), options.animate, field=options.field, scale=options.scale,
-        mirrored=options.mirrored, title=case["title"], units=case["units"],
+        mirrored=options.mirrored, title=case["title"],
     )  # fmt: skip
 
 
@@ -94,13 +94,7 @@ def _of_bodies(
 
     at = f"section {options.section}, " if plane else ""
     title = f"{case['title']}\n{at}load factor {step.load_factor:g}, displacements x {options.scale:g}".strip()
-    labels = {
-        "field": options.field,
-        "scale": options.scale,
-        "zoom": options.zoom,
-        "title": title,
-        "units": case["units"],
-    }
+    labels = {"field": options.field, "scale": options.scale, "zoom": options.zoom, "title": title}
     if plane is None:
         return plot.deformed_shape(results.mesh, step, mirrored=options.mirrored, **labels)
     point, normal = [0.0] * 3, [0.0] * 3
@@ -112,7 +106,7 @@ def _of_contact(options: argparse.Namespace, results: Any, step: Any, case: dict
     """Draw of one contact pair its map, its zones or history over the load, or the stresses under it."""
     from fastcontact.results import plot
 
-    labels = {"title": case["title"], "units": case["units"]}
+    labels = {"title": case["title"]}
     name = _results.chosen_contact(step, options.contact)
     hint = _results.other_contacts(step, name, options.contact)
     if hint and not options.quiet:
