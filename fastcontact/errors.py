@@ -6,7 +6,8 @@ import difflib
 import os
 import sys
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 
@@ -69,6 +70,17 @@ class FastcontactWarning(UserWarning):
 
     def __str__(self) -> str:
         return printable(super().__str__())
+
+
+@contextmanager
+def in_file(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Name a file at the beginning of the package's errors that do not."""
+    try:
+        yield
+    except FastcontactError as error:
+        if isinstance(error, ConvergenceError) or str(path) in str(error):
+            raise
+        raise type(error)(f"{path}: {error}") from error
 
 
 def warn(text: str) -> None:

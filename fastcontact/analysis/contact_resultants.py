@@ -15,6 +15,7 @@ from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.integration import lumped_areas
 from fastcontact.errors import ContactError, unknown
 from fastcontact.mesh.argument_types import typed
+from fastcontact.mesh.html_table import fields_table
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
 
@@ -62,8 +63,8 @@ class ContactResultants:
         times the unit of thickness, in axisymmetry that of the full circle [length^2]. Off by less than a row of facets at
         the edge.
     centre : ndarray (dim,)
-        Centre of pressure, of the normal forces of this model; NaN without any [length]. In axisymmetry its radius means
-        nothing.
+        Centre of pressure, of the normal forces of this model; NaN without any [length]. In axisymmetry it lies on the axis,
+        and NaN stands for the mean radius of the forces, which is no centre.
     mean_gap : float
         Mean over the area that faces the other side [length]; NaN where none does.
     pressure_mean, pressure_max : float
@@ -82,6 +83,8 @@ class ContactResultants:
     pressure_max: float
     dissipation: float
     friction_work: float
+
+    _repr_html_ = fields_table
 
 
 @typed(ContactError)
@@ -116,12 +119,15 @@ def _resultants(contact: ContactResult, areas: Array, axisymmetric: bool, work: 
     total, area = float(pushed.sum()), float(areas[closed].sum())
     pressed = bool(total > 0.0)
     moment = contact_moment(contact)
+    centre = pushed @ contact.coordinates / total if pressed else np.full(contact.coordinates.shape[1], np.nan)
+    if axisymmetric:
+        centre[0] = np.nan
     return ContactResultants(
         force=contact.force,
         normal_force=contact.normal_force,
         moment=np.zeros_like(moment) if axisymmetric else moment,
         area=area,
-        centre=pushed @ contact.coordinates / total if pressed else np.full(contact.coordinates.shape[1], np.nan),
+        centre=centre,
         mean_gap=float(areas[facing] @ contact.gap[facing] / areas[facing].sum()) if facing.any() else float("nan"),
         pressure_mean=total / area if area else 0.0,
         pressure_max=contact.pressure_max,

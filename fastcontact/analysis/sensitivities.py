@@ -24,6 +24,7 @@ from fastcontact.analysis.sensitivity.settled_step import checked_margin, settle
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 from fastcontact.mesh.argument_types import typed
+from fastcontact.mesh.html_table import fields_table
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import RampLike, ramp_of
 from fastcontact.results.step import StepResult
@@ -53,6 +54,8 @@ class Sensitivities:
     derivatives: dict[tuple[str | int, ...], float]
     margin: float
     solutions: int
+
+    _repr_html_ = fields_table
 
 
 @typed(ModelError)

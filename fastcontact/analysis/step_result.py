@@ -20,6 +20,7 @@ from fastcontact.model.pretension import section_results
 from fastcontact.model.ramp import multiplier
 from fastcontact.results.material_stress import by_largest_von_mises
 from fastcontact.results.step import ContactResult, StepResult
+from fastcontact.results.units import units_of_results
 
 
 def recover(
@@ -63,12 +64,12 @@ def recover(
     else:
         at_places = recovery.averaged_stress(bodies.stress, problem.sides)
     stress, by_material = by_largest_von_mises(problem.sides, problem.material_of_cells, at_places, mesh.n_points)
-    von_mises = recovery.von_mises(stress)
+    von_mises, named = recovery.von_mises(stress), problem.model.units
     return StepResult(
         *instant, u.copy(), stress, von_mises, recovery.von_mises_signed(stress, von_mises), reaction.reshape(-1, mesh.dim),
         contact, iterations, material_stress=by_material,
         cell_fields={} if bodies is None or problem.bodies is None else problem.bodies.cell_fields(bodies, u),
-        temperature=heat,
+        temperature=heat, units=named and units_of_results(named, problem.model.kinematics),
     )  # fmt: skip
 
 

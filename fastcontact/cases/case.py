@@ -14,7 +14,7 @@ from fastcontact.cases.input_files import files_named
 from fastcontact.cases.keys import NUMBER, RAMP, SENSITIVITY, TOP, at, called, check_keys, check_settings, tables
 from fastcontact.cases.model_tables import LISTS, build_model, points
 from fastcontact.cases.shipped import case_path, shipped_cases
-from fastcontact.errors import CaseError, FastcontactError, unknown
+from fastcontact.errors import CaseError, in_file, unknown
 from fastcontact.linear.choice import check_tolerance
 from fastcontact.mesh import generate
 from fastcontact.mesh.files import toml_text
@@ -24,7 +24,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, linear_ramp
 from fastcontact.results.step import StepResult
-from fastcontact.results.units import known_units, units_of_results
+from fastcontact.results.units import known_units
 
 if TYPE_CHECKING:
     from fastcontact.cases.decks.deck import Deck
@@ -108,9 +108,8 @@ def read_case(path: str | Path) -> Case:
         return _case_of_deck(path)
     text, data = _parsed(path)
     try:
-        return build_case(data, name=path.stem, folder=path.parent, text=text)
-    except FastcontactError as error:
-        raise type(error)(f"{path}: {error}") from error
+        with in_file(path):
+            return build_case(data, name=path.stem, folder=path.parent, text=text)
     except (ArithmeticError, AttributeError, LookupError, MemoryError, RecursionError, TypeError, ValueError) as error:
         # A value that passed all checks by key: Python's own message is all there is.
         reason = " ".join(str(error).split())[:200] or type(error).__name__
@@ -220,7 +219,7 @@ def build_case(
         probes=probes,
         theories=theories,
         checks=_checks(data, probes, pairs, theories),
-        units=known_units(data.get("units", {})),
+        units=known_units(model.units),
         approach=approach,
         folder=Path(folder).resolve(),
         sensitivities=_sensitivities(model, data),
@@ -254,10 +253,10 @@ def _checks(
 
 
 def _sensitivities(model: Model, data: dict[str, Any]) -> list[tuple[Asked, list[Asked]]]:
-    from fastcontact.analysis.sensitivities import check_asked  # half of the solver
-
-    asked_for = []
-    for i, entry in enumerate(tables("sensitivity", data.get("sensitivity", []))):
+    asked_for, entries = [], list(tables("sensitivity", data.get("sensitivity", [])))
+    if entries:
+        from fastcontact.analysis.sensitivities import check_asked  # half of the solver
+    for i, entry in enumerate(entries):
         where = f"sensitivity[{i}]"
         check_keys(where, entry, SENSITIVITY)
         for key in SENSITIVITY:
@@ -358,14 +357,13 @@ def _theory(where: str, data: dict[str, Any]) -> Any:
 
 
 def described(data: dict[str, Any]) -> dict[str, Any]:
-    """Return title, units of results, theories, approach and the table of the ramp of a case, as `Case` holds them.
+    """Return title, theories, approach and the table of the ramp of a case, as `Case` holds them.
 
     `data` is the parsed text kept in a result file; it may be empty.
     """
     theories, approach = _theories(data)
     return {
         "title": data.get("title", ""),
-        "units": units_of_results(data.get("units", {}), str(data.get("kinematics", ""))),
         "theories": theories,
         "approach": approach,
         "ramp": _ramp(data.get("ramp", {})).table,

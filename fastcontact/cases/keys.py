@@ -51,9 +51,8 @@ TOP: dict[str, Any] = {
     "strain": str,
     "reference_temperature": NUMBER,
     "contact": (dict, str),
-    **dict.fromkeys(
-        ("units", "mesh", "contacts", "obstacle", "ramp", "solve", "probes", "theory", "study", "modes"), dict
-    ),
+    "units": (dict, str),
+    **dict.fromkeys(("mesh", "contacts", "obstacle", "ramp", "solve", "probes", "theory", "study", "modes"), dict),
     **dict.fromkeys(("check", "sensitivity"), list),
 }
 
@@ -77,7 +76,8 @@ def check_keys(where: str, data: Any, known: Mapping[str, Any]) -> None:
 def check_settings(data: Mapping[str, Any]) -> None:
     """Raise CaseError if a key of a table of settings, such as ``[study]``, is unknown, or a value not of its type."""
     for key, known in (("study", STUDY), ("units", UNITS), ("solve", SOLVE), ("modes", MODES)):
-        check_keys(key, data.get(key, {}), known)
+        if not (key == "units" and isinstance(data.get(key), str)):
+            check_keys(key, data.get(key, {}), known)
     if data.get("modes", {}).get("n", 1) < 1:
         raise CaseError(f"modes.n = {data['modes']['n']}: ask for one mode or more")
     for key, (kind, form) in STUDY_ENTRIES.items():

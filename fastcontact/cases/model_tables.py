@@ -219,8 +219,8 @@ def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Mo
         case_text=text,
         strain=data.get("strain", "small"),
         reference_temperature=float(data.get("reference_temperature", 0.0)),
+        units=data.get("units", {}),
     )
-    model.units = dict(data.get("units", {}))
     _add_lists(model, data, folder, _ADD)
     _add_contacts(model, data)
     for name, entry in data.get("obstacle", {}).items():

@@ -107,16 +107,14 @@ def profile_picture(case: Any, step: StepResult, path: str) -> None:
     name, contact = next(iter(step.contact.items()))
     given = {"approach": case.approach.get(name), "load": load_multiplier(case.ramp.table, step)}
     curves = pressure_curves(case.theories.get(name, {}), contact, **given)
-    draw_profile(contact, step, curves, path, case.title, case.units)
+    draw_profile(contact, step, curves, path, case.title)
 
 
-def draw_profile(
-    contact: ContactResult, step: StepResult, theories: dict[str, Any], path: str, title: str, units: Any
-) -> None:
+def draw_profile(contact: ContactResult, step: StepResult, theories: dict[str, Any], path: str, title: str) -> None:
     """Plot the pressure of a contact pair with theories by legend."""
     from fastcontact.results import plot
     from fastcontact.results.tables import normal_stress
 
     stress = normal_stress(contact, step)
     title = f"{title}\nload factor {step.load_factor:g}"
-    save(plot.pressure_profile(contact, other_theories=theories, stress=stress, title=title, units=units), path)
+    save(plot.pressure_profile(contact, other_theories=theories, stress=stress, title=title), path)

@@ -49,7 +49,7 @@ def other_contacts(step: Any, name: str, asked: str | None) -> str:
 
 
 def case_data(results: Any) -> dict[str, Any]:
-    """Return title, units, theories, approaches and ramp of the case text kept in the file; empty without one."""
+    """Return title, theories, approaches and ramp of the case text kept in the file; empty without one."""
     from fastcontact.cases.case import described
 
     try:

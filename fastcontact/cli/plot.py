@@ -92,8 +92,7 @@ def _animate(options: argparse.Namespace, results: Any, step: Any, case: dict[st
     shown = list(results) if options.phases is None else phases(step, options.phases)
     plot.animate(
         results.mesh, shown, options.animate, field=options.field, scale=options.scale,
-        mirrored=options.mirrored, title=case["title"], units=case["units"],
-        pictures_per_second=5 if options.phases is None else 12,
+        mirrored=options.mirrored, title=case["title"], pictures_per_second=5 if options.phases is None else 12,
     )  # fmt: skip
 
 
@@ -105,13 +104,7 @@ def _of_bodies(
 
     at = f"section {options.section}, " if plane else ""
     title = f"{case['title']}\n{at}load factor {step.load_factor:g}, displacements x {options.scale:g}".strip()
-    labels = {
-        "field": options.field,
-        "scale": options.scale,
-        "zoom": options.zoom,
-        "title": title,
-        "units": case["units"],
-    }
+    labels = {"field": options.field, "scale": options.scale, "zoom": options.zoom, "title": title}
     if plane is None:
         return plot.deformed_shape(results.mesh, step, mirrored=options.mirrored, **labels)
     point, normal = [0.0] * 3, [0.0] * 3
@@ -123,7 +116,7 @@ def _of_contact(options: argparse.Namespace, results: Any, step: Any, case: dict
     """Draw of one contact pair its map, its zones or history over the load, or the stresses under it."""
     from fastcontact.results import plot
 
-    labels = {"title": case["title"], "units": case["units"]}
+    labels = {"title": case["title"]}
     name = _results.chosen_contact(step, options.contact)
     hint = _results.other_contacts(step, name, options.contact)
     if hint and not options.quiet:

@@ -48,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
     if options.agr:
         _write_agr(options.agr, case, contact, step, theories)
     if options.png:
-        draw_profile(contact, step, theories, options.png, case["title"] or name, case["units"])
+        draw_profile(contact, step, theories, options.png, case["title"] or name)
     written = [path for path in (options.csv, options.agr, options.png) if path]
     if not written:
         _print(table)
@@ -84,6 +84,6 @@ def _write_agr(path: str, case: dict[str, Any], contact: Any, step: Any, theorie
         curves,
         title=case["title"] or f"Contact '{contact.name}'",
         subtitle=f"load factor {step.load_factor:g}",
-        xlabel=labelled(f"distance from the {start}", case["units"], "length"),
-        ylabel=labelled("contact pressure", case["units"], "pressure"),
+        xlabel=labelled(f"distance from the {start}", contact.units, "length"),
+        ylabel=labelled("contact pressure", contact.units, "pressure"),
     )

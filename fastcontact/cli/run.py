@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import math
 import os
 import time
 from collections.abc import Sequence
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from fastcontact.cli._outputs import check_outputs, profile_picture, write_json
 from fastcontact.cli._terminal import say, somebody_watches
 from fastcontact.cli._warnings import warnings_shown
-from fastcontact.errors import CaseError, ConvergenceError, FileError, ModelError
+from fastcontact.errors import CaseError, ConvergenceError, FileError, ModelError, in_file, warn
 
 if TYPE_CHECKING:
     from fastcontact.cases.case import Case
@@ -66,7 +67,8 @@ def run(options: argparse.Namespace) -> int:
         case = read_case(options.case)
         _check_study(case)
     read = time.perf_counter()
-    case.model.check(case.ramp)  # a wrong model must not replace the results of a right one
+    with in_file(case_path(options.case)):
+        case.model.check(case.ramp)  # a wrong model must not replace the results of a right one
     with warnings_shown() as caught:
         caught += early
         done, last, steps = _solved(options, case, output)
@@ -83,15 +85,8 @@ def run(options: argparse.Namespace) -> int:
             say(f"warning: {text}", error=True)
     if not options.quiet:
         say("\n".join(summary.lines(numbers)))
-        say(
-            "  "
-            + _written(
-                output,
-                len(done.summaries),
-                len(steps),
-                [path for path in (options.json, options.plot, options.modes) if path],
-            )
-        )
+        others = [path for path in (options.json, options.plot, options.modes) if path]
+        say(f"  {_written(output, len(done.summaries), len(steps), others)}")
     failed = [check["name"] for check in numbers["checks"] if not check["passed"]]
     if options.strict and failed:
         say(f"{len(failed)} of {len(numbers['checks'])} checks of the case failed: {', '.join(failed)}", error=True)
@@ -170,6 +165,7 @@ def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[_Don
         _check_same(case, writer.done, output)
         last, done = writer.done[-1] if writer.done else None, _done(writer.done)
         steps = list(done.summaries)
+        _tell_other_steps(case, [own["load_factor"] for own in steps], output)
         total = len(steps) + len(remaining(case.ramp, last))
         progress = Progress(total, show=somebody_watches() and not options.quiet, done=len(steps))
         try:
@@ -214,6 +210,17 @@ def _check_same(case: Any, done: Sequence[Any], output: Path) -> None:
             restart.check(done[-1], restart.identity(case.model, case.ramp, case.criteria), case.model)
         except ModelError as error:
             raise ModelError(f"'{output}' cannot be resumed: {error}") from error
+
+
+def _tell_other_steps(case: Case, done: Sequence[float], output: Path) -> None:
+    """Warn where load factors of steps that were there before are none of the case now."""
+    known = case.ramp.instants
+    others = [factor for factor in done if not any(math.isclose(factor, own, rel_tol=1e-9) for own in known)]
+    if others:
+        warn(
+            f"'{output}' holds {len(done)} steps, the case now has {len(known)}: those in the file stay, also at load factor "
+            f"{others[0]:g}, which is none of the case's; without --resume all are solved anew"
+        )
 
 
 def _kept(output: Path, steps: int) -> str:

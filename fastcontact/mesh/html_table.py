@@ -3,7 +3,14 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+# Longest array whose numbers are shown.
+SHOWN = 9
 
 
 def html_table(rows: Iterable[Sequence[object]], head: Sequence[object] = (), caption: str = "") -> str:
@@ -12,6 +19,23 @@ def html_table(rows: Iterable[Sequence[object]], head: Sequence[object] = (), ca
     top = f"<thead>{_row(head, 'th')}</thead>" if head else ""
     body = "".join(_row(cells, "td") for cells in rows)
     return f"<table>{above}{top}<tbody>{body}</tbody></table>"
+
+
+def fields_table(result: Any) -> str:
+    """Return the fields of a dataclass as an HTML table, and its properties that are numbers; of long arrays the range."""
+    named = [own.name for own in fields(result) if own.repr]
+    properties = [name for name, own in vars(type(result)).items() if isinstance(own, property)]
+    rows = [(name.replace("_", " "), _text(getattr(result, name))) for name in [*named, *properties]]
+    return html_table(rows, caption=type(result).__name__)
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return ", ".join(f"{' '.join(map(str, key))}: {number:.6g}" for key, number in value.items())
+    numbers = np.atleast_1d(value)
+    if numbers.size > SHOWN:
+        return f"{numbers.size} numbers, {numbers.min():.6g} to {numbers.max():.6g}"
+    return ", ".join(f"{number:.6g}" for number in numbers.ravel())
 
 
 def _row(cells: Sequence[object], tag: str) -> str:

@@ -59,6 +59,10 @@ class Model(ModelSupports):
         loads keep their directions and reference areas; stresses are Cauchy's.
     reference_temperature : float
         Where heat is conducted: of the bodies before any load, without thermal strain [temperature].
+    units : str or mapping of str to str
+        Names of the units of length, force and pressure that all numbers are in, ``"mm, N, MPa"``, or by ``"length"``,
+        ``"force"``, ``"pressure"``: tables, reports, pictures and result files show them, a warning tells if force / length^2
+        is no pressure. They change no number, and none need be given.
 
     Examples
     --------

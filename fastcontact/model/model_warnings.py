@@ -24,6 +24,7 @@ from fastcontact.model.hanging_nodes import hanging_nodes_warning
 from fastcontact.model.prescribed_overlap import Supports, prescribed_overlap_warnings
 from fastcontact.model.ramp import Harmonic, Ramp, Table
 from fastcontact.model.repeated_pairs import split_side_warnings
+from fastcontact.model.units import in_si, misfit
 
 if TYPE_CHECKING:
     from fastcontact.model.model import Model
@@ -35,11 +36,6 @@ MODULI = 3e5
 DISPLACED, STRAINED, UNSTRAINED = 1.0, 1.0, 1e-12
 # Solids: aerogel to diamond [Pa]. Only here units of the user matter, and only where a case names them.
 SOLIDS = (1e2, 2e12)
-PASCALS = {
-    "Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "N/mm2": 1e6, "N/mm^2": 1e6, "psi": 6894.757, "ksi": 6894757.0,
-}  # fmt: skip
-METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254}
-NEWTONS = {"N": 1.0, "kN": 1e3, "MN": 1e6, "mN": 1e-3, "lbf": 4.448222}
 # Number of cells by which integrals are judged.
 SOME = 1000
 # Relative error of the integral of a load, and of the stiffness (1.6 % on regular pyramids), above which there is a warning.
@@ -110,27 +106,18 @@ def _moduli(model: Model) -> list[str]:
 
 def _named_units(model: Model) -> list[str]:
     """Compare moduli with those of solids, and the units with each other, where their names are known."""
-    units, texts = model.units, []
-    pascal = PASCALS.get(units.get("pressure", ""))
-    if pascal is not None:
-        for material, groups in model.materials:
-            low, high = material.young
-            if low * pascal < SOLIDS[0] or high * pascal > SOLIDS[1]:
-                E, limit, quantity = (
-                    (high, SOLIDS[1], "diamond") if high * pascal > SOLIDS[1] else (low, SOLIDS[0], "aerogel")
-                )
-                where = "all cells" if groups is None else ", ".join(f"'{group}'" for group in groups)
-                texts.append(
-                    f"Young's modulus E = {E:g} {units['pressure']} of {where} is "
-                    f"{E * pascal / limit:.3g} times that of {quantity}: is it in another unit?"
-                )
-    metre, newton = METRES.get(units.get("length", "")), NEWTONS.get(units.get("force", ""))
-    if pascal is not None and metre is not None and newton is not None:
-        ratio = newton / metre**2 / pascal
-        if not 0.99 < ratio < 1.01:
+    units = model.units
+    pascal, texts = in_si(units, "pressure"), [text for text in [misfit(units)] if text]
+    if pascal is None:
+        return texts
+    for material, groups in model.materials:
+        low, high = (young * pascal for young in material.young)
+        if low < SOLIDS[0] or high > SOLIDS[1]:
+            E, limit, quantity = (high, SOLIDS[1], "diamond") if high > SOLIDS[1] else (low, SOLIDS[0], "aerogel")
+            where = "all cells" if groups is None else ", ".join(f"'{group}'" for group in groups)
             texts.append(
-                f"the units do not fit each other: 1 {units['force']}/{units['length']}^2 is {ratio:.6g} "
-                f"{units['pressure']}; change one of the three"
+                f"Young's modulus E = {E / pascal:g} {units['pressure']} of {where} is {E / limit:.3g} times that of "
+                f"{quantity}: is it in another unit?"
             )
     return texts
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -13,6 +13,13 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.results import layout
 from fastcontact.results.step import StepResult
 from fastcontact.results.tables import AXES, STRESS_COMPONENTS, contact_table
+from fastcontact.results.units import column_units
+
+if TYPE_CHECKING:
+    import pandas
+
+# Columns before those of contact tables.
+LEADING = ("step", "load_factor", "contact")
 
 
 def library(name: str, title: str, install: str) -> Any:
@@ -53,21 +60,26 @@ def series(mesh: Mesh, steps: Iterable[StepResult]) -> Any:
     return blocks
 
 
-def contact_frame(steps: Iterable[StepResult]) -> Any:
+def data_frame(table: Any, units: Mapping[str, str], columns: Sequence[str] | None = None) -> pandas.DataFrame:
+    """Return a table as a ``pandas.DataFrame``, whose ``attrs["units"]`` are the units by column that have a name."""
+    frame = library("pandas", "pandas", "'fastcontact[table]'").DataFrame(table, columns=columns)
+    if named := {name: text for name, text in units.items() if text}:
+        frame.attrs["units"] = named
+    return cast("pandas.DataFrame", frame)
+
+
+def contact_frame(steps: Iterable[StepResult], units: Mapping[str, str]) -> pandas.DataFrame:
     """Return the contact tables of steps as one ``pandas.DataFrame``; columns as in `contact_table`, before them the step."""
-    pandas = library("pandas", "pandas", "pandas")
+    concat = library("pandas", "pandas", "'fastcontact[table]'").concat
     frames = []
     for step in steps:
         for name, contact in step.contact.items():
-            frame = pandas.DataFrame(contact_table(contact, step))
+            frame = data_frame(contact_table(contact, step), {})
             for column, value in (("contact", name), ("load_factor", step.load_factor), ("step", step.index)):
                 frame.insert(0, column, value)
             frames.append(frame)
-    return (
-        pandas.concat(frames, ignore_index=True)
-        if frames
-        else pandas.DataFrame(columns=["step", "load_factor", "contact"])
-    )
+    whole = concat(frames, ignore_index=True) if frames else None
+    return data_frame(whole, column_units(() if whole is None else whole.columns, units), None if frames else LEADING)
 
 
 def dataset(mesh: Mesh, steps: Iterable[StepResult], units: dict[str, str]) -> Any:
@@ -93,14 +105,10 @@ def dataset(mesh: Mesh, steps: Iterable[StepResult], units: dict[str, str]) -> A
         "von_mises_signed": ((), (), "pressure"),
         "reaction": (("axis",), (dim,), "force"),
     }
-    data = {
-        name: (
-            ("step", "point", *dims),
-            over_steps([getattr(s, name) for s in steps_given], (n, *shape)),
-            _unit(units, quantity),
-        )
-        for name, (dims, shape, quantity) in by_name.items()
-    }
+    data = {}
+    for name, (dims, shape, quantity) in by_name.items():
+        values = over_steps([getattr(s, name) for s in steps_given], (n, *shape))
+        data[name] = (("step", "point", *dims), values, _unit(units, quantity))
     nodal = over_steps([layout.contact_pressure(mesh, step) for step in steps_given], (n,))
     data["contact_pressure"] = (("step", "point"), nodal, _unit(units, "pressure"))
     data["contact_force"] = (("step", "contact", "axis"), of_pairs("force", (dim,)), _unit(units, "force"))
@@ -118,4 +126,4 @@ def dataset(mesh: Mesh, steps: Iterable[StepResult], units: dict[str, str]) -> A
 
 def _unit(units: dict[str, str], quantity: str) -> dict[str, str]:
     """Return the attributes of a field: its unit where it is known."""
-    return {"units": units[quantity]} if quantity in units else {}
+    return {"units": units[quantity]} if units.get(quantity) else {}

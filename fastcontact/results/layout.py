@@ -9,7 +9,7 @@ A result file is an HDF5 file with two groups. Viewers read the first, whose lay
 The second holds what VTK has no place for:
 
     fastcontact/mesh                                points, cells of all dimensions, groups
-    fastcontact/kinematics, case, versions          texts as JSON
+    fastcontact/kinematics, case, versions, units   texts as JSON; units where the model names them
     fastcontact/steps                               a row for each step (STEP_ROW), with the place of its notes
     fastcontact/contact/0, 1, ...                   for each pair its name, a row for each node and step, a row for each step;
                                                     forces on the primary side, a row for each of its nodes and step

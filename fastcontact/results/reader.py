@@ -28,6 +28,7 @@ from fastcontact.results.file_lock import is_being_written
 from fastcontact.results.material_stress import MaterialStress
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.results.texts import read_text
+from fastcontact.results.units import units_of_results
 
 if TYPE_CHECKING:
     import pandas
@@ -78,6 +79,8 @@ class Results(Sequence[StepResult]):
         Versions of the packages that computed the results.
     load_factors : ndarray (n_steps,)
         Pseudo-time of each step [-].
+    units : dict of str to str
+        Names of units where the model or the case file names them, as of a `StepResult`; else empty.
     warnings : tuple of str
         Every warning of the run and its steps, once.
     log : object
@@ -145,6 +148,10 @@ class Results(Sequence[StepResult]):
         notes = [self._notes(number) for number in range(self._n_steps)]
         self.case_text = next((note["case"] for note in reversed(notes) if "case" in note), self.case_text)
         of_steps = [text for note in notes for text in note["warnings"]]
+        named = _read_json(group["units"], self._raw) if "units" in group else self._units_of_case()
+        if not isinstance(named, dict) or not all(isinstance(text, str) for text in named.values()):
+            raise ValueError("its units are no names")
+        self.units: dict[str, str] = units_of_results(named, self.kinematics) if named else {}
         self.warnings: tuple[str, ...] = tuple(dict.fromkeys([*(run or {}).get("warnings", ()), *of_steps]))
 
     def _run_record(self, group: Any) -> dict[str, Any] | None:
@@ -208,7 +215,7 @@ class Results(Sequence[StepResult]):
             ("kinematics", self.kinematics),
             (
                 "mesh",
-                f"{self.mesh.n_points} points, {', '.join(f'{len(b)} {name}' for name, b in self.mesh.cells.items())}",
+                ", ".join([f"{self.mesh.n_points} points", *(f"{len(b)} {n}" for n, b in self.mesh.cells.items())]),
             ),
             ("groups", ", ".join(self.mesh.group_names)),
             *(("warning", text) for text in self.warnings),
@@ -246,14 +253,14 @@ class Results(Sequence[StepResult]):
         """Return the contact tables of all steps as one ``pandas.DataFrame``.
 
         A row is a secondary node of a contact pair in a step: columns ``step``, ``load_factor``, ``contact``, then those of
-        `contact_table` with their units.
+        `contact_table`; ``attrs["units"]`` names the units of columns that have one.
 
         Raises
         ------
         FileError
             If pandas is not installed.
         """
-        return conversions.contact_frame(self)
+        return conversions.contact_frame(self, self.units)
 
     def to_xarray(self) -> Any:
         """Return the fields of all steps, in memory, as an ``xarray.Dataset``.
@@ -261,17 +268,17 @@ class Results(Sequence[StepResult]):
         Its dimensions are ``step``, ``point``, ``axis``, ``stress_component`` and ``contact``: ``displacement`` [length],
         ``stress``, ``von_mises``, ``contact_pressure`` [pressure], ``reaction`` [force] at the points; ``contact_force``
         [force] and ``contact_pressure_max`` [pressure] of the pairs. ``x``, ``y`` (``z``) are reference coordinates
-        [length]. Names of units that the case gives are attributes.
+        [length]. Names of `units` are attributes.
 
         Raises
         ------
         FileError
             If xarray is not installed.
         """
-        return conversions.dataset(self.mesh, self, self._units())
+        return conversions.dataset(self.mesh, self, self.units)
 
-    def _units(self) -> dict[str, str]:
-        """Return the names of the units of length, force and pressure that the case text gives."""
+    def _units_of_case(self) -> dict[str, str]:
+        """Return the names of units that the case text gives: where files of earlier versions have them."""
         try:
             named = toml_text.parsed(self.case_text or "").get("units", {})
         except ValueError:
@@ -304,6 +311,7 @@ class Results(Sequence[StepResult]):
                 cell_fields=self._cell_fields(number),
                 restart=self._restart(number) if number == self._n_steps - 1 else None,
                 material_stress=self._material_stress(number),
+                units=self.units,
                 **{name: self._field(name, number) for name in layout.HEAT_FIELDS if name in self.point_field_names},
             )
 
@@ -445,6 +453,6 @@ def _read_contact(pair: Any, number: int, name: str, formulation: str) -> Contac
         obstacle_displacement=moved if np.isfinite(moved).all() else None,
         middle=step["middle"].copy() if "middle" in known else None,  # type: ignore[arg-type]
         tangent=step["tangent"].copy() if "tangent" in known and np.isfinite(step["tangent"]).all() else None,
-        **faced,
-        **columns,
+        **faced,  # type: ignore[arg-type]
+        **columns,  # type: ignore[arg-type]
     )

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from fastcontact.arrays import Array, Mask, Numbers
 from fastcontact.errors import unknown
 from fastcontact.mesh.html_table import html_table
 from fastcontact.results.material_stress import MaterialStress
+from fastcontact.results.units import with_unit
 
 # Part of the normal forces below which their resultant tells nothing.
 CANCELLED = 1e-3
@@ -114,6 +116,9 @@ class ContactResult:
         Point numbers of the primary side; none for a rigid obstacle.
     primary_force_vectors : ndarray (k, dim)
         Contact force on each of them; axisymmetric: over the full circle [force]. A node of both sides counts here alone.
+    units : mapping of str to str
+        Names of the units of ``length``, ``force``, ``pressure`` where the model names them, of plane models of forces per
+        thickness; reprs, pictures and tables show them.
     """
 
     name: str
@@ -146,6 +151,7 @@ class ContactResult:
     slip: Array = None  # type: ignore[assignment]
     slip_total: Array = None  # type: ignore[assignment]
     heat_flux: Array | None = None
+    units: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.middle is None:
@@ -168,12 +174,17 @@ class ContactResult:
     def shown(self) -> dict[str, str]:
         """What reprs and tables tell, as texts: force, largest pressure, closed nodes, contact radius."""
         low, high = self.radius
-        force = f"{float(np.linalg.norm(self.force)):.6g}"
+        force = with_unit(f"{float(np.linalg.norm(self.force)):.6g}", self.units, "force")
+        around = (
+            with_unit(f", normal {self.normal_force:.6g}", self.units, "force") + " all round" if self.cancels else ""
+        )
         return {
-            "force": f"{force}, normal {self.normal_force:.6g} all round" if self.cancels else force,
-            "largest pressure": f"{self.pressure_max:.6g}",
+            "force": force + around,
+            "largest pressure": with_unit(f"{self.pressure_max:.6g}", self.units, "pressure"),
             "closed": f"{int(self.active.sum())} of {len(self.points)} nodes",
-            "contact radius": f"{low:.4g} to {high:.4g}" if np.isfinite(low) else "none",
+            "contact radius": with_unit(f"{low:.4g} to {high:.4g}", self.units, "length")
+            if np.isfinite(low)
+            else "none",
         }
 
     def __repr__(self) -> str:
@@ -279,6 +290,8 @@ class StepResult:
         Heat that prescribed temperatures put into the nodes, zero elsewhere; axisymmetric: over the full circle [power].
     restart : dict, optional
         Restart data for the next step: plain numbers, strings and arrays. Result files keep those of their last step.
+    units : mapping of str to str
+        As of its `ContactResult`.
     """
 
     index: int
@@ -296,17 +309,20 @@ class StepResult:
     material_stress: MaterialStress | None = None
     temperature: Array | None = None
     heat_reaction: Array | None = None
+    units: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "contact", ContactsByName(self.contact))
+        named = {name: replace(pair, units=self.units) for name, pair in self.contact.items()} if self.units else {}
+        object.__setattr__(self, "contact", ContactsByName(named or self.contact))
 
     @property
     def shown(self) -> dict[str, str]:
         """What reprs and tables tell, as texts: load factor, largest displacement and stress, iterations."""
+        moved, stressed = (float(np.abs(own).max(initial=0.0)) for own in (self.displacement, self.von_mises))
         shown = {
             "load factor": f"{self.load_factor:.6g}",
-            "largest displacement": f"{float(np.abs(self.displacement).max(initial=0.0)):.6g}",
-            "largest von Mises stress": f"{float(np.max(self.von_mises, initial=0.0)):.6g}",
+            "largest displacement": with_unit(f"{moved:.6g}", self.units, "length"),
+            "largest von Mises stress": with_unit(f"{stressed:.6g}", self.units, "pressure"),
         }
         named = {"geometry_updates": "geometry updates", "active_set_iterations": "active-set iterations"}
         return shown | {text: str(self.iterations[key]) for key, text in named.items() if key in self.iterations}

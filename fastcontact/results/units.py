@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+
+# What columns of tables hold, by the beginning of their names.
+COLUMNS = {
+    **dict.fromkeys(("abscissa", "radius", "place", "gap", "displacement_", "slip_", "wear"), "length"),
+    **dict.fromkeys(("pressure", "stress_", "normal_stress", "von_mises", "shear_", "fluid_pressure"), "pressure"),
+    "force_": "force",
+}
 
 
 def known_units(units: Mapping[str, str]) -> dict[str, str]:
@@ -43,6 +50,21 @@ def units_of_results(units: Mapping[str, str], kinematics: str) -> dict[str, str
         "moment": f"{force} {length}/{length}",
         "stiffness": f"{force}/{length}^2",
     }
+
+
+def column_units(columns: Iterable[str], units: Mapping[str, str]) -> dict[str, str]:
+    """Return the names of units of columns of tables, where they are known.
+
+    Examples
+    --------
+    >>> column_units(["point", "x", "stress_xx"], {"length": "mm", "force": "N", "pressure": "MPa"})
+    {'x': 'mm', 'stress_xx': 'MPa'}
+    """
+    kinds = {
+        name: "length" if name in ("x", "y", "z") else next((COLUMNS[k] for k in COLUMNS if name.startswith(k)), "")
+        for name in columns
+    }
+    return {name: units[kind] for name, kind in kinds.items() if units.get(kind)}
 
 
 def labelled(text: str, units: Mapping[str, str], quantity: str) -> str:

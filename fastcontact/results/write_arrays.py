@@ -91,13 +91,15 @@ def _write_steps_group(
         growing_table(cell_offsets, name, np.int64)
 
 
-def write_own(file: Any, mesh: Mesh, kinematics: str, case_text: str) -> None:
+def write_own(file: Any, mesh: Mesh, kinematics: str, case_text: str, units: Mapping[str, str]) -> None:
     """Write /fastcontact: the mesh with all its cells and groups, the case, and room for the steps."""
     group = file.create_group("fastcontact")
     group.attrs["schema"] = np.int64(layout.SCHEMA)
     group["kinematics"] = as_json(kinematics)
     group["case"] = as_json(case_text)
     group["versions"] = as_json(_versions())
+    if units:
+        group["units"] = as_json(dict(units))
     stored = group.create_group("mesh")
     stored.attrs["dim"] = np.int64(mesh.dim)
     stored["points"] = file["VTKHDF/Points"]

@@ -117,7 +117,7 @@ class ResultWriter:
         background: bool = False,
     ) -> None:
         self._material: Any = None
-        self._heat = bool(getattr(mesh, "conducts", False))
+        self._heat, self._units = bool(getattr(mesh, "conducts", False)), dict(getattr(mesh, "units", {}))
         cell_fields = dict.fromkeys((*getattr(mesh, "cell_fields", ()), *cell_fields))
         if not isinstance(mesh, Mesh):
             if not isinstance(getattr(mesh, "mesh", None), Mesh) or not hasattr(mesh, "kinematics"):
@@ -392,7 +392,7 @@ class ResultWriter:
                 reserve(probe.fileno(), temporary.parent, 0, size)
             with new_hdf5(temporary) as file:
                 write_arrays.write_geometry(file, self._mesh, self._cell_fields, self._material, self._heat)
-                write_arrays.write_own(file, self._mesh, kinematics, case_text)
+                write_arrays.write_own(file, self._mesh, kinematics, case_text, self._units)
         # Closed in between because Windows renames no open file; without locks viewers may follow.
         self._open()
 

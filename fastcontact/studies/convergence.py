@@ -57,7 +57,8 @@ def convergence_study(
         Of a case, compared in all combinations; ``["all"]`` for all; by default what ``[study]`` names, or the case's own.
     quantities : sequence of str, or dict of str to callable
         Further ones to fit, such as ``"C1.stress.yy"``, ``"C1.displacement.y"``, ``"C1.pressure"``; of a function, functions
-        of the last `StepResult` that return a number, by name, or names of standard quantities.
+        of the last `StepResult` that return a number, by name, or names of standard quantities. One whose argument is called
+        ``steps`` gets the list of all steps.
     executor : concurrent.futures.Executor, optional
         Where to run: by default processes of this machine, or e.g. ``Client.get_executor()`` of Dask or an
         ``MPIPoolExecutor`` of mpi4py. It is not shut down here.
@@ -146,7 +147,7 @@ def _of_function(
     solved = [(level, {**result, "h": given[level]}) for level, result in enumerate(results)]
     series = _series(Named(None, None, name), solved, [*wanted], (), (None, 1.0, ""), asked=tuple(wanted))
     _tell_coarser(series.levels)
-    return Study(**functions.of_function(function), series=[series], failed={}, theory=None)
+    return Study(**functions.of_function(function, results), series=[series], failed={}, theory=None)
 
 
 def _tell_coarser(levels: Sequence[Level]) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from fastcontact.analytic.pressure_curve import pressure_curve
 from fastcontact.arrays import Array
 from fastcontact.results.units import labelled
+from fastcontact.studies.fit import CONFIDENCE
 from fastcontact.studies.quantities import title
 from fastcontact.studies.render.figure import frame, marker, message
 from fastcontact.studies.series import Series
@@ -41,19 +42,17 @@ def draw_errors(ax: Any, all_series: Sequence[Series], quantity: str, units: Map
             # The fitted power law, through the middle of the errors.
             factor = np.exp(np.mean(np.log(error[shown] / h[shown] ** limit.order)))
             ax.plot(h, factor * h**limit.order, ":", lw=1.0, color=color)
+    explained = {":": "fit $C\\,h^{order}$"} | ({"|": f"error bar of the limit, {CONFIDENCE:.0%}"} if few else {})
+    for style, text in explained.items():
+        ax.plot([], [], style, color="0.4", lw=1.0, label=text)
     _slope_triangles(ax, quantity, [series for _, series in known])
-    labels, size = (
-        (
-            labelled("mesh size h" if named else "facet length at the contact h", units, "length"),
-            "|value - limit| / limit",
-        ),
-        8 if few else 6.5,
-    )
+    along = labelled("mesh size h" if named else "facet length at the contact h", units, "length")
+    labels, size = (along, "|value - limit| / limit"), 8 if few else 6.5
     frame(ax, f"Mesh error of the {title(quantity)}", labels, scales=("plain log", "log"), legend_size=size)
     ax.grid(which="minor", alpha=0.12)
     if few:  # matplotlib does not see error bars in the way of the legend
         low, high = ax.get_ylim()
-        ax.set_ylim(low, high * (high / low) ** (0.02 * size * len(known) / 2.2))
+        ax.set_ylim(low, high * (high / low) ** (0.02 * size * (len(known) + len(explained)) / 2.2))
 
 
 def _slope_triangles(ax: Any, quantity: str, all_series: Sequence[Series]) -> None:

@@ -21,6 +21,7 @@ from fastcontact.elasticity.smoothed_stress import smoothed_stress
 from fastcontact.errors import ModelError
 from fastcontact.mesh import elements
 from fastcontact.mesh.argument_types import typed
+from fastcontact.mesh.html_table import fields_table
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.studies.error_norms import stress_in_cells
@@ -43,6 +44,8 @@ class ErrorEstimate:
     cells: Array
     contact: Array
     energy: float
+
+    _repr_html_ = fields_table
 
     @property
     def total(self) -> float:

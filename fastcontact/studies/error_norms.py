@@ -22,6 +22,7 @@ from fastcontact.errors import ModelError
 from fastcontact.mesh import elements
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.elements import Element
+from fastcontact.mesh.html_table import fields_table
 from fastcontact.model.model import Model
 
 # Quadrature points worked on at a time, so that theories with large intermediate arrays fit the memory.
@@ -60,6 +61,8 @@ class ErrorNorms:
     displacement: float
     energy_of_theory: float
     displacement_of_theory: float
+
+    _repr_html_ = fields_table
 
     @property
     def relative_energy(self) -> float:

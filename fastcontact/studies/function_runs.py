@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact.analysis.criteria import Criteria
+from fastcontact.analysis.run import solve
 from fastcontact.cases.case import Case
 from fastcontact.errors import CaseError, FastcontactError, unknown
 from fastcontact.model.model import Model
@@ -23,11 +24,14 @@ from fastcontact.results.step import StepResult
 from fastcontact.results.units import known_units
 from fastcontact.studies import quantities
 from fastcontact.studies.execute import Progress, raise_first, run_all
-from fastcontact.studies.job import Run, last_step, profile, recorded
+from fastcontact.studies.job import Run, profile, recorded
 from fastcontact.studies.progress import told
 
-# Names of quantities, or functions of the last step by name.
-Quantities = Sequence[str] | Mapping[str, Callable[[StepResult], float]]
+# Of the last step; with an argument of the name `STEPS`, of the list of all steps.
+Measure = Callable[..., float]
+# Names of quantities, or functions by name.
+Quantities = Sequence[str] | Mapping[str, Measure]
+STEPS = "steps"
 Function = Callable[..., Any]
 
 
@@ -38,26 +42,28 @@ class FunctionRun(Run):
     function: Function
     positional: tuple[Any, ...]  # arguments
     named: Mapping[str, Any]
-    measures: Mapping[str, Callable[[StepResult], float]]  # further quantities
+    measures: Mapping[str, Measure]  # further quantities
 
     def measured(self) -> dict[str, Any]:
         """See `Run`."""
         started = time.perf_counter()
         with recorded() as texts:
-            case, last = _solved(self._made(), self.name)
+            case, steps = _solved(self._made(), self.name)
+        last = steps[-1]
         pair = next(iter(last.contact), None)
         values = quantities.measure(case, last, pair) if case else quantities.of_contacts(last)
         values = {name: value for name, value in values.items() if np.isfinite(value)}
         return {
             "h": quantities.mesh_size(case, pair) if case else float("nan"),
             "n_dofs": last.displacement.size,
-            "values": values | {name: _number(name, measure, last) for name, measure in self.measures.items()},
+            "values": values | {name: _number(name, measure, steps) for name, measure in self.measures.items()},
             "theory": {},
             "reference": {},
             "equal_force": {},
             "profile": profile(last, pair),
             "seconds": time.perf_counter() - started,
             "warnings": texts,
+            "units": dict(last.units),
         }
 
     def _made(self) -> Any:
@@ -72,31 +78,32 @@ class FunctionRun(Run):
             raise CaseError(f"the function {self.name} failed{where}: {type(error).__name__}: {error}") from error
 
 
-def _solved(made: Any, name: str) -> tuple[Case | None, StepResult]:
-    """Return the last step of what a function has made; of a model, solved here, also the case that it is."""
+def _solved(made: Any, name: str) -> tuple[Case | None, Sequence[StepResult]]:
+    """Return the steps of what a function has made; of a model, solved here, also the case that it is."""
     if isinstance(made, Model):
         case = Case(
             name=name, title=name, text="", mesh=made.mesh, model=made, ramp=linear_ramp(), criteria=Criteria(),
-            linear_solver="auto", linear_tolerance=1e-10, probes={},
+            linear_solver="auto", linear_tolerance=1e-10, probes={}, units=known_units(made.units),
         )  # fmt: skip
-        return case, last_step(case)
+        return case, solve(made, case.ramp)
     if isinstance(made, StepResult):
-        return None, made
+        return None, [made]
     if isinstance(made, Sequence) and len(made) and isinstance(made[-1], StepResult):
-        return None, made[-1]
+        return None, made
     raise CaseError(
         f"the function {name} must return a Model, or what fc.solve returns, not {type(made).__name__}: end it with 'return'"
     )
 
 
-def _number(name: str, measure: Callable[[StepResult], float], last: StepResult) -> float:
+def _number(name: str, measure: Measure, steps: Sequence[StepResult]) -> float:
     """Return a quantity of the caller's."""
     try:
-        return float(measure(last))
+        return float(measure(steps if first_parameter(measure) == STEPS else steps[-1]))
     except Exception as error:
         reason = f"{type(error).__name__}: {error}"
         raise CaseError(
-            f"the quantity '{name}' is a function that failed ({reason}): it must return a number of the last StepResult"
+            f"the quantity '{name}' is a function that failed ({reason}): it must return a number of the last StepResult, "
+            f"or of the list of all if its argument is called '{STEPS}'"
         ) from error
 
 
@@ -113,18 +120,21 @@ def first_parameter(function: Function) -> str:
         return "value"
 
 
-def of_function(function: Function) -> dict[str, Any]:
-    """Return the fields of a `Report` that are those of a function; its text is its source where Python has it."""
+def of_function(function: Function, results: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Return the fields of a `Report` that are those of a function; its text is its source where Python has it.
+
+    Units are those of the models in the `results`.
+    """
     try:
         text = inspect.getsource(function)
     except (OSError, TypeError):
         text = ""
-    name = function_name(function)
+    name, units = function_name(function), next((result["units"] for result in results if result.get("units")), None)
     title = (inspect.getdoc(function) or name).partition("\n")[0]
-    return {"name": name, "title": title, "text": text, "units": known_units({})}
+    return {"name": name, "title": title, "text": text, "units": known_units(units or {})}
 
 
-def measures_of(wanted: Quantities) -> dict[str, Callable[[StepResult], float]]:
+def measures_of(wanted: Quantities) -> dict[str, Measure]:
     """Return the functions among the quantities; CaseError for a name that no run of a function can have."""
     if isinstance(wanted, Mapping):
         return dict(wanted)

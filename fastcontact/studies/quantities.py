@@ -273,14 +273,17 @@ def title(quantity: str) -> str:
 
 def unit(quantity: str, units: Mapping[str, str]) -> str:
     """Return the name of a quantity's unit; empty for ratios, and where it is not known."""
-    return units.get(_kind(quantity), "")
+    return units.get(_kind(quantity) or "", "")
 
 
-def _kind(quantity: str) -> str:
-    """Return what a quantity is: a length, a force, a pressure; empty for ratios."""
-    return LABELS[quantity][1] if quantity in LABELS else "length" if ".displacement." in quantity else "pressure"
+def _kind(quantity: str) -> str | None:
+    """Return what a quantity is: a length, a force, a pressure; empty for ratios, None for a caller's own."""
+    if quantity in LABELS:
+        return LABELS[quantity][1]
+    return None if "." not in quantity else "length" if ".displacement." in quantity else "pressure"
 
 
 def column(label: str, quantity: str, units: Mapping[str, str]) -> str:
     """Return the header of a column or axis: a label and the unit of its quantity where that is known, ``[1]`` for ratios."""
-    return labelled(label, units, kind) if (kind := _kind(quantity)) else f"{label} [1]"
+    kind = _kind(quantity)
+    return f"{label} [1]" if kind == "" else labelled(label, units, kind or "")

@@ -9,8 +9,9 @@ from fastcontact.arrays import AnyArray
 from fastcontact.cases.case import Case
 from fastcontact.cases.summary import versions
 from fastcontact.mesh.html_table import html_table
-from fastcontact.results.conversions import library
+from fastcontact.results.conversions import data_frame
 from fastcontact.results.units import units_of_results
+from fastcontact.studies.quantities import unit
 from fastcontact.studies.render import page
 from fastcontact.studies.render.table import Rows, aligned
 
@@ -89,8 +90,11 @@ class Report:
         raise NotImplementedError
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return `table` as a ``pandas.DataFrame``; FileError if pandas is not installed."""
-        return library("pandas", "pandas", "pandas").DataFrame(self.table())
+        """Return `table` as a ``pandas.DataFrame``; FileError if pandas is not installed.
+
+        ``attrs["units"]`` holds the names of units by column, where they are known.
+        """
+        return data_frame(self.table(), {name: unit(name, self.units) for name in self.table().dtype.names or ()})
 
     def __repr__(self) -> str:
         return "\n".join([f"{type(self).__name__} of '{self.name}'", *self.lines()])

@@ -124,7 +124,9 @@ def _of_function(
     ]  # fmt: skip
     results = functions.run_functions(runs, "no point of the sweep could be solved", **options)
     points = _points(by_name, choices, results)
-    return Sweep(**functions.of_function(function), **points, combination=name, asked=tuple(wanted), compared="")
+    return Sweep(
+        **functions.of_function(function, results), **points, combination=name, asked=tuple(wanted), compared=""
+    )
 
 
 def _choices(parameters: Mapping[str, Sequence[Value]]) -> list[dict[str, Value]]:
@@ -136,7 +138,7 @@ def _choices(parameters: Mapping[str, Sequence[Value]]) -> list[dict[str, Value]
 
 
 def _label(choice: Mapping[str, Value]) -> str:
-    return ", ".join(f"{name} = {value}" for name, value in choice.items())
+    return label_of(choice, list(choice))
 
 
 def _points(

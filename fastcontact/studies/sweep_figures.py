@@ -150,5 +150,6 @@ class Drawing:
 
 
 def label_of(parameters: Mapping[str, Value], others: Sequence[str]) -> str:
-    """Return what tells a curve from others: its values of all parameters but the first."""
-    return ", ".join(f"{name} = {parameters[name]}" for name in others)
+    """Return some of the parameters with their values in words, as what tells a curve from others."""
+    values = ((name, parameters[name]) for name in others)
+    return ", ".join(f"{name} = {f'{value:.6g}' if isinstance(value, float) else value}" for name, value in values)

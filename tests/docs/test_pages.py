@@ -54,6 +54,16 @@ def test_the_gallery_asserts_a_number_for_every_picture():
         assert "\nassert " in section, section.splitlines()[0]
 
 
+def test_every_machine_part_makes_its_picture_and_asserts_a_number():
+    page = pages.DOCS / "machine-parts.md"
+    sections = page.read_text(encoding="utf-8").split("\n## ")[1:]
+    assert 6 <= len(sections) == len(pages.pictures(page))
+    for section in sections:
+        assert section.count("![") == section.count("```python") == section.count("\nassert ") == 1, (
+            section.splitlines()[0]
+        )
+
+
 def test_pictures_are_small():
     """A page of them is read on a telephone, and the repository keeps every version."""
     for path in (pages.DOCS / "images").glob("*.png"):

@@ -15,12 +15,13 @@ from fastcontact.analysis.modal.cyclic import Sectors
 from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.material_field import MaterialField
-from fastcontact.errors import FileError, ModelError
+from fastcontact.errors import ModelError
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.generate import union
 from fastcontact.mesh.html_table import html_table
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.model import Model
+from fastcontact.results.conversions import data_frame
 from fastcontact.results.phases import phases
 from fastcontact.results.step import StepResult
 
@@ -147,17 +148,11 @@ class Modes(Shapes):
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return the table as a ``pandas.DataFrame``; FileError if pandas is not installed."""
-        try:
-            import pandas
-        except ImportError as error:
-            raise FileError("to_pandas needs pandas: pip install pandas") from error
         whole = [np.arange(1, len(self) + 1)]
         if self.nodal_diameters is not None and self.twins is not None:
             whole += [self.nodal_diameters, self.twins + 1]
         data = np.column_stack([*whole, self.frequencies, self.effective_mass])
-        return pandas.DataFrame(data, columns=list(self._columns)).astype(
-            dict.fromkeys(self._columns[: len(whole)], int)
-        )
+        return data_frame(data, {}, self._columns).astype(dict.fromkeys(self._columns[: len(whole)], int))
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,6 +23,7 @@ from fastcontact.elasticity.multipoint_constraints import TemporaryConstraint
 from fastcontact.errors import ContactError, FileError, MeshError, ModelError, warn
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.files.paths import PathLike, existing_file
+from fastcontact.mesh.html_table import html_table
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, table_value
 from fastcontact.results.step import StepResult
@@ -60,6 +61,10 @@ class Deck:
     thickness: float = 1.0
     modes: dict[str, Any] | None = None
     building: Building = field(default=None, repr=False)  # type: ignore[assignment]
+
+    def _repr_html_(self) -> str:
+        """Return title, notes and model as tables for notebooks."""
+        return html_table([("note", text) for text in self.notes], caption=self.title) + self.model._repr_html_()
 
     def solve(self, **options: Any) -> list[StepResult]:
         """Solve all steps; `options` are those of `fastcontact.solve_steps` without `resume`.

@@ -27,6 +27,7 @@ from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.periodicity import PeriodicInterface
 from fastcontact.model.pretension import Pretension
 from fastcontact.model.ramp import Harmonic, PartHistory, Table
+from fastcontact.model.units import named_units
 
 
 @dataclass(frozen=True)
@@ -82,6 +83,7 @@ class ModelBase:
         *,
         strain: str = "small",
         reference_temperature: float = 0.0,
+        units: str | Mapping[str, str] = "",
     ) -> None:
         if kinematics not in KINEMATICS:
             raise ModelError(unknown("kinematics", kinematics, KINEMATICS))
@@ -106,7 +108,7 @@ class ModelBase:
         self.strain = strain
         self.reference_temperature = reference_temperature
         self.case_text = case_text
-        self.units: dict[str, str] = {}  # names of the units of length, force, pressure where they are known
+        self.units = named_units(units) if units else {}
         self.materials: list[tuple[Material, tuple[str, ...] | None]] = []
         self.supports: list[Support] = []
         self.loads: list[Load] = []

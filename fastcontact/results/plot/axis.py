@@ -62,7 +62,7 @@ def axis_stress(
     depth, side, stress = stresses_on_axis(mesh, step, pair)
     upright = abs(_axis(step, pair)[1][1]) > 0.5
     bodies = ("upper body", "lower body") if upright else ("right body", "left body")
-    axes = new_axes(ax, (6.4, 4.8))
+    axes, units = new_axes(ax, (6.4, 4.8)), units or step.units
     reach = DEEP * np.nan_to_num(contacts_of([step], pair)[0].radius[0]) or float(depth.max())
     shown = depth <= reach
     values = {what: stress[:, component] for what, component in COMPONENTS.items()} | {"von Mises": von_mises(stress)}
@@ -80,11 +80,7 @@ def axis_stress(
             axes.plot(fine, curve, style, color=colour, lw=1.0)
         axes.plot([], [], f"k{style}", lw=1.0, label=label)
     title = title or f"Stresses on the axis, load factor {step.load_factor:g}"
-    depth_name, stress_name = (
-        labelled("depth under the surface", units, "length"),
-        labelled("stress", units, "pressure"),
-    )
-    axes.set(xlabel=depth_name, ylabel=stress_name)
+    axes.set(xlabel=labelled("depth under the surface", units, "length"), ylabel=labelled("stress", units, "pressure"))
     axes.set_title(title, fontsize="medium")
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 # The part of the surface that is drawn reaches so far beyond the closed one, in its own half widths.
-MARGIN = 0.35
+MARGIN = 0.15
 # Least length of the mean of the facets' normals for a surface to be drawn as it is seen along it.
 LEAST_MEAN = 0.3
 # What may stand beside the pressure: its name in words, and what its unit belongs to.
@@ -69,7 +69,7 @@ def contact_map(
     if mesh.dim != 3:
         raise FastcontactError("maps of a contact are for meshes in three dimensions: draw the pressure profile")
     blocks = _facets(mesh, contact)
-    basis, labels = _seen_along(contact, blocks)
+    (basis, labels), units = _seen_along(contact, blocks), units or contact.units
     flat = contact.coordinates @ basis.T
     if labels is None:
         flat -= contact.middle @ basis.T
@@ -84,7 +84,7 @@ def contact_map(
     for ax, (values, caption, quantity) in zip(panels, fields, strict=False):
         ends = min(0.0, float(values.min(initial=0.0))), float(values.max(initial=0.0)) or 1.0
         drawn = fill(ax, blocks, flat, values, "viridis", ends)
-        high = _limit(ax, flat, contact.active & ~np.array(everything))
+        high = _limit(ax, flat, _carrying(contact, blocks) & ~np.array(everything))
         ax.figure.colorbar(drawn, ax=ax, label=labelled(caption, units, quantity), shrink=0.75 * high)
         _nodes(ax, flat, contact, both)
         ax.set(xlabel=labelled(labels[0], units, "length"), ylabel=labelled(labels[1], units, "length"), aspect="equal")
@@ -160,6 +160,14 @@ def _arrows(ax: Any, flat: Array, vectors: Array, size: Array) -> None:
     """Draw the direction of shear or slip at the nodes that have a tenth of the largest."""
     here = size > 0.1 * size.max()
     ax.quiver(*flat[here].T, *vectors[here].T, color="white", width=0.004, pivot="tail")
+
+
+def _carrying(contact: ContactResult, blocks: dict[str, Indices]) -> Mask:
+    """Return which nodes (m,) are closed, or have a facet with pressure."""
+    found = contact.active.copy()
+    for facets in blocks.values():
+        found[facets[(contact.pressure[facets] != 0.0).any(axis=1)]] = True
+    return found
 
 
 def _limit(ax: Any, flat: Array, closed: Mask) -> float:

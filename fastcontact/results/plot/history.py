@@ -56,7 +56,7 @@ def history(
     if axes is None:
         axes = Panels(new_panels(2, 1, (6.0, 5.8), sharex=True)[:, 0])
     upper, lower = axes
-    contacts = contacts_of(steps, pair)
+    contacts, units = contacts_of(steps, pair), units or steps[-1].units
     x = np.array([step.load_factor for step in steps]) * (approach or 1.0)
     cancels = any(c.active.any() for c in contacts) and all(c.cancels for c in contacts if c.active.any())
     forces = [c.normal_force if cancels else float(np.linalg.norm(c.force)) for c in contacts]
@@ -122,7 +122,7 @@ def contact_zones(
     if not steps:
         raise FastcontactError("there is no step whose contact could be plotted")
     axes = new_axes(ax, (6.4, 4.8))
-    contacts = contacts_of(steps, pair)
+    contacts, units = contacts_of(steps, pair), units or steps[-1].units
     x = np.concatenate([np.full(len(c.points), step.load_factor) for step, c in zip(steps, contacts, strict=True)])
     y = np.concatenate([c.place for c in contacts])
     closed = np.concatenate([c.active for c in contacts])

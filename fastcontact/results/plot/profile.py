@@ -48,10 +48,11 @@ def pressure_profile(
         `normal_stress`.
     title : str
     units : mapping
-        Names of the units of ``length``, ``force`` and ``pressure`` for the labels, which have none without; see `UNITS`.
+        Names of the units of ``length``, ``force`` and ``pressure`` for the labels, by default those of the model (none
+        where it names none); see `UNITS`.
     ax : matplotlib Axes, optional
     """
-    ax = new_axes(ax, (6.4, 4.4))
+    ax, units = new_axes(ax, (6.4, 4.4)), units or contact.units
     order = np.argsort(contact.place, kind="stable")
     position, flat = contact.place[order], contact.coordinates.shape[1] == 2
     curves = _curves(theory, other_theories or {})
@@ -123,6 +124,7 @@ def _mark_edges(ax: Axes, contact: ContactResult, position: Array, units: Units)
         centre = 0.5 * float(closed.min() + closed.max()) if len(closed) else 0.0
         ax.axvspan(centre - outside, centre - inside, color="tab:blue", alpha=0.15, lw=0)
     # Where constraints lie between nodes, the radius that results tell is narrower than what nodes can show.
-    between = not np.allclose((inside, outside), contact.radius, rtol=0.01)
-    label = f"edge{', between nodes' * between}: {inside:.4g} to {valued(outside, units, 'length')}"
+    between = not np.allclose(half_width(contact.place, contact.active, contact.across), contact.radius, rtol=0.01)
+    along = "" if contact.tangent is None else " (arc length)"
+    label = f"edge{', between nodes' * between}: {inside:.4g} to {valued(outside, units, 'length')}{along}"
     ax.axvspan(centre + inside, centre + outside, color="tab:blue", alpha=0.15, lw=0, label=label)

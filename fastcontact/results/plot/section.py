@@ -78,7 +78,7 @@ def section(
         If the mesh is not three-dimensional, the normal is zero, or the plane does not meet the mesh.
     """
     at, direction = _plane(mesh, point, normal)
-    shown = field_of(mesh, step, field)
+    shown, units = field_of(mesh, step, field), units or step.units
     triangles, lines = _touching(shown, step, at, direction)
     basis, labels = _plane_axes(direction)
     corners = scaled(triangles[..., :3], scale, triangles[..., 3:6])

@@ -23,7 +23,7 @@ from fastcontact.results.plot._axes import (
 )
 from fastcontact.results.plot.fields import Field, field_of
 from fastcontact.results.plot.patches import fill, outlines
-from fastcontact.results.plot.solid import MOST_EDGES, draw_solid, is_seen
+from fastcontact.results.plot.solid import MOST_EDGES, draw_solid, is_seen, view_of_extreme
 from fastcontact.results.step import StepResult
 from fastcontact.results.units import labelled, valued
 
@@ -56,7 +56,7 @@ def deformed_shape(
     limits: tuple[float, float] | None = None,
     title: str = "",
     units: Units = UNKNOWN,
-    view: tuple[float, float] = (25.0, -60.0),
+    view: tuple[float, float] | None = None,
     ax: Axes | None = None,
 ) -> Axes:
     """Plot the deformed mesh, in 3D what is seen of its surface, coloured by a field, its largest value marked.
@@ -80,18 +80,20 @@ def deformed_shape(
         Values of the first and the last colour, in the unit of the field.
     title, units
         As in `pressure_profile`.
-    view : (float, float)
-        In 3D, height of the eye over the x-y plane and its direction around z [degrees].
+    view : (float, float), optional
+        In 3D, height of the eye over the x-y plane and its direction around z [degrees]; by default (25, -60), or the first
+        of eight corners, of a box around the body, from which the extreme value is seen.
     ax : matplotlib Axes, optional
         In 3D with ``projection="3d"``.
     """
     if zoom is not None and (mesh.dim == 3 or not 0.0 < zoom < LARGEST):
         raise FastcontactError(f"zoom = {zoom:g}: in the plane half a width > 0 can be drawn; in 3D draw a section")
-    shown = field_of(mesh, step, field)
+    shown, units = field_of(mesh, step, field), units or step.units
     points = scaled(shown.mesh.points, scale, step.displacement[shown.node])
     heading = title or f"Deformed shape (displacements x {scale:g}), load factor {step.load_factor:g}"
     if mesh.dim == 3:
         axes = new_axes(ax, (6.4, 6.2), "3d")
+        view = view or view_of_extreme(shown, points)
         drawn = draw_solid(axes, shown, points, edges, view, limits or shown.range)
         _mark(axes, shown, points, mesh, units, hidden=not is_seen(shown, points, view))
         framed = _framed(axes, drawn, shown, heading, units, 0.02)

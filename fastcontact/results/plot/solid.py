@@ -24,6 +24,8 @@ FINEST = 4
 ROOM = 0.9
 # The longer side of what is seen of a box may be this part of its diagonal; slender boxes are drawn smaller.
 WIDEST = 0.8
+# Heights and directions of the eye [degrees]: from above and from below, by way of the four corners.
+VIEWS = [(height, direction) for height in (25.0, -25.0) for direction in (-60.0, 30.0, 120.0, -150.0)]
 # Ticks on an axis that is seen as long as the diagonal of the box.
 TICKS = 14
 
@@ -83,7 +85,9 @@ def show_box(ax: Any, low: Array, high: Array, view: tuple[float, float]) -> Non
     for name, begin, end, along in zip("xyz", low, high, fraction):
         getattr(ax, f"set_{name}lim")(begin, end)
         locator = getattr(ax, f"{name}axis").get_major_locator()
-        locator.set_params(nbins=int(np.clip(TICKS * along, 1, 9)), prune="lower" if TICKS * along < 1.5 else None)
+        # The first number on y stands where the last one on x does.
+        prune = "both" if name == "y" and TICKS * along > 3.0 else "lower" if TICKS * along < 1.5 else None
+        locator.set_params(nbins=int(np.clip(TICKS * along, 1, 9)), prune=prune)
     ax.set_box_aspect(size, zoom=ROOM * min(1.0, WIDEST / widest))
 
 
@@ -93,6 +97,11 @@ def is_seen(shown: Field, points: Array, view: tuple[float, float]) -> bool:
     facing = _facing(shown, points, eye)
     screen = Screen(np.concatenate([corners[:, flat].reshape(-1, 3, 3) for _, corners, _, flat in facing]), eye)
     return not bool(screen.hidden(points[[shown.extreme]])[0])
+
+
+def view_of_extreme(shown: Field, place: Array) -> tuple[float, float]:
+    """Return from where to look: the first of VIEWS from which the extreme value of a field is seen."""
+    return next((view for view in VIEWS if is_seen(shown, place, view)), VIEWS[0])
 
 
 def towards(view: tuple[float, float]) -> Array:

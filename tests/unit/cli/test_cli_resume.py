@@ -106,6 +106,15 @@ def test_an_interrupted_run_goes_on_and_a_complete_one_stays(whole, path, capsys
     assert path.read_bytes() == before
 
 
+def test_a_resumed_run_tells_that_its_steps_are_others(whole, path, capsys, tmp_path):
+    case, _ = whole
+    run(case, path)
+    other = tmp_path / "other.toml"
+    other.write_text(case.read_text().replace(f"steps = {STEPS}", f"steps = {STEPS + 1}"))
+    assert main(["run", str(other), "-o", str(path), "--resume"]) == 0
+    assert f"holds {STEPS} steps, the case now has {STEPS + 1}: those in the file stay" in capsys.readouterr().err
+
+
 def test_without_resume_a_run_begins_anew(whole, begun, path):
     case, steps = whole
     shutil.copy(begun, path)

@@ -195,6 +195,14 @@ def test_the_mark_says_that_it_is_hidden():
     assert label(ax) == "maximum 1 at (0.5, 0.5, 0.5), hidden"
 
 
+def test_a_solid_is_seen_from_where_its_extreme_is():
+    mesh = box((1.0, 1.0, 1.0), (2, 2, 2), "hex8")
+    behind = (np.abs(mesh.points - [0.0, 1.0, 0.0]).sum(axis=1) == 0.0) * 1.0
+    ax = fc.plot.deformed_shape(mesh, step_of(mesh, values=behind))
+    assert (ax.elev, ax.azim) == (25.0, 30.0)
+    assert "hidden" not in label(ax)
+
+
 def test_tetrahedra_are_cut_where_the_level_is():
     random = np.random.default_rng(1)
     data = random.normal(size=(200, 4, 3))
@@ -290,6 +298,10 @@ def test_a_contact_map_shows_the_pressure_at_the_nodes(element, turned):
     assert len(closed.get_xdata()) == contact.active.sum()
     reach = np.abs(contact.coordinates[contact.active][:, 0]).max()
     assert reach < ax.get_xlim()[1] < 1.0
+    ends = across[
+        contact.pressure == 0.0, 0
+    ]  # next to the last closed nodes: pressure falls to zero within the picture
+    assert ends[ends > reach + 1e-9].min() < ax.get_xlim()[1]
     assert axes._repr_png_().startswith(b"\x89PNG")
 
 

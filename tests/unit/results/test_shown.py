@@ -50,6 +50,15 @@ def test_steps_are_a_list_with_a_short_repr(steps):
     assert [s.index for s in pickle.loads(pickle.dumps(steps))] == [1, 2, 3]
 
 
+def test_answers_and_estimates_show_tables(model, steps):
+    answers = fc.contact_resultants(model, steps, "hertz & co")[-1]
+    assert f"{answers.normal_force:.6g}" in answers._repr_html_()
+    assert np.isnan(answers.centre[0])  # forces all round have no middle off the axis
+    estimate = fc.estimate_error(model, steps[-1])
+    assert f"{estimate.relative:.6g}" in estimate._repr_html_()
+    assert f"{len(estimate.cells)} numbers, {estimate.cells.min():.6g} to" in estimate._repr_html_()
+
+
 def test_a_long_analysis_shows_its_last_steps(steps):
     many = Steps([steps[0]] * (SHOWN + 9) + [steps[2]])
     assert len(many) == SHOWN + 10
