@@ -31,7 +31,9 @@ _MODULES = {
 }
 _NAMES = {
     "analysis.contact_resultants": (
+        "ContactAnswers",
         "ContactResultants",
+        "contact_answers",
         "contact_history",
         "contact_moment",
         "contact_resultants",

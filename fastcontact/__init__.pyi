@@ -2,7 +2,9 @@
 
 from fastcontact import analytic as analytic
 from fastcontact._version import __version__ as __version__
+from fastcontact.analysis.contact_resultants import ContactAnswers as ContactAnswers
 from fastcontact.analysis.contact_resultants import ContactResultants as ContactResultants
+from fastcontact.analysis.contact_resultants import contact_answers as contact_answers
 from fastcontact.analysis.contact_resultants import contact_history as contact_history
 from fastcontact.analysis.contact_resultants import contact_moment as contact_moment
 from fastcontact.analysis.contact_resultants import contact_resultants as contact_resultants

@@ -112,6 +112,12 @@ def contact_resultants(model: Model, steps: Iterable[StepResult], name: str) -> 
     return resultants
 
 
+#: The earlier name of `ContactResultants`.
+ContactAnswers = ContactResultants
+#: The earlier name of `contact_resultants`.
+contact_answers = contact_resultants
+
+
 def _resultants(contact: ContactResult, areas: Array, axisymmetric: bool, work: float) -> ContactResultants:
     closed, facing = contact.active, np.isfinite(contact.gap)
     normal = np.where(np.isfinite(contact.normal), contact.normal, 0.0)

@@ -187,7 +187,7 @@ class HeatConditions:
         """Prescribe the temperature of nodes by a line of *BOUNDARY."""
         if not self.made.content.heat:
             raise row.location.refuse(
-                "component 11, the temperature, is none of 1 to 6: in static steps use *TEMPERATURE"
+                "component 11, the temperature, is not within 1 to 6: in static steps use *TEMPERATURE"
             )
         if "FIXED" in given.block.parameters:
             raise row.location.refuse("FIXED is not supported for temperatures: give them")
