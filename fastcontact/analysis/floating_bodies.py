@@ -25,7 +25,8 @@ from fastcontact.model.rigid_motions import FreeMotions
 
 # Stiffness of the springs beside that of the body. Softer ones cost digits of factors (1e-6: a wedge off by 3e-9), stiffer
 # ones solutions: a stack with friction takes 4.1, 4.2 and 65 linear solutions with 1e-3, 1e-2 and 1, a bolt 2.8, 5.3 and 27.
-SOFT = 1e-3
+# Where turned bodies under load have a negative stiffness, springs as stiff as the body make up for it.
+SOFT, STIFF = 1e-3, 1.0
 # The springs carry less than this fraction of the loads and of the contact forces, which is all there is where motions drive
 # the bodies; more where round-off or the linear solver leave more.
 SLACK = 1e-12
@@ -76,6 +77,8 @@ class FloatingBodies:
         Displacements to keep the springs from if possible: those of the contact surfaces.
     before : ndarray of int, optional
         Displacements that springs held before, which go on with them unless others are much better.
+    softness : float, optional
+        Stiffness of the springs beside that of the body [-].
 
     Attributes
     ----------
@@ -89,7 +92,9 @@ class FloatingBodies:
         Of each spring [force / length].
     """
 
-    def __init__(self, motions: FreeMotions, system: System, avoid: Indices, before: Indices = NONE) -> None:
+    def __init__(
+        self, motions: FreeMotions, system: System, avoid: Indices, before: Indices = NONE, softness: float = SOFT
+    ) -> None:
         diagonal, weightless = system.matrix.diagonal(), system.weightless
         typical = float(np.median(diagonal[system.free & ~weightless]))
         diagonal = np.where(weightless, typical, diagonal)
@@ -104,7 +109,7 @@ class FloatingBodies:
         ]
         self._at_springs = motions.displacement[self.dofs]
         self.motions = motions.combined(np.asarray(np.linalg.inv(self._at_springs), np.float64))
-        self.stiffness = SOFT * typical
+        self.stiffness = softness * typical
 
     def with_springs(self, matrix: bsr_array) -> bsr_array:
         """Return the matrix with the springs added."""

@@ -149,23 +149,22 @@ def _solve(
 
     `at` are the bodies and their displacements (n_dofs,) [length], `scale` the displacement to expect [length] and the last
     relative change: contact geometry settles to a part of that. Where the tangent is not positive definite, the constraints
-    that the `last` contact held are stiffened, which leaves the iterations quadratic; where that does not help, parts of the
-    geometric stiffness are left out.
+    that the `last` contact held are stiffened, or the springs of floating bodies, which leaves the iterations quadratic;
+    where that does not help, parts of the geometric stiffness are left out.
     """
     bodies, u = at
-    held = None if problem.floating_bodies is not None else _held(last)  # there tangents let bodies move freely
-    attempts = [
-        (WHOLE, None),
-        *([] if held is None else [(WHOLE, held)]),
-        *((less, None) for less in range(WHOLE)[::-1]),
-    ]
-    for geometric, rows in attempts:
+    stiff = problem.floating_bodies is not None
+    held = None if stiff else _held(last)  # there tangents let bodies move freely
+    attempts: list[tuple[int, csr_array | None, bool]] = [(WHOLE, None, False)]
+    attempts += [(WHOLE, held, stiff)] if stiff or held is not None else []
+    attempts += [(less, None, stiff) for less in range(WHOLE)[::-1]]
+    for geometric, *stiffened in attempts:
         if geometric < WHOLE:
             bodies = problem.deformed(u, start, geometric=geometric)
         try:
-            return _linear_contact(problem, start, load, (bodies, u), iterate, scale, rows)
+            return _linear_contact(problem, start, load, (bodies, u), iterate, scale, *stiffened)
         except (ModelError, ConvergenceError) as error:
-            log.info("the tangent is changed (geometric stiffness %d, held %s): %s", geometric, rows is not None, error)
+            log.info("the tangent with %d parts of the geometric stiffness fails: %s", geometric, error)
             failed = error
     if isinstance(failed, ConvergenceError):
         raise failed
@@ -187,10 +186,10 @@ def _held(last: SettledContact | None) -> csr_array | None:
 
 def _linear_contact(
     problem: Problem, start: State, load: StepLoad, at: tuple[DeformedBodies, Array], iterate: Iterate,
-    scale: tuple[float, float], held: csr_array | None = None,
+    scale: tuple[float, float], held: csr_array | None = None, stiff: bool = False,
 ) -> tuple[SettledContact | None, Array, Array]:  # fmt: skip
-    """Return the result of `_solve` for a tangent, stiffened along the rows `held` (k, n_dofs)."""
-    tangent, linear = problem.linearised(*at, load, iterate.rigid, held)
+    """Return the result of `_solve` for a tangent, stiffened along the rows `held` (k, n_dofs) and where bodies float."""
+    tangent, linear = problem.linearised(*at, load, iterate.rigid, held, stiff)
     iterate.u, iterate.history = at[1].copy(), []
     loaded, settled = with_loads(tangent, linear), None
     if tangent.pairs:

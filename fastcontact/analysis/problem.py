@@ -14,7 +14,7 @@ from scipy.sparse import bsr_array, csr_array, diags_array, eye_array, kron
 from fastcontact._jit import parallel
 from fastcontact.analysis.active_dofs import ActiveDofs, SurfaceDofs
 from fastcontact.analysis.criteria import Criteria
-from fastcontact.analysis.floating_bodies import FloatingBodies, RigidPosition
+from fastcontact.analysis.floating_bodies import SOFT, STIFF, FloatingBodies, RigidPosition
 from fastcontact.analysis.heat import Heat, prepared_heat
 from fastcontact.analysis.state import State
 from fastcontact.analysis.work import Work
@@ -258,16 +258,17 @@ class Problem:
             force[:n] -= factor * (here - before).ravel()
         return force, (bodies.energy + 0.5 * float(pull @ u[:n]), bodies.plastic_work)
 
-    def _floating(self, system: System, u: Array, rigid: RigidPosition | None) -> FloatingBodies | None:
+    def _floating(self, system: System, u: Array, rigid: RigidPosition | None, stiff: bool) -> FloatingBodies | None:
         """Return the floating bodies of a tangent: where they turn, their free motions are those of the deformed shape."""
-        turning = self.bodies is not None and self.bodies.finite and self.model.kinematics != "axisymmetric"
-        if self.floating_bodies is None or not turning:
+        if self.floating_bodies is None or self.bodies is None or not self.bodies.finite:
             return self.floating_bodies
-        motions = floating_motions(self.model, self.model.prescribed_by_ramp()[0], self.displacement(u))
-        if len(motions) != len(self.floating_bodies.motions):
-            return self.floating_bodies
+        motions = self.floating_bodies.motions
+        if self.model.kinematics != "axisymmetric":
+            turned = floating_motions(self.model, self.model.prescribed_by_ramp()[0], self.displacement(u))
+            motions = turned if len(turned) == len(motions) else motions
         before = self.floating_bodies.dofs if rigid is None else rigid.dofs
-        return FloatingBodies(motions, system, system.involved(self.contact_dofs), before)
+        softness = STIFF if stiff else SOFT
+        return FloatingBodies(motions, system, system.involved(self.contact_dofs), before, softness)
 
     def linearised(
         self,
@@ -276,10 +277,11 @@ class Problem:
         load: StepLoad,
         rigid: RigidPosition | None,
         held: csr_array | None = None,
+        stiff: bool = False,
     ) -> tuple[Problem, StepLoad]:
         """Return the problem with the tangent of nonlinear bodies, at displacements u (n_dofs,) [length], and its loads.
 
-        The tangent has springs along the rows `held` (k, n_dofs), slack at u.
+        The tangent has springs along the rows `held` (k, n_dofs), slack at u; those of floating bodies are `stiff`.
         """
         force, K = -self.internal(bodies, u, load)[0], stiffened(bodies.K, self.model.springs)
         for (pressure, _), factor in zip(self.following, load.following, strict=True):
@@ -288,7 +290,7 @@ class Problem:
         K = self.force_driven.stiffness(K)
         system = self.system.renewed(K if held is None else _stiffened_along(K, held))
         force += load.force + system.K @ u
-        floating = self._floating(system, u, rigid)
+        floating = self._floating(system, u, rigid, stiff)
         if floating is not None and rigid is not None:  # turned bodies under load are not free to turn
             force -= system.K @ floating.rigid(u[floating.dofs])
         solver = copy.copy(self.solver)

@@ -159,7 +159,7 @@ def of_function(function: Callable[..., Any], where: str, inherited: Docstring |
     """The entries of a function or method; those of a constructor stand in the docstring of its class."""
     module = sys.modules[function.__module__]
     source = Source(function, inherited or Docstring(function.__doc__ or ""))
-    for name, parameter in inspect.signature(function).parameters.items():
+    for name, parameter in inspect.signature(inspect.unwrap(function)).parameters.items():
         note = "" if parameter.annotation is parameter.empty else str(parameter.annotation)
         said = source.argument(name, note)
         if is_array(note, module) or TYPED.search(said.partition("\n")[0]):
