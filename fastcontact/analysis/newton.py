@@ -158,11 +158,11 @@ def _solve(
     attempts: list[tuple[int, csr_array | None, bool]] = [(WHOLE, None, False)]
     attempts += [(WHOLE, held, stiff)] if stiff or held is not None else []
     attempts += [(less, None, stiff) for less in range(WHOLE)[::-1]]
-    for geometric, *stiffened in attempts:
+    for geometric, rows, firm in attempts:
         if geometric < WHOLE:
             bodies = problem.deformed(u, start, geometric=geometric)
         try:
-            return _linear_contact(problem, start, load, (bodies, u), iterate, scale, *stiffened)
+            return _linear_contact(problem, start, load, (bodies, u), iterate, scale, rows, firm)
         except (ModelError, ConvergenceError) as error:
             log.info("the tangent with %d parts of the geometric stiffness fails: %s", geometric, error)
             failed = error
