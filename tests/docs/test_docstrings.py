@@ -15,8 +15,10 @@ PACKAGE = pages.ROOT / "fastcontact"
 WITH_EXAMPLES = [path for path in sorted(PACKAGE.rglob("*.py")) if ">>>" in path.read_text(encoding="utf-8")]
 ROOMS = ["analytic", "mesh/generate", "mesh/elements", "mesh/mesh.py", "mesh/quadrature.py", "mesh/quality.py"]
 ROOMS += ["mesh/topology.py", "model/checks.py"]
-ROOMS += [f"elasticity/{name}.py" for name in ("energy", "loads", "materials", "recovery", "multipoint_constraints", "springs")]
-ROOMS += [f"elasticity/{name}.py" for name in ("cell_stress", "dilatation", "smoothed_stress", "stiffness")]
+ROOMS += [f"elasticity/{name}.py" for name in ("energy", "loads", "materials", "recovery", "springs", "stiffness")]
+ROOMS += [
+    f"elasticity/{name}.py" for name in ("cell_stress", "dilatation", "multipoint_constraints", "smoothed_stress")
+]
 
 
 @pytest.mark.parametrize("path", WITH_EXAMPLES, ids=lambda path: str(path.relative_to(PACKAGE)))

@@ -111,8 +111,8 @@ class ModelContact(ModelConnections):
               faced [length].
             - ``normals``: ``"facet"`` or ``"averaged"`` between the facets that meet at a node at less than 45 degrees, which
               curved sides that fit closely need; ``"secondary"``: those of the secondary side; a vector (dim,) out of the
-              primary side's body: one normal for all of it [-]. ``projection_tolerance``: how far points may stand out beyond the end of
-              the primary side and still carry force, in facet lengths.
+              primary side's body: one normal for all of it [-]. ``projection_tolerance``: how far points may stand out
+              beyond the end of the primary side and still carry force, in facet lengths.
         """
         given: dict[str, Any] = {option: value for option, value in options.items() if value is not None}
         if formulation is None:
