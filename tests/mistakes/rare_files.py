@@ -189,7 +189,7 @@ CALLS = [
     ("an HDF5 file with texts for numbers", lambda folder: opened(folder, texts), fc.errors.FileError, r"holds no plain numbers: the file is damaged, write it anew"),
     ("packed data without head", lambda: packing.unpacked(np.zeros(300, np.uint8)), ValueError, r"no packed data"),
     ("packed data that were changed", packed_and_changed, ValueError, r"packed data are cut off or changed"),
-    ("packed data of another kind", packed_of_another_kind, ValueError, r"an array of \|O8 is none of ours"),
+    ("packed data of another kind", packed_of_another_kind, ValueError, r"an array of \|O8 is not one of ours"),
     ("a result whose kinematics are a number", lambda folder: resulting(folder, kinematics_in_numbers), fc.errors.FileError, r"its kinematics or its case is no text"),
     ("a result whose point numbers are broken", lambda folder: resulting(folder, broken_point_numbers), fc.errors.FileError, r"the contact table of 'pair' is of another kind"),
     ("a result with a cell field cut off", lambda folder: resulting(folder, cell_field_cut_off), fc.errors.FileError, r"error of step 0 is cut off or of another kind"),

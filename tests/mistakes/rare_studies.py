@@ -38,7 +38,7 @@ CASES = [
     ("combination of one word", '"tri3 node_to_segment"', '"tri3"', r"an entry of study\.combinations must name an element and a formulation, not 'tri3'"),
     ("combination with an unknown formulation", '"tri3 node_to_segment"', '"tri3 node_to_segmnt"', r"unknown contact formulation 'node_to_segmnt': did you mean 'node_to_segment'\?"),
     ("unknown maker of a study", 'generator = "half-spheres"', 'generator = "half-sphere"', r"unknown study\.generator 'half-sphere': did you mean 'half-spheres'"),
-    ("unknown argument of a maker", "[study.triangles]", "[study.triangles]\nsiz = 3.0", r"unknown argument of the generator half-spheres in \[study\] 'siz': did you mean 'size'"),
+    ("unknown argument of a maker", "[study.triangles]", "[study.triangles]\nsiz = 3.0", r"unknown key 'study\.triangles\.siz': did you mean 'study\.triangles\.size'"),
     ("curve without radius", "[study]", '[study]\ncurves = [{ group = "CONT1", centre = [0.0, 50.0] }]', r"study\.curves\[0\] must be \{ group = 'NAME', centre = \[x, y\], radius = R \}"),
     ("element that the study has no sizes for", '"tri3 node_to_segment"', '"hex8 node_to_segment"', r"there are no meshes of hex8 in this study: give the arguments of level 0 in \[study\.triangles\]"),
 ]  # fmt: skip
