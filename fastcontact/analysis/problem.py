@@ -14,7 +14,7 @@ from scipy.sparse import bsr_array, csr_array, diags_array, eye_array, kron
 from fastcontact._jit import parallel
 from fastcontact.analysis.active_dofs import ActiveDofs, SurfaceDofs
 from fastcontact.analysis.criteria import Criteria
-from fastcontact.analysis.floating_bodies import SOFT, STIFF, FloatingBodies, RigidPosition
+from fastcontact.analysis.floating_bodies import FIRM, SOFT, STIFF, FloatingBodies, RigidPosition
 from fastcontact.analysis.heat import Heat, prepared_heat
 from fastcontact.analysis.state import State
 from fastcontact.analysis.work import Work
@@ -267,8 +267,8 @@ class Problem:
             turned = floating_motions(self.model, self.model.prescribed_by_ramp()[0], self.displacement(u))
             motions = turned if len(turned) == len(motions) else motions
         before = self.floating_bodies.dofs if rigid is None else rigid.dofs
-        softness = STIFF if stiff else SOFT
-        return FloatingBodies(motions, system, system.involved(self.contact_dofs), before, softness)
+        softness = STIFF if stiff else _softness(self.solver)
+        return FloatingBodies(motions, system, system.involved(self.contact_dofs), softness, before)
 
     def linearised(
         self,
@@ -357,7 +357,7 @@ def prepare(
     contact_dofs = _contact_dofs(mesh, pairs, len(driven))
     involved = system.involved(contact_dofs)
     motions = floating_motions(model, supported)
-    bodies = FloatingBodies(motions, system, involved) if len(motions) else None
+    bodies = FloatingBodies(motions, system, involved, _softness(solver)) if len(motions) else None
     involved = _prepare_solver(solver, system, bodies, driven.near_nullspace(near_nullspace(model)), involved)
     return Problem(
         model, ramp, criteria, solver, pairs, field, sides, system, bodies,
@@ -374,6 +374,11 @@ def _stiffened_along(K: bsr_array, rows: csr_array) -> bsr_array:
     total = bsr_array(K + csr_array(rows.T @ diags_array(stiffness) @ rows).tobsr(K.blocksize))
     total.sort_indices()
     return total
+
+
+def _softness(solver: LinearSolver) -> float:
+    """Return how stiff springs on floating bodies are beside these [-]."""
+    return SOFT if solver.iterative else FIRM
 
 
 def floating_motions(model: Model, supported: Mask, displacement: Array | float = 0.0) -> FreeMotions:
