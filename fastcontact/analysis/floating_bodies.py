@@ -18,6 +18,7 @@ import numpy as np
 from scipy.linalg import qr
 from scipy.sparse import bsr_array
 
+from fastcontact.analysis.anderson import Anderson
 from fastcontact.analysis.solution import Solution
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.elasticity.constrained_system import System
@@ -34,6 +35,8 @@ SLACK = 1e-12
 # What is left when nothing improves any more counts as slack below this fraction.
 STAGNANT = 1e-8
 MAX_POSITIONS = 100
+# Anchors before their changes are extrapolated: parts far softer than the springs, as a layer that peels off, creep.
+PLAIN = 1
 # Of the size of a displacement as a place of a spring: on contact surfaces, and where springs have been.
 AVOIDED, KEPT = 1e-3, 4.0
 NONE = np.empty(0, np.intp)
@@ -178,17 +181,21 @@ class FloatingBodies:
             The last one if the springs do not become slack, or a contact problem does not settle.
         """
         position, before, iterations = start, np.inf, 0
+        mixing = Anderson(len(start) + 1, np.arange(len(start)))
         for positions in range(1, MAX_POSITIONS + 1):
             state = solve_at(position)
             elongation, iterations = state.u[self.dofs], iterations + state.iterations
             left = float(np.abs(elongation).max())
             force = max(load, float(np.abs(state.multiplier).max(initial=0.0))) / self.stiffness
             slack = left <= max(SLACK * force, noise * float(np.abs(state.u).max()))
-            if not slack and left >= 0.5 * before:
+            if not slack and left >= 0.5 * before and positions > PLAIN + 2:
                 slack = left <= max(STAGNANT * force, round_off)
             if slack or not state.settled or positions == MAX_POSITIONS:
                 break
-            position, before = position + elongation, left
+            if left > before:
+                mixing.restart()
+            anchor = position + elongation
+            position, before = anchor if positions <= PLAIN else mixing.mixed(position, anchor), left
         state = dataclasses.replace(state, iterations=iterations)
         return RigidPosition(state, position, self.stiffness * elongation, positions, slack, self.dofs)
 

@@ -115,11 +115,11 @@ def test_a_slender_bar_settles_and_contact_carries_its_load(geometry, caplog):
         assert f"scatter by {scatter['displacement']:.1e}" in caplog.text
 
 
-def test_a_slender_bar_whose_rigid_position_is_found_at_once_does_not_scatter():
-    """Its position is left alone where its springs are slack: looking for it anew in every pairing is what scatters."""
+def test_a_slender_bar_that_contact_holds_scatters_by_round_off_alone():
+    """Its position settles in two updates, and the geometry loop ends where later ones tell nothing more."""
     (step,) = fc.solve(slender(), fc.linear_ramp(1))
-    assert "scatter" not in step.iterations
-    assert step.iterations["geometry_updates"] < 5
+    assert step.iterations["scatter"]["displacement"] < 1e-7
+    assert step.iterations["geometry_updates"] < 20
     assert step.contact["c"].force[1] == pytest.approx(0.4, rel=1e-10)
 
 
