@@ -143,7 +143,7 @@ def test_a_schema_that_is_no_whole_number(results, value):
 
 def test_a_result_file_behind_a_block_of_others_is_refused(results):
     results.write_bytes(bytes(512) + results.read_bytes())
-    with pytest.raises(FileError, match="its addresses are none of ours"):
+    with pytest.raises(FileError, match="its addresses are not ours"):
         fc.open_results(results)
 
 
@@ -398,13 +398,13 @@ def test_texts_of_cases_are_no_toml(tmp_path, results, kind):
     with fc.open_results(results) as found:
         found.case_text = TEXTS[kind]
         assert case_data(found)["title"] == ""
-        assert found._units() == {}
+        assert found._units_of_case() == {}
 
 
 def test_a_case_text_in_results_that_is_too_large_is_not_parsed(results):
     with fc.open_results(results) as found:
         found.case_text = "a = 1\n" + "#" * (1 << 23)
-        assert found._units() == {}
+        assert found._units_of_case() == {}
 
 
 @pytest.mark.parametrize("shape", [(8, 0), (1, 0), (0, 0, 8)])
