@@ -1,0 +1,92 @@
+"""Bodies that contact and friction alone hold cost multigrid at most ten linear solutions."""
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+
+
+def numbered(mesh, i):
+    return fc.generate.renamed(mesh, {name: f"{name}{i}" for name in mesh.group_names})
+
+
+def stack():
+    """Three loose plates on each other, pressed and pushed along."""
+    plates, z = [], 0.0
+    for i, (width, n) in enumerate(((8.0, 6), (6.0, 5), (7.0, 7))):
+        plates.append(numbered(fc.generate.box((width, width, 2.0), (n, n, 2), origin=(-width / 2, -width / 2, z)), i))
+        z += 2.0
+    model = fc.Model(fc.generate.union(*plates), "3d")
+    for i, E in enumerate((2e5, 1e4, 7e4)):
+        model.add_material(fc.LinearElastic(E, 0.3), groups=[f"BOX{i}"])
+    model.fix("ZMIN0", "xyz")
+    model.add_pressure("ZMAX2", 10.0)
+    model.add_traction("ZMAX2", x=1.0)
+    for i in (1, 2):
+        model.add_contact(f"c{i}", secondary=f"ZMIN{i}", primary=f"ZMAX{i - 1}", friction=0.3)
+    return model
+
+
+def wedge():
+    """A wedge pressed into the notch between two blocks."""
+
+    def leaning(mesh, of):
+        points = mesh.points.copy()
+        points[:, 0] = of(points[:, 0], 0.6 + 0.25 * points[:, 1])
+        return mesh.replace(points=points)
+
+    left, right, middle = (
+        numbered(fc.generate.block(size, divisions, "quad4", origin), i)
+        for i, (size, divisions, origin) in enumerate(
+            (((4.0, 3.0), (8, 6), (-4.0, 0.0)), ((4.0, 3.0), (8, 6), (0.0, 0.0)), ((2.0, 3.0), (5, 7), (-1.0, 0.0)))
+        )
+    )
+    left = leaning(left, lambda x, half: -4.0 + (x + 4.0) * (4.0 - half) / 4.0)
+    right = leaning(right, lambda x, half: 4.0 - (4.0 - x) * (4.0 - half) / 4.0)
+    model = fc.Model(fc.generate.union(left, right, leaning(middle, lambda x, half: x * half)), "plane_strain")
+    model.add_material(fc.LinearElastic(2e5, 0.3))
+    model.fix("LEFT0", "xy")
+    model.fix("RIGHT1", "xy")
+    model.add_pressure("TOP2", 10.0)
+    model.add_contact("l", secondary="LEFT2", primary="RIGHT0", friction=0.3)
+    model.add_contact("r", secondary="RIGHT2", primary="LEFT1", friction=0.3)
+    return model
+
+
+def gasket():
+    """A quarter of a soft ring between two flanges that pressure clamps."""
+
+    def ring(radii, heights, divisions, i):
+        size = (radii[1] - radii[0], np.pi / 2, heights[1] - heights[0])
+        mesh = fc.generate.box(size, divisions, origin=(radii[0], 0.0, heights[0]))
+        r, angle, z = mesh.points.T
+        return numbered(mesh.replace(points=np.column_stack([r * np.cos(angle), r * np.sin(angle), z])), i)
+
+    rings = (
+        ring((4, 10), (0.0, 2.0), (6, 10, 2), 0),
+        ring((5, 7), (2.0, 2.3), (3, 13, 1), 1),
+        ring((4, 10), (2.3, 4.3), (5, 9, 2), 2),
+    )
+    model = fc.Model(fc.generate.union(*rings), "3d")
+    for i, E in enumerate((2e5, 2e3, 2e5)):
+        model.add_material(fc.LinearElastic(E, 0.3), groups=[f"BOX{i}"])
+        model.fix(f"YMIN{i}", "y")
+        model.fix(f"YMAX{i}", "x")
+    model.fix("ZMIN0", "z")
+    model.add_pressure("ZMAX2", 10.0)
+    model.add_contact("lower", secondary="ZMIN1", primary="ZMAX0", friction=0.3)
+    model.add_contact("upper", secondary="ZMAX1", primary="ZMIN2", friction=0.3)
+    return model
+
+
+@pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")
+@pytest.mark.parametrize(
+    ("model", "of_linear", "held", "force"),
+    # Iterations of a linear solution of the same bodies on the springs, and what the first pair carries along an axis: the load.
+    [(stack, 15, 2, 490.0), (wedge, 11, 1, 13.5), (gasket, 19, 2, 378.0 * 10.0 * np.sin(np.pi / 18))],
+)
+def test_ten_linear_solutions_hold_loose_bodies(model, of_linear, held, force):
+    (step,) = fc.solve(model(), 1, linear_solver="amg")
+    assert step.iterations["linear_iterations"] <= 10 * of_linear
+    first = next(iter(step.contact.values()))
+    assert abs(first.force[held]) == pytest.approx(force, rel=1e-6)
