@@ -82,7 +82,7 @@ def gasket():
 @pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")
 @pytest.mark.parametrize(
     ("model", "of_linear", "held", "force"),
-    # Iterations of a linear solution of the same bodies on the springs, and what the first pair carries along an axis: the load.
+    # Iterations of a linear solution of the same bodies on the springs; the load that the first pair carries along an axis.
     [(stack, 15, 2, 490.0), (wedge, 11, 1, 13.5), (gasket, 19, 2, 378.0 * 10.0 * np.sin(np.pi / 18))],
 )
 def test_ten_linear_solutions_hold_loose_bodies(model, of_linear, held, force):
