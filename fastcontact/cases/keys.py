@@ -81,9 +81,11 @@ def check_settings(data: Mapping[str, Any]) -> None:
     if data.get("modes", {}).get("n", 1) < 1:
         raise CaseError(f"modes.n = {data['modes']['n']}: ask for one mode or more")
     diameters = data.get("modes", {}).get("nodal_diameters", "all")
-    wrong = isinstance(diameters, list) and any(not isinstance(d, int) or isinstance(d, bool) or d < 0 for d in diameters)
+    wrong = isinstance(diameters, list) and any(
+        not isinstance(d, int) or isinstance(d, bool) or d < 0 for d in diameters
+    )
     if wrong or (isinstance(diameters, str) and diameters != "all"):
-        raise CaseError(f"modes.nodal_diameters = {diameters!r}: write \"all\", or whole numbers from 0 on")
+        raise CaseError(f'modes.nodal_diameters = {diameters!r}: write "all", or whole numbers from 0 on')
     for key, (kind, form) in STUDY_ENTRIES.items():
         entries = data.get("study", {}).get(key, ())
         for place, entry in entries.items() if isinstance(entries, dict) else enumerate(entries):

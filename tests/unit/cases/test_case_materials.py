@@ -72,7 +72,10 @@ def test_constants_that_vary_reach_the_model(tmp_path):
             WOOD + "volumetric = 'plain'",
             r"the key 'material\[0\].volumetric' does not belong to a material that is orthotropic",
         ),
-        ("E = 1.0\nnu = 0.3\naxes = [[1, 0, 0], [0, 1, 0]]", r"the key 'material\[0\].axes' does not belong to .* isotropic"),
+        (
+            "E = 1.0\nnu = 0.3\naxes = [[1, 0, 0], [0, 1, 0]]",
+            r"the key 'material\[0\].axes' does not belong to .* isotropic",
+        ),
         (
             "E = {along = 'r', table = [[0, 1]]}\nnu = 0.3",
             r"'material\[0\].E': a table is along x, y, z or radius, not",
