@@ -135,9 +135,10 @@ def _with_floating_bodies(
     start = iterate.u[bodies.dofs]
     if not iterate.history:
         moved = _approach(step, bodies, constraints, iterate.u)
-        if not active.any():
+        unilateral = active if constraints.equality is None else active & ~constraints.equality
+        if not unilateral.any():
             start = start + moved
-            known = _touching(step, constraints, iterate.u + bodies.rigid(moved))
+            known = active | _touching(step, constraints, iterate.u + bodies.rigid(moved))
     noise = 10 * max(problem.solver.tolerance, accuracy.residual or 0.0)
     rigid = bodies.settle(solve_at, start, state.largest_rigid_force, noise, state.gap_round_off)
     if rigid.state.settled and not rigid.slack:

@@ -33,7 +33,7 @@ def functions():
             made = getattr(space, name)
             if name.startswith("_"):
                 continue
-            if inspect.isclass(made) and not issubclass(made, BaseException) and name not in RESULTS:
+            if inspect.isclass(made) and not issubclass(made, BaseException) and made.__name__ not in RESULTS:
                 found[name] = (made.__init__, made)
                 for method in (m for m in dir(made) if not m.startswith("_")):
                     call = inspect.getattr_static(made, method)
