@@ -37,7 +37,9 @@ def test_every_public_name_is_in_the_reference():
     reference = "\n".join(path.read_text(encoding="utf-8") for path in (pages.DOCS / "reference").glob("*.md"))
     errors = {name for name, value in vars(fc.errors).items() if inspect.isclass(value)}
     for name in set(fc.__all__) - errors:
-        assert re.search(rf"auto(class|function|module|data):: (fastcontact\.[\w.]*)?{name}$", reference, re.MULTILINE), name
+        assert re.search(
+            rf"auto(class|function|module|data):: (fastcontact\.[\w.]*)?{name}$", reference, re.MULTILINE
+        ), name
     for module in (analytic, generate, obstacles, plot, fc.errors):
         assert f"automodule:: {module.__name__}\n" in reference
 
