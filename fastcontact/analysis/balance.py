@@ -15,9 +15,8 @@ from fastcontact.analysis.problem import Problem
 from fastcontact.arrays import Array
 from fastcontact.elasticity.springs import ground_force
 from fastcontact.errors import ConvergenceError
+from fastcontact.round_off import SUM_ROUND_OFF
 
-# Round-off of a sum of internal forces, in units of the sum of their sizes.
-ROUND_OFF = 16 * float(np.finfo(float).eps)
 # Forces are there beyond so much round-off from elsewhere.
 THERE = 100.0
 # What is allowed where there are no forces but round-off, in the same units.
@@ -125,7 +124,7 @@ def balance(
         # Stiff parts that moved far are off by round-off of their own rows, which may be more than the forces of soft ones.
         # Without forces the criterion is 0/0: round-off of all rows decides. Either costs a product with K.
         row_sums = problem.system.K.row_sums(problem.accurate_to(u))
-        residual = problem.system.balance(out, ROUND_OFF * row_sums)[1]
+        residual = problem.system.balance(out, SUM_ROUND_OFF * row_sums)[1]
         round_off, noise = _round_off(problem, row_sums, forces, largest_so_far)
     n_dofs = problem.model.n_dofs
     return Balance(
@@ -151,8 +150,8 @@ def _round_off(
     soft ones.
     """
     slack = SLACK * largest_force
-    noise = max(slack, THERE * ROUND_OFF * largest(row_sums))
+    noise = max(slack, THERE * SUM_ROUND_OFF * largest(row_sums))
     for part in map(np.abs, forces):
-        if ((part > noise) & (part * problem.criteria.relative > ROUND_OFF * row_sums)).any():
+        if ((part > noise) & (part * problem.criteria.relative > SUM_ROUND_OFF * row_sums)).any():
             return slack, noise
     return max(max(ALLOWED, 10 * problem.solver.tolerance) * largest(row_sums), slack), noise

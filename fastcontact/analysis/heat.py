@@ -20,9 +20,8 @@ from fastcontact.mesh.topology import bodies
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, Table, combined
 from fastcontact.model.rigid_motions import body_name
+from fastcontact.round_off import SUM_ROUND_OFF
 
-# Round-off of a sum of powers, in units of the sum of their sizes.
-ROUND_OFF = 16 * float(np.finfo(float).eps)
 ByRamp = Mapping[Table | None, Array]
 
 
@@ -129,7 +128,7 @@ class Heat:
         rise[free] = self._solved(csr_array(A[free][:, free]), f[free] - (A @ rise)[free])
         out = A @ rise - f
         reaction = np.where(self.fixed, out, 0.0)
-        round_off = ROUND_OFF * float((abs(A) @ np.abs(rise)).max())
+        round_off = SUM_ROUND_OFF * float((abs(A) @ np.abs(rise)).max())
         rise = P @ rise
         given_off = ambient - films @ rise
         largest = max(float(np.abs(part).max()) for part in (reaction, loads, given_off, rubbed, P.T @ (inner @ rise)))

@@ -22,9 +22,8 @@ from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.protocol import Loaded
 from fastcontact.model.rigid_motions import generalised, needed_friction, resisting, stopped_at
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# Of the largest prescribed motion, what counts as none.
-ROUND_OFF = 1e-9
 # Of the size of the model: gaps that the linear program for rigid bodies, accurate to 1e-7, leaves where they touch.
 TOUCHING = 1e-6
 
@@ -65,7 +64,7 @@ class StepContext:
                 if isinstance(self.problem.pairs[name].primary, RigidSide):
                     slips[:, rows] += constraints.slip0[:, rows]
                     scale = max(scale, largest(constraints.slip0[:, rows]))
-        return np.asarray((np.abs(slips) > ROUND_OFF * scale).any(axis=0))
+        return np.asarray((np.abs(slips) > LENGTH_ROUND_OFF * scale).any(axis=0))
 
 
 def solve_inequalities(

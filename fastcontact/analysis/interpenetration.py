@@ -16,12 +16,11 @@ from fastcontact.mesh.topology import bodies, outer_facets
 from fastcontact.model.body_overlap import depths
 from fastcontact.model.rigid_motions import body_name
 from fastcontact.results.step import StepResult
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 Indices = NDArray[np.signedinteger]
 # Bodies by their numbers, and nodes on the outside of the first (n,) with their depths (n,) in the second [length].
 Inside = tuple[int, int, Indices, Array]
-# Depths worth a warning where no contact is defined, relative to the size of the model.
-ROUND_OFF = 1e-9
 # Beside the facets of a contact: relative to the deformation of the bodies, and to the depth of nodes that contact holds.
 BESIDE, HELD = 0.01, 2.0
 
@@ -60,7 +59,11 @@ def _without_contact(
     texts: dict[frozenset[int], str] = {}
     for number, other, points, depth in sorted(inside, key=lambda entry: -float(entry[3].max())):
         both, row = frozenset((number, other)), int(np.argmax(depth))
-        if both not in joined and both not in texts and depth[row] > ROUND_OFF * np.ptp(mesh.points, axis=0).max():
+        if (
+            both not in joined
+            and both not in texts
+            and depth[row] > LENGTH_ROUND_OFF * np.ptp(mesh.points, axis=0).max()
+        ):
             where = mesh.points[points[row]]
             texts[both] = (
                 f"bodies {body_name(mesh, body, number)} and {body_name(mesh, body, other)} interpenetrate by "

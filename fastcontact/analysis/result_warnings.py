@@ -24,6 +24,7 @@ from fastcontact.elasticity.materials import LinearElastic, Material
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.step import ContactResult, StepResult
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 # Penetration under a penalty that is worth a warning, relative to the largest displacement.
 DEEP = 0.01
@@ -35,8 +36,6 @@ ROTATION = 0.3
 MANY_STEPS = 1000
 # Worn depth by the size of the model, likewise.
 WORN = 0.1
-# Energies below this part of the largest force times the largest displacement are round-off.
-ROUND_OFF = 1e-9
 # Elements across the radius of a contact that resolve its pressure.
 ACROSS = 4
 # Change of the displacement by the last of a fixed number of geometry updates, relative to its largest component.
@@ -100,7 +99,7 @@ def _too_fast(name: str, pair: Formulation, state: State) -> Iterator[str]:
 
 def _unbalanced(state: State) -> Iterator[str]:
     """Yield a warning where the energy balance of all steps is violated by more than round-off."""
-    work, round_off = state.work, ROUND_OFF * state.largest_force * float(np.abs(state.u).max(initial=0.0))
+    work, round_off = state.work, LENGTH_ROUND_OFF * state.largest_force * float(np.abs(state.u).max(initial=0.0))
     if work is not None and abs(work.imbalance) > IMBALANCE * work.largest and work.largest > round_off:
         yield (
             f"the works of these load steps do not add up: {work.imbalance:.3g} of the external work {work.external:.4g} is "

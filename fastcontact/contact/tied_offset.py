@@ -16,9 +16,7 @@ from fastcontact.arrays import Array, Numbers
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.pairing import Pairing, normals
 from fastcontact.contact.surface import Surface
-
-# Gaps below this part of the size of the secondary side are round-off.
-ROUND_OFF = 1e-9
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
 def with_arms(constraints: Constraints, pairing: Pairing, primary: Surface, points: Array) -> Constraints:
@@ -47,7 +45,7 @@ def with_arms(constraints: Constraints, pairing: Pairing, primary: Surface, poin
         square = np.maximum((arm**2).sum(axis=1), 1e-300)
         length = (arm * left).sum(axis=1) / square
         moved = np.abs(np.stack([tangent @ np.tile(e, len(points)) for e in np.eye(points.shape[1])])).max(axis=0)
-        length[(np.abs(length) <= ROUND_OFF * size) | (moved > ROUND_OFF)] = 0.0
+        length[(np.abs(length) <= LENGTH_ROUND_OFF * size) | (moved > LENGTH_ROUND_OFF)] = 0.0
         rows.append(csr_array(tangent - diags_array(length) @ lever) if length.any() else tangent)
     return replace(constraints, tangents=tuple(rows))
 

@@ -22,11 +22,10 @@ from fastcontact.elasticity import system_kernels
 from fastcontact.elasticity.multipoint_constraints import Elimination, MultiPointConstraint, eliminate, stacked_rows
 from fastcontact.errors import ModelError
 from fastcontact.linear.multigrid.matrix import block_matrix
+from fastcontact.round_off import ROUND_OFF
 
 # Supports and right-hand sides that miss a condition by less than this fraction meet it.
 CONFLICT = 1e-9
-# A stiffness below this fraction of those that cancel in it is what rounding leaves.
-ROUND_OFF = 1e-12
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,12 +13,11 @@ from fastcontact.elasticity.loads import LARGEST, Table, check_number
 from fastcontact.elasticity.material_axes import Axes, checked_axes, frames, rotations
 from fastcontact.elasticity.varying_constants import Cells, Varying, positions, wrapped
 from fastcontact.errors import ModelError
+from fastcontact.round_off import ROUND_OFF
 
 COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 # The history of what is there from the first step on.
 ALWAYS: Table = ((-LARGEST, 1.0), (LARGEST, 1.0))
-# Components out of the plane, relative to the largest, that are round-off of a rotation.
-ROUND_OFF = 1e-12
 
 
 @dataclass(frozen=True, eq=False)

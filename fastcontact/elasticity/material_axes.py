@@ -11,12 +11,11 @@ import numpy as np
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 from fastcontact.mesh.argument_types import check_type, values_at
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 Axes = Sequence[Sequence[float]] | Callable[[Array], Array] | None
 # Components of stress and strain: xx, yy, zz, xy, yz, xz.
 PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
-# Deviation from unit length and right angles, and distance from a cylinder's axis, that count as zero.
-ROUND_OFF = 1e-9
 
 
 @dataclass(frozen=True)
@@ -62,7 +61,7 @@ class CylindricalAxes:
         arm = places - self.origin
         radial = arm - (arm @ along)[:, None] * along
         length = np.linalg.norm(radial, axis=1)
-        bad = np.flatnonzero(length <= ROUND_OFF * np.abs(places - self.origin).max(initial=0.0))
+        bad = np.flatnonzero(length <= LENGTH_ROUND_OFF * np.abs(places - self.origin).max(initial=0.0))
         if len(bad):
             raise ModelError(
                 f"a point of a cell at {places[bad[0]]} lies on the line of the cylindrical axes, where no direction is "

@@ -19,6 +19,7 @@ from fastcontact.elasticity.material_axes import PAIRS, Axes, frames, rotations
 from fastcontact.elasticity.varying_constants import Cells, Varying, mapped, varying, wrapped
 from fastcontact.errors import ModelError, unknown
 from fastcontact.mesh.argument_types import typed
+from fastcontact.round_off import ROUND_OFF
 
 AnyMaterial = TypeVar("AnyMaterial", bound="Material")
 
@@ -27,8 +28,6 @@ KINEMATICS = ("axisymmetric", "plane_strain", "plane_stress", "3d")
 VOLUMETRIC = ("auto", "plain", "mean_dilatation")
 # Poisson's ratio from which on a material has a mean dilatation by itself.
 NEARLY_INCOMPRESSIBLE = 0.49
-# Couplings of plane strains with others, relative to the largest modulus, that are round-off of a rotation.
-ROUND_OFF = 1e-12
 # Constants that may vary, those of the moduli first.
 MODULI = ("E", "nu", "G")
 CONSTANTS = (*MODULI, "density", "expansion", "conductivity")

@@ -42,7 +42,7 @@ SOME = 1000
 INTEGRAL, STIFFNESS = 1e-3, 5e-2
 # Nodes nearer to each other than these parts of the size of the model and of the edges there are meant to be one; those
 # nearer than the last are.
-COINCIDENT, NEAR, ROUND_OFF = 1e-6, 1e-2, 1e-9
+COINCIDENT, NEAR, SAME_PLACE = 1e-6, 1e-2, 1e-9
 # Rubber on rough ground has a coefficient of friction of 1 to 2.
 RUBBING = 3.0
 
@@ -183,7 +183,7 @@ def _coincident(model: Model) -> list[str]:
     first = pairs[np.lexsort(mesh.points[pairs[:, 0]].T)[0]]
     point = ", ".join(f"{x:.6g}" for x in mesh.points[first[0]])
     largest = float(apart.max())
-    where = "where another one is" if largest <= ROUND_OFF * size else f"within {largest:.3g} of another one"
+    where = "where another one is" if largest <= SAME_PLACE * size else f"within {largest:.3g} of another one"
     return [
         f"{count} nodes lie {where}, and no contact joins them (first: points {first[0]} and {first[1]} at ({point})): merge "
         "them in the mesher or with generate.transform.merge_points, or define the contact"

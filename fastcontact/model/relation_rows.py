@@ -13,10 +13,9 @@ from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.elasticity.loads import facets_of, outward
 from fastcontact.errors import ModelError
 from fastcontact.mesh.mesh import Mesh
+from fastcontact.round_off import ROUND_OFF
 
 NORMAL = "normal"
-# A component of a unit normal below this is round-off.
-ROUND_OFF = 1e-12
 # How far apart nodes may lie that belong together, in sizes of their group.
 APART = 1e-6
 

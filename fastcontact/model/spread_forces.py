@@ -11,6 +11,7 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.loads import Load, Table, Traction, check_number
 from fastcontact.errors import MeshError, ModelError, unknown
 from fastcontact.mesh.mesh import Mesh
+from fastcontact.round_off import ROUND_OFF
 
 # Weights by the distance over the radius, from 1 at the place to 0 at the radius.
 WEIGHTINGS: dict[str, Callable[[Array], Array]] = {
@@ -19,8 +20,6 @@ WEIGHTINGS: dict[str, Callable[[Array], Array]] = {
     "quadratic": lambda s: 1.0 - s**2,
     "cubic": lambda s: 1.0 - 3.0 * s**2 + 2.0 * s**3,
 }
-# A moment below this, relative to force times size, is round-off and needs no arms.
-ROUND_OFF = 1e-12
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 
 from fastcontact.arrays import Array
 from fastcontact.errors import CaseError
+from fastcontact.round_off import ROUND_OFF
 
 CONFIDENCE = 0.95
 ORDERS = np.geomspace(0.4, 6.0, 81)
@@ -29,8 +30,6 @@ PRIOR_ORDER, PRIOR_SPREAD = 1.6, 0.35
 PRIOR_NOISE, PRIOR_WEIGHT = 0.2, 1.5
 # How much more the first meshes may be off, and how probable it is for each that they are.
 COARSE_NOISE, COARSE_PROBABILITY = 10.0, 0.5
-# Solutions are never better than this, relatively.
-ROUND_OFF = 1e-12
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,9 @@ from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.cases.decks.pretension import Locks
 from fastcontact.cases.decks.temperatures import give as give_temperatures
 from fastcontact.cases.decks.temperatures import initial_temperatures
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 NAMED = {"XSYMM": (1,), "YSYMM": (2,), "ZSYMM": (3,), "ENCASTRE": (1, 2, 3, 4, 5, 6), "PINNED": (1, 2, 3)}
-ROUND_OFF = 1e-9
 # Point and component from 0; of supports on local axes component from 0 and True.
 Component = tuple[int, int, bool]
 
@@ -183,7 +183,7 @@ class Conditions:
         """Return the component along a local axis: a global one with its sign where the axis is parallel to it."""
         direction = self.directions[point][component - 1]
         axis = int(np.argmax(np.abs(direction)))
-        if abs(abs(direction[axis]) - 1.0) < ROUND_OFF and axis < self.mesh.dim:
+        if abs(abs(direction[axis]) - 1.0) < LENGTH_ROUND_OFF and axis < self.mesh.dim:
             return (point, axis, False), float(np.sign(direction[axis]))
         return (point, component - 1, True), 1.0
 

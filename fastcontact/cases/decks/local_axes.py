@@ -10,8 +10,7 @@ from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import Assembled, Element
 from fastcontact.cases.decks.blocks import Location, folded
 from fastcontact.cases.decks.content import Axes, Content
-
-ROUND_OFF = 1e-9
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
 def local_directions(made: Assembled) -> dict[int, Array]:
@@ -75,7 +74,7 @@ def local_axes(axes: Axes, point: Array) -> Array:
     else:
         first, third = a, np.cross(a, b)
     lengths = np.linalg.norm(first), np.linalg.norm(third)
-    if min(lengths) <= ROUND_OFF * max(1.0, float(np.abs(axes.points).max()) if not axes.cylindrical else 0.0):
+    if min(lengths) <= LENGTH_ROUND_OFF * max(1.0, float(np.abs(axes.points).max()) if not axes.cylindrical else 0.0):
         raise axes.location.refuse(f"the local axes are not defined at the point {point.tolist()}")
     first, third = first / lengths[0], third / lengths[1]
     return np.array([first, np.cross(third, first), third])

@@ -18,7 +18,7 @@ from fastcontact.linear.cholesky.symmetric_factors import LowerTriangle, Symmetr
 # Zeros that supernodes may take in so that there are fewer of them, as shares of their entries, by their width.
 WIDTHS, SHARES = np.array([4, 16, 48]), np.array([0.8, 0.5, 0.1, 0.05])
 # Pivots that are smaller than this in units of what was on the diagonal are round-off.
-ROUND_OFF = 1e-10
+SINGULAR = 1e-10
 
 
 def singular() -> ModelError:
@@ -77,7 +77,7 @@ def factors(K: bsr_array, last: Indices) -> SymmetricFactors:
         A.indptr, A.indices, A.data, tree.order, tree.place, tree.parent, *nodes, sizes, start, values, d
     )
     if bad >= 0:
-        if abs(d[bad]) <= ROUND_OFF * A.diagonal()[tree.order[bad]]:
+        if abs(d[bad]) <= SINGULAR * A.diagonal()[tree.order[bad]]:
             raise singular()
         raise ModelError("the stiffness matrix is not positive definite: check the material and the cells")
     position = np.empty(n, np.intp)

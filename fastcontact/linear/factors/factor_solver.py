@@ -19,7 +19,7 @@ from fastcontact.linear.protocol import Counters, LinearSolver, Monitor
 log = logging.getLogger("fastcontact")
 # Beyond this many unknowns last, their dense block costs more than the solutions it saves.
 LAST_UP_TO = 4000
-ROUND_OFF = 1e-14
+ATTAINABLE = 1e-14
 # Errors of one solution, in units of those of another.
 MARGIN = 10.0
 
@@ -41,7 +41,7 @@ class FactorSolver(LinearSolver):
     iterative = False
 
     def __init__(self, tolerance: float = 1e-14) -> None:
-        self.tolerance = ROUND_OFF  # whatever was asked
+        self.tolerance = ATTAINABLE  # whatever was asked
         self.counters = Counters()
         self.n = 0
         self._factors: SymmetricFactors | None = None
