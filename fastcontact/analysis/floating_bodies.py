@@ -79,7 +79,7 @@ class FloatingBodies:
     system : System
     avoid : ndarray of int
         Displacements to keep the springs from if possible: those of the contact surfaces.
-    softness : float
+    relative_stiffness : float
         Stiffness of the springs beside that of the body [-].
     before : ndarray of int, optional
         Displacements that springs held before, which go on with them unless others are much better.
@@ -97,7 +97,7 @@ class FloatingBodies:
     """
 
     def __init__(
-        self, motions: FreeMotions, system: System, avoid: Indices, softness: float, before: Indices = NONE
+        self, motions: FreeMotions, system: System, avoid: Indices, relative_stiffness: float, before: Indices = NONE
     ) -> None:
         diagonal, weightless = system.matrix.diagonal(), system.weightless
         typical = float(np.median(diagonal[system.free & ~weightless]))
@@ -113,7 +113,7 @@ class FloatingBodies:
         ]
         self._at_springs = motions.displacement[self.dofs]
         self.motions = motions.combined(np.asarray(np.linalg.inv(self._at_springs), np.float64))
-        self.stiffness = softness * typical
+        self.stiffness = relative_stiffness * typical
 
     def with_springs(self, matrix: bsr_array) -> bsr_array:
         """Return the matrix with the springs added."""

@@ -267,8 +267,8 @@ class Problem:
             turned = floating_motions(self.model, self.model.prescribed_by_ramp()[0], self.displacement(u))
             motions = turned if len(turned) == len(motions) else motions
         before = self.floating_bodies.dofs if rigid is None else rigid.dofs
-        softness = STIFF if stiff else _softness(self.solver)
-        return FloatingBodies(motions, system, system.involved(self.contact_dofs), softness, before)
+        relative_stiffness = STIFF if stiff else _spring_stiffness(self.solver)
+        return FloatingBodies(motions, system, system.involved(self.contact_dofs), relative_stiffness, before)
 
     def linearised(
         self,
@@ -357,7 +357,7 @@ def prepare(
     contact_dofs = _contact_dofs(mesh, pairs, len(driven))
     involved = system.involved(contact_dofs)
     motions = floating_motions(model, supported)
-    bodies = FloatingBodies(motions, system, involved, _softness(solver)) if len(motions) else None
+    bodies = FloatingBodies(motions, system, involved, _spring_stiffness(solver)) if len(motions) else None
     involved = _prepare_solver(solver, system, bodies, driven.near_nullspace(near_nullspace(model)), involved)
     return Problem(
         model, ramp, criteria, solver, pairs, field, sides, system, bodies,
@@ -376,8 +376,8 @@ def _stiffened_along(K: bsr_array, rows: csr_array) -> bsr_array:
     return total
 
 
-def _softness(solver: LinearSolver) -> float:
-    """Return how stiff springs on floating bodies are beside these [-]."""
+def _spring_stiffness(solver: LinearSolver) -> float:
+    """Return the stiffness of springs on floating bodies beside that of the bodies [-]."""
     return SOFT if solver.iterative else FIRM
 
 

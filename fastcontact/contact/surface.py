@@ -49,7 +49,7 @@ class Surface:
         The nodes; in order along the line where the facets form one open line, else ascending.
     abscissa : ndarray (m,)
         Length along the surface to each node [length]; zero where there is no such order.
-    periodic_interfaces : tuple of (ndarray of int (k,), ndarray of int (k,), ndarray (dim, dim))
+    periodic_ends : tuple of (ndarray of int (k,), ndarray of int (k,), ndarray (dim, dim))
         Positions in `points` at both ends of a part that repeats itself, and the turn [-] from the first to the second: there
         the surface goes on.
     """
@@ -58,20 +58,20 @@ class Surface:
     blocks: tuple[FacetBlock, ...]
     points: Numbers
     abscissa: Array
-    periodic_interfaces: tuple[tuple[Indices, Indices, Array], ...] = ()
+    periodic_ends: tuple[tuple[Indices, Indices, Array], ...] = ()
 
     def with_periodic_ends(self, ends: Iterable[tuple[Indices, Indices, Array]]) -> Surface:
         """Return the surface that goes on at ends (k,) and (k,), by number of points, as far as it reaches them."""
-        order, interfaces = np.argsort(self.points), []
+        order, on_surface = np.argsort(self.points), []
         for first, second, turn in ends:
             both = np.isin(first, self.points) & np.isin(second, self.points) & (first != second)
             rows = (order[np.searchsorted(self.points, end[both], sorter=order)] for end in (first, second))
-            interfaces.append((*rows, turn))
-        return replace(self, periodic_interfaces=tuple(interfaces))
+            on_surface.append((*rows, turn))
+        return replace(self, periodic_ends=tuple(on_surface))
 
     def add_across_ends(self, vectors: Array) -> None:
         """Add up vectors (m, dim), sums over the facets at each end of an interface, over the facets of both ends."""
-        for first, second, turn in self.periodic_interfaces:
+        for first, second, turn in self.periodic_ends:
             vectors[first] += vectors[second] @ turn
             vectors[second] = vectors[first] @ turn.T
 

@@ -79,13 +79,9 @@ class Sectors:
 def _sense(interface: PeriodicInterface, turn: Array) -> int:
     """Return 1 where an interface turns as `turn` (dim, dim) does, -1 where it turns back, 0 where it does neither."""
     assert interface.turn is not None
-    return (
-        1
-        if np.allclose(interface.turn, turn, atol=1e-9)
-        else -1
-        if np.allclose(interface.turn, turn.T, atol=1e-9)
-        else 0
-    )
+    if np.allclose(interface.turn, turn, atol=1e-9):
+        return 1
+    return -1 if np.allclose(interface.turn, turn.T, atol=1e-9) else 0
 
 
 @dataclass(frozen=True, eq=False)

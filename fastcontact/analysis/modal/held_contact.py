@@ -26,7 +26,7 @@ from fastcontact.results.step import ContactResult, StepResult
 
 @dataclass(frozen=True, eq=False)
 class Conditions:
-    """Relative displacements of one contact pair, along its normals or along its tangents, that vanish or give way.
+    """Relative displacements of one contact pair, along its normals or along its tangents, that vanish or have a compliance.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class Conditions:
     directions : ndarray (m, dim), optional
         Along tangents, the tangents [-].
     compliance : csr_array (m, m), optional
-        By how much they give way [length / force].
+        Of the conditions themselves [length / force].
     """
 
     rows: csr_array

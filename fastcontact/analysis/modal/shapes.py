@@ -14,6 +14,7 @@ import numpy as np
 from fastcontact.analysis.modal.cyclic import Sectors
 from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity import recovery
+from fastcontact.elasticity.material_axes import rotations
 from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.errors import ModelError
 from fastcontact.mesh.argument_types import typed
@@ -27,9 +28,6 @@ from fastcontact.results.step import StepResult
 
 if TYPE_CHECKING:
     import pandas
-
-# Rows and columns of the components of tensors, in the order of stresses.
-_COMPONENTS = {4: ([0, 1, 2, 0], [0, 1, 2, 1]), 6: ([0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2])}
 
 
 class Shapes(Sequence[StepResult]):
@@ -206,9 +204,7 @@ class RingModes(Shapes):
 
 
 def _turned(stress: Array, turn: Array) -> Array:
-    """Return stresses (n, 4 or 6) in axes before a turn (dim, dim) of the material [pressure]."""
-    rows, columns = _COMPONENTS[stress.shape[1]]
-    tensor, Q = np.zeros((len(stress), 3, 3)), np.eye(3)
+    """Return stresses (n, 4 or 6) of a body that is turned with them by a rotation (dim, dim) [pressure]."""
+    Q, size = np.eye(3), stress.shape[1]
     Q[: len(turn), : len(turn)] = turn
-    tensor[:, rows, columns] = tensor[:, columns, rows] = stress
-    return np.asarray((Q @ tensor @ Q.T)[:, rows, columns])
+    return np.asarray(stress @ rotations(Q.T[None])[0, :size, :size].T)

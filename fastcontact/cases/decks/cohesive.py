@@ -61,7 +61,7 @@ def cohesion_of(content: Content, law: Interaction) -> dict[str, Any]:
         given["stiffness"] = stiffness
     content.note(
         behaviour.location,
-        "sides that are pressed together give way by the stiffness of the layer, and what is broken does, too",
+        "sides that are pressed together have the stiffness of the layer, also where it is broken",
     )
     return {"cohesion": given}
 

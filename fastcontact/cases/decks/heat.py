@@ -21,6 +21,8 @@ from fastcontact.errors import ContactError
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
 
+# Keywords of loads of heat.
+OF_HEAT = ("CFLUX", "DFLUX", "DSFLUX", "FILM", "SFILM")
 # Number of the degree of freedom of temperature.
 TEMPERATURE = 11
 # Bodies of steps of heat alone, which are held.
@@ -333,6 +335,3 @@ def _reference(made: Assembled, initial: Mapping[int, float]) -> float:
         )
     content.note(location, "no effect: initial temperatures differ, and steady ones do not depend on them")
     return 0.0
-
-
-OF_HEAT: Mapping[str, str] = dict.fromkeys(("CFLUX", "DFLUX", "DSFLUX", "FILM", "SFILM"), "")

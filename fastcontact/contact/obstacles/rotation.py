@@ -9,9 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from fastcontact.arrays import Array
-
-# Distance from the axis, by the largest one, that is round-off.
-ON_AXIS = 1e-9
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
 @dataclass(frozen=True)
@@ -60,7 +58,7 @@ class Rotation:
         radial = arm - (arm @ along)[:, None] * along
         length = np.linalg.norm(radial, axis=1, keepdims=True)
         some = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
-        on_axis = length <= ON_AXIS * length.max(initial=0.0)
+        on_axis = length <= LENGTH_ROUND_OFF * length.max(initial=0.0)
         radial = np.where(on_axis, some / np.linalg.norm(some), radial / np.where(on_axis, 1.0, length))
         axes = np.stack([radial, np.cross(along, radial), np.broadcast_to(along, radial.shape)], axis=2)
         return axes[:, :dim, :dim]
