@@ -35,6 +35,20 @@ def contact_moment(contact: ContactResult, about: ArrayLike | None = None) -> Ar
     ndarray (1,) or (3,)
         In the plane about z, in space about x, y and z [force times length]. In axisymmetry no moment is left over the
         circle, and this one means nothing.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> mesh = fc.generate.block_on_block()
+    >>> model = fc.Model(mesh, kinematics="plane_strain")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    >>> model.fix("LOWER_BOTTOM", "xy")
+    >>> model.fix("UPPER_LEFT", "x")
+    >>> model.add_pressure("UPPER_TOP", 2.0)
+    >>> model.add_contact("joint", secondary="CONT_UPPER", primary="CONT_LOWER")
+    >>> steps = fc.solve(model, 2)
+    >>> fc.contact_moment(steps[-1].contact["joint"], about=(0.0, 5.0)).round(6)
+    array([100.])
     """
     centre = contact.middle if about is None else np.asarray(about, float)
     if centre.shape != (contact.coordinates.shape[1],) or not np.isfinite(centre).all():
@@ -71,6 +85,21 @@ class ContactResultants:
         Normal force over area, and the largest nodal pressure [pressure].
     dissipation, friction_work : float
         Work of friction in this step, and of all steps so far [energy].
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> mesh = fc.generate.block_on_block()
+    >>> model = fc.Model(mesh, kinematics="plane_strain")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    >>> model.fix("LOWER_BOTTOM", "xy")
+    >>> model.fix("UPPER_LEFT", "x")
+    >>> model.add_pressure("UPPER_TOP", 2.0)
+    >>> model.add_contact("joint", secondary="CONT_UPPER", primary="CONT_LOWER")
+    >>> steps = fc.solve(model, 2)
+    >>> joint = fc.contact_resultants(model, steps, "joint")[-1]
+    >>> joint.centre.round(6)
+    array([5., 0.])
     """
 
     force: Array
@@ -100,6 +129,21 @@ def contact_resultants(model: Model, steps: Iterable[StepResult], name: str) -> 
         Of the contact pair.
 
     ContactError if the model has no such pair.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> mesh = fc.generate.block_on_block()
+    >>> model = fc.Model(mesh, kinematics="plane_strain")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    >>> model.fix("LOWER_BOTTOM", "xy")
+    >>> model.fix("UPPER_LEFT", "x")
+    >>> model.add_pressure("UPPER_TOP", 2.0)
+    >>> model.add_contact("joint", secondary="CONT_UPPER", primary="CONT_LOWER")
+    >>> steps = fc.solve(model, 2)
+    >>> last = fc.contact_resultants(model, steps, "joint")[-1]
+    >>> round(last.normal_force, 9), round(last.area, 9), round(last.pressure_mean, 9)
+    (20.0, 10.0, 2.0)
     """
     pair = _bound(model, name)
     areas, work, resultants = lumped_areas(pair.secondary, pair.points, pair.axisymmetric), 0.0, []
@@ -151,6 +195,20 @@ def contact_history(model: Model, steps: Sequence[StepResult], name: str) -> NDA
     structured ndarray (n_steps,)
         ``step``, ``load_factor``; ``force_x`` ...; ``moment_z``, in space ``moment_x`` ...; ``area``; ``centre_x`` ...;
         ``normal_force``, ``mean_gap``, ``pressure_mean``, ``pressure_max``, ``dissipation``, ``friction_work``.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> mesh = fc.generate.block_on_block()
+    >>> model = fc.Model(mesh, kinematics="plane_strain")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    >>> model.fix("LOWER_BOTTOM", "xy")
+    >>> model.fix("UPPER_LEFT", "x")
+    >>> model.add_pressure("UPPER_TOP", 2.0)
+    >>> model.add_contact("joint", secondary="CONT_UPPER", primary="CONT_LOWER")
+    >>> steps = fc.solve(model, 2)
+    >>> fc.contact_history(model, steps, "joint")["normal_force"].round(9)
+    array([10., 20.])
     """
     answers = contact_resultants(model, steps, name)
     axes = "xyz"[: model.mesh.dim]
@@ -199,6 +257,22 @@ def wear(model: Model, steps: Iterable[StepResult], name: str, coefficient: floa
     Notes
     -----
     Archard, J. Appl. Phys. 24, 1953.
+
+    Examples
+    --------
+    Nothing slides here, so nothing is worn off:
+
+    >>> import fastcontact as fc
+    >>> mesh = fc.generate.block_on_block()
+    >>> model = fc.Model(mesh, kinematics="plane_strain")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    >>> model.fix("LOWER_BOTTOM", "xy")
+    >>> model.fix("UPPER_LEFT", "x")
+    >>> model.add_pressure("UPPER_TOP", 2.0)
+    >>> model.add_contact("joint", secondary="CONT_UPPER", primary="CONT_LOWER")
+    >>> steps = fc.solve(model, 2)
+    >>> bool(fc.wear(model, steps, "joint", coefficient=1e-9).max() < 1e-20)
+    True
     """
     if not (np.isfinite(coefficient) and coefficient >= 0.0):
         raise ContactError(f"the coefficient of wear {coefficient} must be a number, zero or more")

@@ -41,6 +41,13 @@ class Criteria:
         as often with nonlinear bodies. Those go on with parts of that size, and twice it after each that took few iterations.
         Parts of a step are steps of their own, so that friction slides along their path; only the instants of the ramp
         give a result, whose ``iterations["substeps"]`` lists the ends of its parts. 0: never.
+
+    Examples
+    --------
+    Contact detection three times per load step, as code_aster does by default:
+
+    >>> import fastcontact as fc
+    >>> criteria = fc.Criteria(geometry_updates=2)
     """
 
     relative: float = 1e-6

@@ -75,6 +75,19 @@ def solve(
     -----
     FastcontactWarning
         What is doubtful about the model and, at the end, the result, with figures; these steps keep the texts.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> model = fc.Model(fc.generate.half_spheres(size=10.0), kinematics="axisymmetric")
+    >>> model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+    >>> model.fix("A1A2", "x")
+    >>> model.prescribe("A2B2", y=-2.0)
+    >>> model.prescribe("A1B1", y=+2.0)
+    >>> model.add_contact("hertz", secondary="CONT1", primary="CONT2")
+    >>> steps = fc.solve(model, 2)
+    >>> [step.load_factor for step in steps]
+    [0.5, 1.0]
     """
     steps, ramp = Steps(resume), ramp_of(ramp)
     total = len(steps) + len(restart.remaining(ramp, steps[-1] if steps else None))

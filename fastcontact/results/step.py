@@ -119,6 +119,20 @@ class ContactResult:
     units : mapping of str to str
         Names of the units of ``length``, ``force``, ``pressure`` where the model names them, of plane models of forces per
         thickness; reprs, pictures and tables show them.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    >>> model.fix("LEFT", "x")
+    >>> model.add_obstacle("floor", secondary="BOTTOM", obstacle=fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0)))
+    >>> model.add_pressure("TOP", 2.0)
+    >>> floor = fc.solve(model, 1)[-1].contact["floor"]
+    >>> floor.pressure.round(9)
+    array([2., 2., 2., 2., 2.])
+    >>> round(floor.normal_force, 9)
+    2.0
     """
 
     name: str
@@ -292,6 +306,18 @@ class StepResult:
         Restart data for the next step: plain numbers, strings and arrays. Result files keep those of their last step.
     units : mapping of str to str
         As of its `ContactResult`.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> model = fc.Model(fc.generate.block(), kinematics="plane_stress")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    >>> model.fix("BOTTOM", "y")
+    >>> model.fix("BOTTOM_LEFT", "x")
+    >>> model.add_pressure("TOP", 2.0)
+    >>> step = fc.solve(model, 1)[-1]
+    >>> round(float(step.stress[0, 1]), 9), round(float(step.reaction[:, 1].sum()), 9)
+    (-2.0, 2.0)
     """
 
     index: int

@@ -41,6 +41,21 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Any
         where heat crosses ``heat_flux`` [power / area];
         ``active``, ``sticking`` (true or false). With `step` also ``displacement_x`` ... [length], ``stress_xx`` ...,
         ``normal_stress``, ``von_mises``, ``von_mises_signed`` [pressure].
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> mesh = fc.generate.block_on_block()
+    >>> model = fc.Model(mesh, kinematics="plane_strain")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    >>> model.fix("LOWER_BOTTOM", "xy")
+    >>> model.fix("UPPER_LEFT", "x")
+    >>> model.add_pressure("UPPER_TOP", 2.0)
+    >>> model.add_contact("joint", secondary="CONT_UPPER", primary="CONT_LOWER")
+    >>> steps = fc.solve(model, 2)
+    >>> table = fc.contact_table(steps[-1].contact["joint"], steps[-1])
+    >>> table["pressure"].round(9)
+    array([2., 2., 2., 2., 2., 2., 2.])
     """
     columns = {
         **_places(contact.points, contact.coordinates, contact.abscissa),
@@ -72,6 +87,20 @@ def normal_stress(contact: ContactResult, step: StepResult) -> Array:
 
     `step` is the one that the contact belongs to. Where contact presses it is minus the pressure, up to the mesh error. NaN
     at nodes that face nothing.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> mesh = fc.generate.block_on_block()
+    >>> model = fc.Model(mesh, kinematics="plane_strain")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    >>> model.fix("LOWER_BOTTOM", "xy")
+    >>> model.fix("UPPER_LEFT", "x")
+    >>> model.add_pressure("UPPER_TOP", 2.0)
+    >>> model.add_contact("joint", secondary="CONT_UPPER", primary="CONT_LOWER")
+    >>> steps = fc.solve(model, 2)
+    >>> fc.normal_stress(steps[-1].contact["joint"], steps[-1]).round(9)
+    array([-2., -2., -2., -2., -2., -2., -2.])
     """
     stress, (x, y) = step.stress[contact.points].T, contact.normal.T[:2]
     across = x * x * stress[0] + y * y * stress[1] + 2.0 * x * y * stress[3]
@@ -105,6 +134,18 @@ def line_table(mesh: Mesh, step: StepResult, group: str, start: str | int | None
     ------
     MeshError
         If there is no such group, or it is no open line.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> mesh = fc.generate.block(divisions=(2, 2))
+    >>> model = fc.Model(mesh, kinematics="plane_stress")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    >>> model.fix("BOTTOM", "xy")
+    >>> model.add_pressure("TOP", 2.0)
+    >>> table = fc.line_table(mesh, fc.solve(model, 1)[-1], "RIGHT", start="BOTTOM_RIGHT")
+    >>> table["displacement_y"].round(9)
+    array([ 0.   , -0.001, -0.002])
     """
     line = ordered_line(mesh, group, start)
     places = mesh.points[line.points]
@@ -138,6 +179,19 @@ def write_csv(path: PathLike, table: AnyArray, units: Mapping[str, str] | None =
         If `units` names a column that is not there.
     FileError
         If the file cannot be written.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> mesh = fc.generate.block_on_block()
+    >>> model = fc.Model(mesh, kinematics="plane_strain")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    >>> model.fix("LOWER_BOTTOM", "xy")
+    >>> model.fix("UPPER_LEFT", "x")
+    >>> model.add_pressure("UPPER_TOP", 2.0)
+    >>> model.add_contact("joint", secondary="CONT_UPPER", primary="CONT_LOWER")
+    >>> steps = fc.solve(model, 2)
+    >>> fc.write_csv("joint.csv", fc.contact_table(steps[-1].contact["joint"]), units={"pressure": "MPa"})
     """
     columns, units = _columns(table), dict(units or {})
     for name in units:

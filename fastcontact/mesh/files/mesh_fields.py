@@ -57,6 +57,12 @@ def read_field(
     ------
     FileError, MeshError
         If the file cannot be read, or has no such field or instant; if a cell or point has no value, or two.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> E = fc.read_field(mesh, "scan.vtu", "E")  # doctest: +SKIP
+    >>> model.add_material(fc.LinearElastic(E=E, nu=0.3))  # doctest: +SKIP
     """
     if over not in OVER:
         raise FileError(f"over must be {' or '.join(OVER)}, not '{over}'")

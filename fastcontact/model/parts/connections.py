@@ -63,6 +63,21 @@ class ModelConnections(ModelInitialStates):
         ------
         MeshError, ModelError
             If the sides do not lie upon each other, share points, or the numbers do not fit.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> bar = fc.generate.block()
+        >>> bar = bar.with_facet_group("CUT", lambda points: abs(points[:, 1] - 0.5) < 1e-9, between=True)
+        >>> mesh = fc.generate.cut(bar, "CUT")
+        >>> model = fc.Model(mesh, kinematics="plane_stress")
+        >>> model.add_material(fc.LinearElastic(E=210_000.0, nu=0.3))
+        >>> model.fix("BOTTOM", "xy")
+        >>> model.fix("TOP", "xy")
+        >>> model.add_pretension("bolt", "CUT", force=1000.0)
+        >>> step = fc.solve(model, 1)[-1]
+        >>> step.pretension["bolt"]
+        {'force': 1000.0000000000002, 'shortening': 0.0046104351967446435}
         """
         if name in {other.label for other in self.pretensions}:
             raise ModelError(f"there is already a pretension '{name}': names must differ")
@@ -83,6 +98,12 @@ class ModelConnections(ModelInitialStates):
         """Let all nodes of a group move together in one displacement component, or several (``"xy"``).
 
         ``"normal"``: by the same along the normals of a group of facets.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.couple("TOP", "y")  # stays straight and level
         """
         nodes = self.mesh.points_of(group)
         if len(nodes) < 2:
@@ -127,6 +148,12 @@ class ModelConnections(ModelInitialStates):
         translation : sequence of float, optional
             What brings the first group upon the second; by default the way from middle to middle [length].
         ramp : Ramp or iterable of (float, float), optional
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.relate_groups("LEFT", "RIGHT", "xy")
         """
         name = f"the relation of {component} of '{first}' and '{second}'"
         if len(coefficients) != 2:
@@ -182,6 +209,14 @@ class ModelConnections(ModelInitialStates):
         ------
         MeshError, ModelError
             If there are no such groups, or their nodes do not lie upon each other; the largest distance is told.
+
+        Examples
+        --------
+        A cell of an endless layer, stretched by 0.1 %:
+
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.add_periodicity("LEFT", "RIGHT", x=0.001)
         """
         name = f"the periodicity of '{first}' and '{second}'"
         given = {key: value for key, value in {"x": x, "y": y, "z": z}.items() if value != 0.0}
@@ -230,6 +265,14 @@ class ModelConnections(ModelInitialStates):
         MeshError, ModelError
             If there are no such groups, they do not lie upon each other (the largest distance is told), or
             kinematics are axisymmetric.
+
+        Examples
+        --------
+        A quarter of a ring stands for all of it:
+
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.rings(), kinematics="plane_strain")
+        >>> model.add_cyclic_symmetry("SYMMETRY_Y", "SYMMETRY_X", sectors=4)
         """
         name = f"the cyclic symmetry of '{first}' and '{second}'"
         if self.kinematics == "axisymmetric":
@@ -267,6 +310,14 @@ class ModelConnections(ModelInitialStates):
             costs much, since it ties every displacement in it to every other.
         value : float
             [length times the unit of the coefficients].
+
+        Examples
+        --------
+        One corner moves down by twice as much as another one:
+
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.relate([("TOP_LEFT", "y", 1.0), ("TOP_RIGHT", "y", -2.0)])
         """
         row: dict[int, float] = {}
         listed = [(point, component, coefficient) for point, component, coefficient in terms]
@@ -322,6 +373,16 @@ class ModelConnections(ModelInitialStates):
         ------
         MeshError, ModelError
             If there are no such groups, or kinematics are axisymmetric.
+
+        Examples
+        --------
+        A moment on the end of a block, through a reference point:
+
+        >>> import fastcontact as fc
+        >>> mesh = fc.generate.with_reference_points(fc.generate.block(), {"HANDLE": (1.5, 0.5)})
+        >>> model = fc.Model(mesh, kinematics="plane_strain")
+        >>> model.add_coupling("HANDLE", "RIGHT", kind="distributing")
+        >>> model.add_moment("HANDLE", z=20.0)
         """
         letters = "xyz"[: self.mesh.dim] if components is None else components
         axes = axes_of(f"the coupling of '{reference}'", dict.fromkeys(letters, 1.0), self.mesh.dim)
@@ -361,6 +422,13 @@ class ModelConnections(ModelInitialStates):
             Takes the place of the line between the two nodes: a vector of any length.
         translation : sequence of float (dim,), optional
             What brings the first group upon the second; by default the way from middle to middle [length].
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.add_spring("BOTTOM", y=1000.0)  # a soft foundation, by node
+        >>> model.add_spring("TOP_LEFT", "BOTTOM_RIGHT", axial=50.0)
         """
         name = f"the spring on '{group}'" if to is None else f"the spring between '{group}' and '{to}'"
         given = {"x": x, "y": y, "z": z}

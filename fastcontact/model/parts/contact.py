@@ -113,6 +113,14 @@ class ModelContact(ModelConnections):
               curved sides that fit closely need; ``"secondary"``: those of the secondary side; a vector (dim,) out of the
               primary side's body: one normal for all of it [-]. ``projection_tolerance``: how far points may stand out
               beyond the end of the primary side and still carry force, in facet lengths.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.half_spheres(size=10.0), kinematics="axisymmetric")
+        >>> model.add_contact("hertz", secondary="CONT1", primary="CONT2", friction=0.2)
+        >>> model.contact[0].formulation
+        'mortar'
         """
         given: dict[str, Any] = {option: value for option, value in options.items() if value is not None}
         if formulation is None:
@@ -152,6 +160,13 @@ class ModelContact(ModelConnections):
         ------
         ContactError
             If no bodies face each other; the message tells how far apart they are.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block_on_block(), kinematics="plane_strain")
+        >>> len(model.add_contacts(friction=0.2))
+        1
         """
         moduli = None
         if self.materials:
@@ -196,6 +211,13 @@ class ModelContact(ModelConnections):
             A group with nodes of the secondary side, from which the fluid comes: its edge, or all of it.
         ramp : Ramp or iterable of (float, float), optional
             A history of its own.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block_on_block(), kinematics="plane_strain")
+        >>> model.add_contact("seal", secondary="CONT_UPPER", primary="CONT_LOWER")
+        >>> model.add_fluid_pressure("seal", 5.0, source="UPPER_BOTTOM_LEFT", ramp=[(0, 0), (1, 0), (2, 1)])
         """
         check_number(f"the fluid pressure in contact '{contact}'", pressure)
         if pressure < 0.0:
@@ -249,6 +271,20 @@ class ModelContact(ModelConnections):
             in space on the other, quadratic facets where there is friction; or ``"continuous"``, by default on all others.
         **options
             Fields of the formulation.
+
+        Examples
+        --------
+        A rigid ball pressed into a block with 100 N:
+
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.graded_block(), kinematics="axisymmetric")
+        >>> model.add_material(fc.LinearElastic(E=70_000.0, nu=0.33))
+        >>> model.fix("BOTTOM", "y")
+        >>> ball = fc.obstacles.Sphere(R=10.0, centre=(0.0, 10.0))
+        >>> model.add_obstacle("ball", secondary="CONTACT", obstacle=ball, force={"y": -100.0})
+        >>> step = fc.solve(model, 1)[-1]
+        >>> round(float(step.contact["ball"].force[1]), 6)
+        -100.0
         """
         moves = axes_of(f"the motion of obstacle '{name}'", dict(motion), self.mesh.dim) if motion else {}
         displacement = tuple(float(moves.get(axis, 0.0)) for axis in range(self.mesh.dim))  # type: ignore[arg-type]

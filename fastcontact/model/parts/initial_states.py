@@ -56,6 +56,14 @@ class ModelInitialStates(ModelLoads):
             Load factors of the instants, between which temperatures follow linearly [-].
         ramp : Ramp or iterable of (float, float), optional
             History of the rise, value minus reference.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.add_material(fc.LinearElastic(E=210_000.0, nu=0.3, expansion=12e-6))
+        >>> model.add_temperature(120.0, reference=20.0)
+        >>> model.add_temperature(lambda points: 10.0 * points[:, 1], "BLOCK")
         """
         names = group_names(groups)
         checked = checked_value(value)
@@ -108,6 +116,12 @@ class ModelInitialStates(ModelLoads):
         ------
         FileError, MeshError, ModelError
             If a file cannot be read or lacks the field, a point has no temperature, or instants and times do not fit.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.add_temperature_file("furnace.med", "TEMP", reference=20.0)  # doctest: +SKIP
         """
         from fastcontact.model.temperature_files import read_temperatures
 
@@ -153,6 +167,12 @@ class ModelInitialStates(ModelLoads):
             What they are along, as of `Orthotropic`: unit vectors in rows (3, 3) [-], or a function, taken at each place.
         ramp : Ramp or iterable of (float, float), optional
             History; by default the whole of it is there from the first step on.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.add_initial_stress(xx=lambda points: 100.0 * (1.0 - 2.0 * points[:, 1]))
         """
         given = {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "yz": yz, "xz": xz}
         self._add_initial("stress", groups, given, axes, ramp)
@@ -182,6 +202,12 @@ class ModelInitialStates(ModelLoads):
             What they are along: unit vectors in rows (3, 3) [-], or a function.
         ramp : Ramp or iterable of (float, float), optional
             History; by default the whole of it is there from the first step on.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.add_initial_strain("BLOCK", xx=-0.002, yy=-0.002, zz=-0.002)  # shrinkage
         """
         given = {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "yz": yz, "xz": xz}
         self._add_initial("strain", groups, given, axes, ramp)

@@ -40,6 +40,13 @@ class ModelLoads(ModelHeat):
         """Press on a group of outer facets with `value` [pressure], positive along their normals into the body.
 
         It is a number, or a function from reference positions (n, dim) [length] to pressures (n,) [pressure].
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.add_pressure("TOP", 2.0)
+        >>> model.add_pressure("RIGHT", lambda points: 10.0 * (1.0 - points[:, 1]))
         """
         self._add(Pressure(group, value, table_of(ramp, f"the ramp of the pressure on '{group}'")))
 
@@ -53,7 +60,14 @@ class ModelLoads(ModelHeat):
         z: Value | None = None,
         ramp: History = None,
     ) -> None:
-        """Load a group of facets with forces per reference area [pressure]; values as in `add_pressure`."""
+        """Load a group of facets with forces per reference area [pressure]; values as in `add_pressure`.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.add_traction("TOP", x=1.0, y=-5.0)
+        """
         axes = axes_of(f"the traction on '{group}'", {"x": x, "y": y, "z": z}, self.mesh.dim)
         self._add(Traction(group, axes, table_of(ramp, f"the ramp of the traction on '{group}'")))
 
@@ -67,7 +81,15 @@ class ModelLoads(ModelHeat):
         z: Value | None = None,
         ramp: History = None,
     ) -> None:
-        """Load groups of solid cells, by default all, with forces per volume [force / length^3], such as the weight."""
+        """Load groups of solid cells, by default all, with forces per volume [force / length^3], such as the weight.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.add_body_force(y=-7.7e-5)
+        >>> model.add_body_force("BLOCK", x=lambda points: 1e-6 * points[:, 0])
+        """
         names = group_names(groups)
         axes = axes_of("the body force", {"x": x, "y": y, "z": z}, self.mesh.dim)
         self._add(BodyForce(names, axes, table_of(ramp, "the ramp of the body force")))
@@ -85,6 +107,15 @@ class ModelLoads(ModelHeat):
         """Load groups of solid cells, by default all, with their weight: density times acceleration [length / time^2].
 
         The densities are those of the materials; units must fit, as do N, mm, MPa with tonnes, seconds and y=-9810.0.
+
+        Examples
+        --------
+        Steel in mm, tonnes and seconds, so that forces are in N:
+
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.add_material(fc.LinearElastic(E=210_000.0, nu=0.3, density=7.85e-9))
+        >>> model.add_gravity(y=-9810.0)
         """
         names = group_names(groups)
         axes = axes_of("gravity", {"x": x, "y": y, "z": z}, self.mesh.dim)
@@ -114,6 +145,16 @@ class ModelLoads(ModelHeat):
             Along the axis, of any length [-]. By default (0, 0, 1), in axisymmetry the axis (0, 1, 0).
         ramp : Ramp or iterable of (float, float), optional
             History of the force, that is of the square of the speed.
+
+        Examples
+        --------
+        A ring at 6000 revolutions per minute:
+
+        >>> import math
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.rings(), kinematics="plane_strain")
+        >>> model.add_material(fc.LinearElastic(E=210_000.0, nu=0.3, density=7.85e-9))
+        >>> model.add_centrifugal(6000.0 / 60.0 * 2.0 * math.pi)
         """
         names = group_names(groups)
         if direction is None:
@@ -142,6 +183,14 @@ class ModelLoads(ModelHeat):
         axis : str, optional
             Along which the level is measured, upwards: by default the last one, y or z.
         ramp : Ramp or iterable of (float, float), optional
+
+        Examples
+        --------
+        Water in N and mm, filled to y = 0.8:
+
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.add_hydrostatic_pressure("RIGHT", weight=9.81e-6, level=0.8)
         """
         name = "xyz"[self.mesh.dim - 1] if axis is None else axis
         (along,) = axes_of(f"the hydrostatic pressure on '{group}'", {name: 1.0}, self.mesh.dim)
@@ -183,6 +232,14 @@ class ModelLoads(ModelHeat):
         radius : float, optional
             Beyond which the group bears nothing [length]; by default the distance of its farthest node.
         ramp : Ramp or iterable of (float, float), optional
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.add_force("TOP", y=-100.0)  # in all, as a uniform traction
+        >>> model.add_force("TOP_RIGHT", x=1.0)  # on the node
+        >>> model.add_force("TOP", y=-100.0, at=(0.25, 1.0))  # off the centre
         """
         self.mesh.points_of(group)
         spread = spread_of(f"the force on '{group}'", at, weighting, radius)
@@ -223,6 +280,12 @@ class ModelLoads(ModelHeat):
         """Load a reference point, or a group, with a moment [force times length]; in the plane about z.
 
         On a group of facets it is spread in proportion to area and distance from the middle, without a resultant force.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.add_moment("TOP", z=20.0)
         """
         name = f"the moment on '{group}'"
         given = {"x": x, "y": y, "z": z}

@@ -22,7 +22,17 @@ class ModelMaterials(ModelBase):
 
     @typed(ModelError)
     def add_material(self, material: Material, groups: Sequence[str] | str | None = None) -> None:
-        """Give a material to groups of solid cells, by default to all; groups override what was given to all before."""
+        """Give a material to groups of solid cells, by default to all; groups override what was given to all before.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block_on_block(), kinematics="plane_strain")
+        >>> model.add_material(fc.LinearElastic(E=210_000.0, nu=0.3))
+        >>> model.add_material(fc.LinearElastic(E=70_000.0, nu=0.33), groups="UPPER")
+        >>> print(model.describe().splitlines()[1])
+        Material: E = 210000, nu = 0.3 in all solid cells.
+        """
         names = self._solid_groups(groups, ", so it cannot have a material")
         check_law(material, self.strain)
         self.materials.append((material.bound(self._cells_of(names)), names))
@@ -112,6 +122,19 @@ class ModelMaterials(ModelBase):
         ----------
         displacement : ndarray (n_points, dim)
             Of a step result [length].
+
+        Examples
+        --------
+        A uniform strain of 0.001 in plane stress needs a force of 0.001 E on each end of a unit square.
+
+        >>> import numpy as np
+        >>> import fastcontact as fc
+        >>> mesh = fc.generate.block()
+        >>> model = fc.Model(mesh, kinematics="plane_stress")
+        >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+        >>> forces = model.internal_forces(np.column_stack([0.001 * mesh.points[:, 0], 0.0 * mesh.points[:, 1]]))
+        >>> round(float(forces[mesh.points_of("RIGHT"), 0].sum()), 12)
+        1.0
         """
         field = self.material_field()
         if np.size(displacement) != self.n_dofs:

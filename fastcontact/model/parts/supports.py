@@ -39,6 +39,14 @@ class ModelSupports(ModelContact):
 
         ``"normal"``: those along the normals of a group of facets. With `axes` (k, 3) [-]
         components are along these, see `prescribe`.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.rings(), kinematics="plane_strain")
+        >>> model.fix("SYMMETRY_X", "x")
+        >>> model.fix("SYMMETRY_Y", "y")
+        >>> model.fix("RIM", "x", axes=fc.CylindricalAxes())  # the radial component
         """
         if not components:
             raise ModelError(f"fix('{group}', ...) names no component: give for example 'x' or 'xy'")
@@ -71,6 +79,18 @@ class ModelSupports(ModelContact):
         `rotation` turns the group about an axis, exactly by any angle, and holds all its components: ``angle`` at multiplier
         1 [radian]; ``centre``, a point of the axis (dim,) [length]; in space ``axis``, its direction; ``ramp``, a history of
         its own. The components x, y and z are then what the axis moves by. Not in axisymmetry.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.rings(), kinematics="plane_strain")
+        >>> model.prescribe("RIM", normal=-0.1)  # shrinks the rim
+        >>> model.prescribe("BORE", x=lambda points: 0.01 * points[:, 1], y=0.0)
+
+        A group that turns by a quarter of a circle while the load factor goes from 0 to 1:
+
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain", strain="finite")
+        >>> model.prescribe("TOP", rotation={"angle": 1.5707963, "centre": (0.5, 1.0)})
         """
         if rotation is not None:
             if axes is not None or normal is not None:
