@@ -90,7 +90,7 @@ class Model(ModelSupports):
         return html_table(rows, caption=head)
 
     def describe(self) -> str:
-        """Return in words what will be solved: kinematics, materials, supports, loads, contact, a line each.
+        """Return a description of the model in words, one line each for kinematics, materials, supports, loads and contact.
 
         Examples
         --------
@@ -109,7 +109,16 @@ class Model(ModelSupports):
 
     @typed(ModelError)
     def check(self, ramp: Ramp | None = None) -> None:
-        """Check the whole model, and its histories against `ramp`; `solve` does so before any numerics.
+        """Check the whole model and the consistency of its histories with `ramp`; `solve` begins with this check.
+
+        Parameters
+        ----------
+        ramp : Ramp, optional
+
+        Raises
+        ------
+        MeshError, ModelError, ContactError
+            With one line that names the error and its remedy.
 
         Examples
         --------

@@ -37,9 +37,16 @@ class ModelLoads(ModelHeat):
 
     @typed(ModelError)
     def add_pressure(self, group: str, value: Value, *, ramp: History = None) -> None:
-        """Press on a group of outer facets with `value` [pressure], positive along their normals into the body.
+        """Apply a pressure to a group of outer facets.
 
-        It is a number, or a function from reference positions (n, dim) [length] to pressures (n,) [pressure].
+        Parameters
+        ----------
+        group : str
+        value : float or callable
+            Positive in compression, that is along the inward normal: a number, or a function from reference positions
+            (n, dim) [length] to pressures (n,) [pressure]. In finite strain it follows the deformed surface.
+        ramp : Ramp or iterable of (float, float), optional
+            History of the pressure.
 
         Examples
         --------
@@ -60,7 +67,15 @@ class ModelLoads(ModelHeat):
         z: Value | None = None,
         ramp: History = None,
     ) -> None:
-        """Load a group of facets with forces per reference area [pressure]; values as in `add_pressure`.
+        """Apply a traction, force per reference area, to a group of facets.
+
+        Parameters
+        ----------
+        group : str
+        x, y, z : float or callable
+            Components, as `value` of `add_pressure` [pressure].
+        ramp : Ramp or iterable of (float, float), optional
+            History of the traction.
 
         Examples
         --------
@@ -81,7 +96,16 @@ class ModelLoads(ModelHeat):
         z: Value | None = None,
         ramp: History = None,
     ) -> None:
-        """Load groups of solid cells, by default all, with forces per volume [force / length^3], such as the weight.
+        """Apply a body force to groups of solid cells.
+
+        Parameters
+        ----------
+        groups : str or sequence of str, optional
+            By default all solid cells.
+        x, y, z : float or callable
+            Force per volume, as `value` of `add_pressure` [force / length^3].
+        ramp : Ramp or iterable of (float, float), optional
+            History of the force.
 
         Examples
         --------
@@ -104,9 +128,17 @@ class ModelLoads(ModelHeat):
         z: float | None = None,
         ramp: History = None,
     ) -> None:
-        """Load groups of solid cells, by default all, with their weight: density times acceleration [length / time^2].
+        """Apply the weight of groups of solid cells, from the densities of their materials.
 
-        The densities are those of the materials; units must fit, as do N, mm, MPa with tonnes, seconds and y=-9810.0.
+        Parameters
+        ----------
+        groups : str or sequence of str, optional
+            By default all solid cells.
+        x, y, z : float
+            Gravitational acceleration [length / time^2], in units consistent with the others: -9810 with N, mm, MPa,
+            tonnes and seconds.
+        ramp : Ramp or iterable of (float, float), optional
+            History of the acceleration.
 
         Examples
         --------
@@ -131,7 +163,7 @@ class ModelLoads(ModelHeat):
         direction: Sequence[float] | None = None,
         ramp: History = None,
     ) -> None:
-        """Load groups of solid cells with the centrifugal force of a rotation, from the densities of the materials.
+        """Apply the centrifugal force of a rotation to groups of solid cells, from the densities of their materials.
 
         Parameters
         ----------
@@ -144,7 +176,7 @@ class ModelLoads(ModelHeat):
         direction : sequence of 3 floats, optional
             Along the axis, of any length [-]. By default (0, 0, 1), in axisymmetry the axis (0, 1, 0).
         ramp : Ramp or iterable of (float, float), optional
-            History of the force, that is of the square of the speed.
+            History of the force, which is proportional to the square of the speed.
 
         Examples
         --------
@@ -171,17 +203,17 @@ class ModelLoads(ModelHeat):
     def add_hydrostatic_pressure(
         self, group: str, *, weight: float, level: float, axis: str | None = None, ramp: History = None
     ) -> None:
-        """Press on a group of outer facets as a liquid does: `weight` times the depth below its level.
+        """Apply the pressure of a liquid, `weight` times the depth below its level, to a group of outer facets.
 
         Parameters
         ----------
         group : str
         weight : float
-            Of the liquid by volume [force / length^3].
+            Weight of the liquid per volume [force / length^3].
         level : float
-            Coordinate of its surface; above it nothing presses [length].
+            Coordinate of its free surface, above which there is no pressure [length].
         axis : str, optional
-            Along which the level is measured, upwards: by default the last one, y or z.
+            Vertical axis, positive upwards: by default the last one, y or z.
         ramp : Ramp or iterable of (float, float), optional
 
         Examples
@@ -212,25 +244,25 @@ class ModelLoads(ModelHeat):
         radius: float | None = None,
         ramp: History = None,
     ) -> None:
-        """Load a group with forces [force].
+        """Apply a force to a group.
 
         Parameters
         ----------
         group : str
         x, y, z : float or callable
-            Components: numbers, or for nodes functions of position, as in `prescribe`. In axisymmetry forces are those over
-            the full circle; on facets a radial one is refused.
+            Components: numbers, or functions of position for forces on nodes, as in `prescribe` [force]. In axisymmetry they
+            are those over the full circle; a radial force on facets is refused.
         distribute : bool, optional
-            True: the total force, spread as a uniform traction over the facets of the group. False: the force on every
-            node of the group. By default True for a group of facets and False for a group of points.
+            True: the components are the resultant, applied as a uniform traction to the facets of the group. False: they
+            act on every node of the group. By default True for a group of facets and False for a group of points.
         at : sequence of float (dim,), optional
-            Place through which the total force acts, spread over the group by area and distance from there, with the arms of
-            the group for what moment is left [length].
+            Point through which the resultant acts [length]. It is distributed over the group in proportion to area and
+            distance from this point; linear terms balance the remaining moment.
         weighting : str
-            Of the force spread about `at`: ``"uniform"``, or falling to zero at the radius as ``"linear"``, ``"quadratic"``
-            or ``"cubic"`` functions of the distance.
+            How the force decays with the distance from `at`: ``"uniform"``, or to zero at the radius by a ``"linear"``,
+            ``"quadratic"`` or ``"cubic"`` function.
         radius : float, optional
-            Beyond which the group bears nothing [length]; by default the distance of its farthest node.
+            Distance from `at` beyond which no force acts [length]; by default that of the farthest node.
         ramp : Ramp or iterable of (float, float), optional
 
         Examples
@@ -277,9 +309,17 @@ class ModelLoads(ModelHeat):
         z: float | None = None,
         ramp: History = None,
     ) -> None:
-        """Load a reference point, or a group, with a moment [force times length]; in the plane about z.
+        """Apply a moment to a reference point or to a group.
 
-        On a group of facets it is spread in proportion to area and distance from the middle, without a resultant force.
+        Parameters
+        ----------
+        group : str
+            On a group of facets the moment is distributed in proportion to area and distance from the centroid, without a
+            resultant force.
+        x, y, z : float
+            Components [force times length]; in the plane z alone.
+        ramp : Ramp or iterable of (float, float), optional
+            History of the moment.
 
         Examples
         --------

@@ -22,7 +22,13 @@ class ModelMaterials(ModelBase):
 
     @typed(ModelError)
     def add_material(self, material: Material, groups: Sequence[str] | str | None = None) -> None:
-        """Give a material to groups of solid cells, by default to all; groups override what was given to all before.
+        """Assign a material to groups of solid cells.
+
+        Parameters
+        ----------
+        material : LinearElastic, Orthotropic, ...
+        groups : str or sequence of str, optional
+            By default all solid cells; the material of a group overrides that of all cells.
 
         Examples
         --------
@@ -113,10 +119,10 @@ class ModelMaterials(ModelBase):
 
     @typed(ModelError)
     def internal_forces(self, displacement: Array) -> Array:
-        """Return the nodal forces (n_points, dim) [force] that hold the solid cells deformed by `displacement`.
+        """Return the internal nodal forces (n_points, dim) [force] of the solid cells at a displacement.
 
-        They are in balance with loads, contact, supports, relations, springs and the forces of heat and initial states
-        (`thermal_forces_by_ramp`, `initial_forces_by_ramp`); axisymmetric: over the full circle.
+        They balance the forces of loads, contact, supports, multi-point constraints, springs, thermal strains and initial
+        states (`thermal_forces_by_ramp`, `initial_forces_by_ramp`). In axisymmetry they are those over the full circle.
 
         Parameters
         ----------

@@ -35,10 +35,15 @@ class ModelSupports(ModelContact):
 
     @typed(ModelError)
     def fix(self, group: str, components: str, *, axes: SupportAxes = None) -> None:
-        """Hold displacement components (``"x"``, ``"y"``, ``"xy"``, in 3D also ``"z"``) of a group's nodes at zero.
+        """Fix displacement components of all nodes of a group at zero.
 
-        ``"normal"``: those along the normals of a group of facets. With `axes` (k, 3) [-]
-        components are along these, see `prescribe`.
+        Parameters
+        ----------
+        group : str
+        components : str
+            ``"x"``, ``"y"``, ``"xy"``, in 3D also ``"z"``; or ``"normal"``, along the normals of a group of facets.
+        axes : sequence or callable, optional
+            Directions (k, 3) [-] of the components, as in `prescribe`.
 
         Examples
         --------
@@ -68,17 +73,25 @@ class ModelSupports(ModelContact):
         ramp: History = None,
         **components: Value,
     ) -> None:
-        """Prescribe displacement components of all nodes of a group, e.g. ``y=-2.0`` [length], times the ramp.
+        """Prescribe displacement components of all nodes of a group.
 
-        A component is a number, or a function from reference positions (n, dim) [length] to displacements (n,) [length].
-        `normal` is the displacement out of the body along the mean normal of the facets at each node, for groups of facets.
-        With `axes` (k, 3) [-], vectors in rows or a function as those of materials, in the plane also one vector of two
-        numbers, x, y and z are along the first, second and third of them: ``axes=fc.CylindricalAxes()`` stands for radial,
-        circumferential and axial components.
-
-        `rotation` turns the group about an axis, exactly by any angle, and holds all its components: ``angle`` at multiplier
-        1 [radian]; ``centre``, a point of the axis (dim,) [length]; in space ``axis``, its direction; ``ramp``, a history of
-        its own. The components x, y and z are then what the axis moves by. Not in axisymmetry.
+        Parameters
+        ----------
+        group : str
+        normal : float or callable, optional
+            Outward displacement along the mean normal of the facets at each node, for groups of facets [length].
+        axes : sequence or callable, optional
+            Directions (k, 3) [-] of x, y and z, as unit vectors in rows or a function like those of materials; in the plane
+            a single vector of two numbers will do. ``axes=fc.CylindricalAxes()``: radial, circumferential and axial.
+        rotation : mapping, optional
+            Rigid rotation of the group about an axis, exact for any angle: ``angle`` at multiplier 1 [radian]; ``centre``,
+            a point of the axis (dim,) [length]; in 3D ``axis``, its direction; ``ramp``, a history of its own. All
+            components are then prescribed, and x, y and z translate the axis. Not in axisymmetry.
+        ramp : Ramp or iterable of (float, float), optional
+            History of the displacement.
+        **components : float or callable
+            ``x``, ``y``, ``z``: numbers, or functions from reference positions (n, dim) [length] to displacements (n,)
+            [length].
 
         Examples
         --------
