@@ -19,10 +19,10 @@ from fastcontact.results.step import StepResult
 
 @typed(ModelError)
 def support_forces(model: Model, step: StepResult) -> dict[str, Array]:
-    """Return the resultant (dim,) of the supports of each group that has some [force].
+    """Return the resultant support force of each group with supports.
 
-    `StepResult.reaction` also holds the forces of relations and of springs to the ground; these do not. Where a node has the
-    same component in several groups, the first one counts it, so that the sum over the groups is that of all supports.
+    Unlike `StepResult.reaction`, it excludes the forces of multi-point constraints and of springs to the ground. A component
+    that several groups support at a node is counted for the first of them, so that the sum over the groups is complete.
 
     Parameters
     ----------

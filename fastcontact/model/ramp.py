@@ -139,7 +139,7 @@ History = Ramp | Iterable[Iterable[float]] | None
 
 @typed(ModelError)
 def linear_ramp(steps: int = 20, end: float = 1.0) -> Ramp:
-    """Return a ramp of equal steps from zero to the full loads at `end`.
+    """Return a ramp of equal steps from zero load to full load at `end`.
 
     ModelError if `steps` is not a whole number from 1 to a million or `end` is not positive.
 

@@ -24,13 +24,13 @@ STRESS_COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 
 @typed(CaseError)
 def contact_table(contact: ContactResult, step: StepResult | None = None) -> AnyArray:
-    """Return the state of a contact pair, one row for each secondary node in order along the surface.
+    """Return the state of a contact pair as a table, one row for each secondary node in order along the surface.
 
     Parameters
     ----------
     contact : ContactResult
     step : StepResult, optional
-        The step the pair belongs to, for the fields at its nodes.
+        The step that the contact belongs to, for the fields at its nodes.
 
     Returns
     -------
@@ -83,10 +83,10 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Any
 
 
 def normal_stress(contact: ContactResult, step: StepResult) -> Array:
-    """Return the stress ``n . sigma . n`` (m,) at the nodes of a contact along the normals n they face [pressure].
+    """Return the normal stress ``n . sigma . n`` (m,) at the secondary nodes of a contact [pressure].
 
-    `step` is the one that the contact belongs to. Where contact presses it is minus the pressure, up to the mesh error. NaN
-    at nodes that face nothing.
+    `step` is the one that the contact belongs to, n the normal of the opposite facet. In contact it is minus the pressure, up
+    to the discretisation error; NaN at nodes without an opposite facet.
 
     Examples
     --------
@@ -112,7 +112,7 @@ def normal_stress(contact: ContactResult, step: StepResult) -> Array:
 
 @typed(CaseError)
 def line_table(mesh: Mesh, step: StepResult, group: str, start: str | int | None = None) -> AnyArray:
-    """Return the fields along a line of nodes, one row a node, in order.
+    """Return the fields along a line of nodes as a table, one row for each node in order.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def with_column(table: AnyArray, name: str, values: AnyArray) -> AnyArray:
 def write_csv(path: PathLike, table: AnyArray, units: Mapping[str, str] | None = None) -> None:
     """Write a table as comma-separated values (RFC 4180) with one header line.
 
-    Numbers are written with all their digits: whoever reads them gets the same bits.
+    Numbers are written with all digits, so that reading them back gives the same bits.
 
     Parameters
     ----------
