@@ -90,7 +90,7 @@ class ModelContact(ModelConnections):
               (overclosure, pressure), ascending from zero pressure [length, pressure]. It does not regularise friction;
               ``tangential_penalty`` does: shear per tangential displacement of sticking nodes, a number or a function of
               the secondary position [pressure / length].
-            - ``cohesion``: cohesive zone with a bilinear law, a mapping of ``strength`` [pressure] and fracture ``energy`` per
+            - ``cohesion``: bilinear cohesive zone, a mapping of ``strength`` [pressure] and fracture ``energy`` per
               area [pressure length], and optionally ``shear_strength``, ``shear_energy`` (by default those of opening),
               ``stiffness`` (by default such that the strength is reached at a hundredth of the opening at break)
               [pressure / length], ``mixed_mode``, ``"bk"`` (Benzeggagh and Kenane) or ``"power"``, with its ``exponent`` (2)
