@@ -251,12 +251,8 @@ WHEN = {
 }
 
 
-# By default every command when NumPy is imported, and one each later on; studies start workers of their own.
-BY_DEFAULT = [
-    ("run", "a kernel is compiled"),
-    ("sweep", "a kernel is compiled"),
-    ("converge", "the compiler is loaded"),
-]
+# By default every command when NumPy is imported, and a run and a study later on; studies start workers of their own.
+BY_DEFAULT = [("run", "a kernel is compiled"), ("sweep", "the compiler is loaded")]
 INTERRUPTED = [
     pytest.param(command, when, marks=() if "NumPy" in when or (command, when) in BY_DEFAULT else pytest.mark.slow)
     for command in COMMANDS
@@ -319,12 +315,12 @@ def of_session(leader):
     return found
 
 
-def test_the_end_of_a_study_by_sigterm(tmp_path):
+def test_the_end_of_a_study_by_sigterm(solved_case, tmp_path):
     """As a scheduler does it: no process stays, nothing but one line is said, what was finished is kept."""
     process = subprocess.Popen(
         [
-            sys.executable, "-m", "fastcontact", "sweep", "forma04a", "--set", "approach=1:4:400", "--workers", "2", "-q",
-            "--store", "store",
+            sys.executable, "-m", "fastcontact", "sweep", str(solved_case / "case.toml"), "--set", "approach=1:4:400",
+            "--workers", "2", "-q", "--store", "store",
         ],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True, cwd=tmp_path,
     )  # fmt: skip

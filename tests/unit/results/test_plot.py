@@ -4,36 +4,19 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from matplotlib_pictures import polygons_of, step_of
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact import normal_stress
 from fastcontact.mesh.generate import block, box, union
-from fastcontact.results.step import StepResult
 
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 
 
-def step_of(mesh, von_mises, displacement=None):
-    n, dim = mesh.points.shape
-    u = np.zeros((n, dim)) if displacement is None else displacement
-    stress = np.zeros((n, 4 if dim == 2 else 6))
-    return StepResult(1, 1.0, u, stress, von_mises, von_mises, np.zeros((n, dim)))
-
-
 @pytest.fixture
 def polygons(monkeypatch):
-    """The polygons that were given to matplotlib in this test."""
-    from mpl_toolkits.mplot3d import art3d
-
-    given = []
-
-    class Recorded(art3d.Poly3DCollection):
-        def __init__(self, verts, **options):
-            given.extend(np.asarray(polygon) for polygon in verts)
-            super().__init__(verts, **options)
-
-    monkeypatch.setattr(art3d, "Poly3DCollection", Recorded)
-    return given
+    return polygons_of(monkeypatch)
 
 
 @pytest.mark.parametrize("element", ["hex8", "hex20", "tet4", "tet10", "wedge6", "pyramid5"])
@@ -91,9 +74,7 @@ def test_a_plane_mesh_is_still_drawn_in_the_plane():
 
 
 def test_a_pressure_profile_in_space_is_over_the_distance_from_the_middle():
-    model = fc.Model(box((1.0, 1.0, 0.5), (5, 5, 2), "hex8", (-0.5, -0.5, -0.5)), "3d")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("ZMIN", "xyz")
+    model = elastic_model(box((1.0, 1.0, 0.5), (5, 5, 2), "hex8", (-0.5, -0.5, -0.5)), "3d", ZMIN="xyz")
     ball = fc.obstacles.Sphere((0.0, 0.0, 2.0), 2.0)
     model.add_obstacle("ball", secondary="ZMAX", obstacle=ball, motion={"z": -0.02})
     contact = fc.solve(model, fc.linear_ramp(1))[-1].contact["ball"]
