@@ -105,7 +105,7 @@ def no_scheduler(patch):
 
 def drawn_on_a_full_disk(patch):
     patch.setattr(Path, "mkdir", refusing(errno.ENOSPC))
-    bench.draw("pictures", {"a": [{"n_dofs": 1}, {"n_dofs": 2}]})
+    bench.suite("command").draw("pictures", {"a": [{"n_dofs": 1}, {"n_dofs": 2}]})
 
 
 def copied_to_a_full_disk(patch, folder):
