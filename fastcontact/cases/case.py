@@ -75,10 +75,10 @@ class Case:
     mesh: Mesh
     model: Model
     ramp: Ramp
-    criteria: Criteria
-    linear_solver: str
-    linear_tolerance: float
-    probes: dict[str, int]
+    criteria: Criteria = field(default_factory=Criteria)
+    linear_solver: str = "auto"
+    linear_tolerance: float = 1e-10
+    probes: dict[str, int] = field(default_factory=dict)
     theories: dict[str, dict[str, Any]] = field(default_factory=dict)
     checks: list[Check] = field(default_factory=list)
     units: dict[str, str] = field(default_factory=dict)
@@ -129,9 +129,6 @@ def _case_of_deck(path: Path) -> Case:
         model=deck.model,
         ramp=deck.ramp,
         criteria=deck.criteria,
-        linear_solver="auto",
-        linear_tolerance=1e-10,
-        probes={},
         units=known_units({}),
         folder=path.parent.resolve(),
         modes=deck.modes,

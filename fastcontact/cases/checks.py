@@ -12,7 +12,7 @@ import numpy as np
 
 from fastcontact.analysis.contact_resultants import contact_moment
 from fastcontact.cases.keys import NUMBER
-from fastcontact.errors import CaseError, unknown
+from fastcontact.errors import CaseError, check_known, unknown
 from fastcontact.results.step import ContactResult, StepResult
 
 STRESS = {"xx": 0, "yy": 1, "zz": 2, "xy": 3, "yz": 4, "xz": 5}
@@ -120,8 +120,7 @@ def read_check(
     if ("theory" in entry) == ("value" in entry):
         raise CaseError(f"{where} needs either 'theory', the contact pair whose theory it is, or 'value'")
     owner, _, field = entry["quantity"].partition(".")
-    if owner not in {**probes, **pairs}:
-        raise CaseError(unknown(f"contact pair or probe in {where}.quantity", owner, [*probes, *pairs]))
+    check_known(f"contact pair or probe in {where}.quantity", owner, [*probes, *pairs], CaseError)
     _check_quantity(where, field, OF_PROBES if owner in probes else OF_PAIRS, kinematics)
     if owner in pairs and field in NEEDED and NEEDED[field][0] not in pairs[owner]:
         raise CaseError(f"{where}: '{owner}' has no {field}: {NEEDED[field][1]}")
@@ -147,8 +146,7 @@ def read_check(
     if check.value == 0.0:
         raise CaseError(f"{where}: the value is 0, so no relative deviation can be told; check another quantity")
     if check.theory:
-        if check.theory not in theories:
-            raise CaseError(unknown(f"theory in {where}", check.theory, theories))
+        check_known(f"theory in {where}", check.theory, theories, CaseError)
         check_target(where, check, theories[check.theory]["theory"])
     return check
 
@@ -159,8 +157,7 @@ def _check_quantity(where: str, field: str, allowed: Sequence[str], kinematics: 
         allowed = [name for name in allowed if name not in ONLY_IN_SPACE]
     if kinematics == "axisymmetric":  # over the circle no moment is left, and no force along the radius
         allowed = [name for name in allowed if name not in ("moment.z", "force.x")]
-    if field not in allowed:
-        raise CaseError(unknown(f"quantity in {where}", field, allowed))
+    check_known(f"quantity in {where}", field, allowed, CaseError)
 
 
 def _whole(field: str, theory: Mapping[str, Any]) -> float:

@@ -125,7 +125,7 @@ def _contact(contact: ContactResult, penalty: float | None) -> dict[str, Any]:
         "formulation": contact.formulation,
         "force": float(np.linalg.norm(contact.force)),
         "force_vector": contact.force.tolist(),
-        "radius": [_finite(value) for value in contact.radius],
+        "radius": [finite(value) for value in contact.radius],
         "pressure_max": contact.pressure_max,
         "middle": contact.middle.tolist(),
         "closed_nodes": int(contact.active.sum()),
@@ -144,14 +144,15 @@ def _resultants(case: Case, last: StepResult, name: str, steps: Sequence[Mapping
         "normal_force": resultants.normal_force,
         "moment": resultants.moment.tolist(),
         "area": resultants.area,
-        "centre": [_finite(value) for value in resultants.centre],
-        "mean_gap": _finite(resultants.mean_gap),
+        "centre": [finite(value) for value in resultants.centre],
+        "mean_gap": finite(resultants.mean_gap),
         "pressure_mean": resultants.pressure_mean,
         "friction_work": sum(step.get("dissipation", {}).get(name, 0.0) for step in steps),
     }
 
 
-def _finite(value: float) -> float | None:
+def finite(value: float) -> float | None:
+    """Return a number that JSON can hold: None for NaN and infinity."""
     return float(value) if np.isfinite(value) else None
 
 
@@ -198,7 +199,7 @@ def _against_theory(
 def _deviations(computed: Mapping[str, float], theory: Any) -> dict[str, Any]:
     """Return the theory's numbers, and the relative deviations of the computed ones from them."""
     exact = {name: getattr(theory, name) for name in COMPARED}
-    return {**exact, "deviation": {name: _finite(computed[name] / exact[name] - 1.0) for name in COMPARED}}
+    return {**exact, "deviation": {name: finite(computed[name] / exact[name] - 1.0) for name in COMPARED}}
 
 
 def lines(summary: Mapping[str, Any]) -> list[str]:

@@ -78,6 +78,12 @@ def write_text(path: str, content: str) -> None:
         target.write_text(content, encoding="utf-8")
 
 
+def say_written(options: Any, *paths: object) -> None:
+    """Print which files were written, unless the options ask for quiet; None means no file."""
+    if not options.quiet:
+        say(f"wrote {', '.join(str(path) for path in paths if path)}")
+
+
 def write_json(path: str, numbers: Any, indent: int = 2) -> None:
     """Write a JSON file; raises like `write_text`."""
     write_text(path, json.dumps(numbers, indent=indent) + "\n")

@@ -36,7 +36,7 @@ from fastcontact.arrays import AnyArray, Array, Numbers
 from fastcontact.elasticity.recovery import von_mises
 from fastcontact.errors import FileError
 from fastcontact.mesh import elements, topology
-from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.mesh import Mesh, starts_of
 from fastcontact.results.separated import mean_in_cells
 from fastcontact.results.step import ContactResult, StepResult
 
@@ -223,16 +223,13 @@ def point_flags(mesh: Mesh) -> dict[str, Flags]:
 def cell_fields(mesh: Mesh) -> dict[str, AnyArray]:
     """Return the body of each solid cell, and 1 inside and 0 outside for each group of solids."""
     first = np.concatenate([np.empty(0, np.int32), *(block[:, 0] for block in mesh.solids.values())])
-    starts, total = {}, 0
-    for name, block in mesh.solids.items():
-        starts[name] = total
-        total += len(block)
+    starts = starts_of(mesh.solids)
     members = {}
     for group, numbers in mesh.cell_groups.items():
         rows = [starts[name] + rows for name, rows in mesh.split(numbers).items() if name in starts]
         if rows:
             members[group] = np.concatenate(rows)
-    return {"body": topology.bodies(mesh)[1][first], **_flags(members, total)}
+    return {"body": topology.bodies(mesh)[1][first], **_flags(members, len(first))}
 
 
 def _plain(name: str) -> str:

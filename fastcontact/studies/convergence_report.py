@@ -8,11 +8,12 @@ from itertools import zip_longest
 from typing import Any
 
 from fastcontact.arrays import AnyArray
+from fastcontact.results.tables import structured
 from fastcontact.studies import convergence_tables as tables
 from fastcontact.studies.convergence_figures import draw_differences, draw_errors, draw_pressure
 from fastcontact.studies.fit import CONFIDENCE
 from fastcontact.studies.render.figure import message, panels
-from fastcontact.studies.render.table import Rows, structured
+from fastcontact.studies.render.table import Rows
 from fastcontact.studies.report import Report
 from fastcontact.studies.sentences import sentences
 from fastcontact.studies.series import Series

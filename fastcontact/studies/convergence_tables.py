@@ -7,9 +7,10 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from fastcontact.cases.summary import finite
 from fastcontact.results.units import labelled
 from fastcontact.studies.quantities import column, title
-from fastcontact.studies.render.table import Rows, finite, number, percent
+from fastcontact.studies.render.table import Rows, number, percent
 from fastcontact.studies.sentences import sentences
 from fastcontact.studies.series import Series
 

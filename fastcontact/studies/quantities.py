@@ -15,7 +15,7 @@ from fastcontact.cases.case import Case
 from fastcontact.cases.checks import OF_PROBES, ONLY_IN_SPACE, STRESS, at_point
 from fastcontact.contact.integration import facet_measure
 from fastcontact.contact.surface import Surface, surface
-from fastcontact.errors import CaseError, unknown
+from fastcontact.errors import CaseError, check_known
 from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import quality
@@ -54,8 +54,7 @@ def check_names(case: Case, names: Iterable[str]) -> None:
     kinds = [kind for kind in OF_PROBES if kind != "shear" and (case.mesh.dim == 3 or kind not in ONLY_IN_SPACE)]
     of_probes = [f"{probe}.{kind}" for probe in case.probes for kind in kinds]
     for name in names:
-        if name not in (*LABELS, *of_probes):
-            raise CaseError(unknown("quantity", name, [*LABELS, *of_probes]))
+        check_known("quantity", name, [*LABELS, *of_probes], CaseError)
 
 
 def of_contacts(last: StepResult) -> dict[str, float]:
@@ -250,12 +249,13 @@ def of_theory(theory: Any, share: float = 1.0) -> dict[str, float]:
     return {quantity: value for quantity, value in quantities.items() if np.isfinite(value) and value > 0}
 
 
-def by_theory(case: Case, pair: str | None, force: float) -> dict[str, dict[str, float]]:
+def by_theory(case: Case | None, pair: str | None, force: float) -> dict[str, dict[str, float]]:
     """Return the quantities of a pair by its theory at equal approach, its mesh-converged solution, and at equal force.
 
-    The keys are ``theory``, ``reference`` and ``equal_force``; `force` is that of the contact [force].
+    The keys are ``theory``, ``reference`` and ``equal_force``; `force` is that of the contact [force]. Nothing is known
+    without a case.
     """
-    theories = case.theories.get(pair or "", {})
+    theories = {} if case is None else case.theories.get(pair or "", {})
     theory: Any = theories.get("theory")
     share = theories.get("share", 1.0)
     same = theory.at_force(force / share) if force > 0 and hasattr(theory, "at_force") else None

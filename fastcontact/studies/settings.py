@@ -11,7 +11,7 @@ from typing import Any
 from fastcontact.cases.case import Case
 from fastcontact.cases.keys import check_keys
 from fastcontact.contact.formulations import FORMULATIONS
-from fastcontact.errors import CaseError, unknown
+from fastcontact.errors import CaseError, check_known
 from fastcontact.mesh import elements
 from fastcontact.mesh.generate import GENERATORS, Circle
 
@@ -92,14 +92,13 @@ def settings(case: Case, data: dict[str, Any] | None = None) -> Settings:
     study = data.get("study", {})
     pair = study.get("contact") or next((own.name for own in case.model.contact), None)
     formulations = {pair.name: pair.formulation for pair in case.model.contact}
-    if pair is not None and pair not in formulations:
-        raise CaseError(unknown("contact pair in study.contact", pair, formulations))
+    if pair is not None:
+        check_known("contact pair in study.contact", pair, formulations, CaseError)
     solids = list(case.mesh.solids)
     own = Combination(solids[0] if len(solids) == 1 else None, formulations.get(pair or ""))
     generator, arguments = _generator(data, study)
     for name in study.get("options", {}):
-        if name not in FORMULATIONS:
-            raise CaseError(unknown("formulation in study.options", name, FORMULATIONS))
+        check_known("formulation in study.options", name, FORMULATIONS, CaseError)
     curves = tuple(_circle(i, entry) for i, entry in enumerate(study.get("curves", ())))
     return Settings(
         data=data,
@@ -121,8 +120,8 @@ def settings(case: Case, data: dict[str, Any] | None = None) -> Settings:
 def _generator(data: dict[str, Any], study: dict[str, Any]) -> tuple[str | None, dict[str, dict[str, Any]]]:
     by_shape = {shape: dict(study[shape]) for shape in SHAPES if shape in study}
     generator = study.get("generator", data["mesh"].get("generator"))
-    if generator is not None and generator not in GENERATORS:
-        raise CaseError(unknown("study.generator", generator, GENERATORS))
+    if generator is not None:
+        check_known("study.generator", generator, GENERATORS, CaseError)
     if by_shape and generator is None:
         raise CaseError(f"study.{next(iter(by_shape))} needs 'study.generator', the mesh maker it is meant for")
     if not by_shape and "generator" in study and study["generator"] != data["mesh"].get("generator"):
@@ -152,10 +151,10 @@ def _combination(entry: Any) -> Combination:
 
 
 def _checked(element: str | None, formulation: str | None) -> Combination:
-    if element is not None and element not in elements.ELEMENTS:
-        raise CaseError(unknown("element", element, elements.ELEMENTS))
-    if formulation is not None and formulation not in FORMULATIONS:
-        raise CaseError(unknown("contact formulation", formulation, FORMULATIONS))
+    if element is not None:
+        check_known("element", element, elements.ELEMENTS, CaseError)
+    if formulation is not None:
+        check_known("contact formulation", formulation, FORMULATIONS, CaseError)
     return Combination(element, formulation)
 
 

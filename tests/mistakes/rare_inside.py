@@ -33,7 +33,7 @@ from fastcontact.mesh.files import aster_mail, hdf5, med, meshio_content
 from fastcontact.mesh.generate import _check, _triangulate
 from fastcontact.mesh.generate.transform import renamed
 from fastcontact.results import reader
-from fastcontact.studies import convergence, levels, sweep
+from fastcontact.studies import execute, levels
 from fastcontact.studies.convergence import convergence_study
 from fastcontact.studies.levels import recipe
 from fastcontact.studies.render import figure
@@ -157,12 +157,12 @@ def failing(jobs, **_):
 
 
 def no_level(patch):
-    patch.setattr(convergence, "run_all", failing)
+    patch.setattr(execute, "run_all", failing)
     convergence_study("forma04a", 1, ["tri3"], ["node_to_segment"])
 
 
 def no_point(patch):
-    patch.setattr(sweep, "run_all", failing)
+    patch.setattr(execute, "run_all", failing)
     parameter_sweep("forma04a", {"approach": [1.0]})
 
 

@@ -142,7 +142,7 @@ def test_an_interruption_of_a_run_alone_ends_its_process(monkeypatch):
         def shutdown(self, **options):
             ended.append(options)
 
-    monkeypatch.setattr(execute, "started_pool", lambda count: Pool())
+    monkeypatch.setattr(execute, "Workers", lambda count: Pool())
     with pytest.raises(KeyboardInterrupt):
         execute._alone(None)
     assert ended == [True, {"wait": False, "cancel_futures": True}]

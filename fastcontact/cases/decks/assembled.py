@@ -14,6 +14,7 @@ from fastcontact.arrays import Array, Mask
 from fastcontact.cases.decks.blocks import Location, folded
 from fastcontact.cases.decks.content import Cell, Content, Instance, Members, Part, Section, SurfaceDefinition
 from fastcontact.cases.decks.element_types import ElementType, element_type
+from fastcontact.cases.decks.refusals import defined
 from fastcontact.mesh import elements
 
 # Names of sets that a message lists, and characters that it shows of one.
@@ -139,9 +140,8 @@ class Assembled:
 
     def _entry(self, kind: str, scope: str, entry: Members) -> Iterable[Any]:
         scope = entry.instance or scope
-        if scope and scope not in self.content.instances:
-            known = ", ".join(instance.name for instance in self.content.instances.values()) or "none"
-            raise entry.location.refuse(f"instance '{scope}' is not defined; instances: {known}")
+        if scope:
+            defined("instance", scope, self.content.instances, entry.location)
         if entry.name:
             return self._named(kind, scope, entry)
         numbers = entry.numbers

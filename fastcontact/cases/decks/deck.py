@@ -78,12 +78,11 @@ class Deck:
         Errors and warnings are those of `fastcontact.solve`; where the deck asks for NLGEOM and small strains are solved, a
         FastcontactWarning tells the largest strain and rotation, which linear kinematics leave out the squares of.
         """
-        given = {"criteria": self.criteria, **options}
         steps: list[StepResult] = []
-        for step in solve_steps(self.model, self.ramp, **given):
+        for step in self.solve_steps(**options):
             if steps:
                 steps[-1] = replace(steps[-1], restart=None)
-            steps.append(self.finished(step))
+            steps.append(step)
         return steps
 
     def solve_steps(self, **options: Any) -> Iterator[StepResult]:

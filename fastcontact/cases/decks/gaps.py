@@ -13,8 +13,8 @@ from fastcontact.cases.decks.assembled import Assembled, facet_points
 from fastcontact.cases.decks.blocks import Location
 from fastcontact.cases.decks.conditions import Conditions
 from fastcontact.cases.decks.meshing import DeckMesh
+from fastcontact.cases.decks.refusals import refusing
 from fastcontact.contact.obstacles.shapes import HalfSpace
-from fastcontact.errors import FastcontactError
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
 
@@ -106,13 +106,11 @@ def add_gap(model: Model, found: DeckMesh, gap: GapGroup, conditions: Conditions
             raise gap.location.refuse(
                 "gap elements between bodies are supported along their direction, in planes across it only"
             )
-        try:
+        with refusing(gap.location):
             model.add_contact(
                 gap.name, secondary=gap.facets, primary=gap.opposite, formulation="node_to_segment",
                 clearance=gap.clearance - float(along.mean()),
             )  # fmt: skip
-        except FastcontactError as error:
-            raise gap.location.refuse(str(error)) from error
         return {}
     history = _motion(gap, conditions)
     wall = HalfSpace(

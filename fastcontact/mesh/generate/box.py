@@ -67,8 +67,8 @@ def box(
     (12, 4, ['quad4', 'tri3', 'wedge6'])
     """
     solid = elements.get(one_of("element", element, SOLIDS))
-    lengths, corner = np.array(each(positive, "size", size, 3)), np.array(each(number, "origin", origin, 3))
-    shape = np.array(each(count, "divisions", divisions, 3))
+    lengths, corner = np.array(each(positive, "size", size)), np.array(each(number, "origin", origin))
+    shape = np.array(each(count, "divisions", divisions))
     block, lattice = _solids(solid, shape)
     facets, sides = _sides(solid, block, lattice, STEPS * shape)
     cells, groups, first = {element: block}, {name: np.arange(len(block))}, len(block)

@@ -13,7 +13,7 @@ from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.companion_groups import OPPOSITE
-from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.mesh import Mesh, starts_of
 
 Facet = frozenset[int]
 
@@ -143,10 +143,8 @@ def _opened(
         rows = np.flatnonzero((new[block] >= 0).any(axis=1))
         follow = [row for row in rows.tolist() if frozenset(block[row].tolist()) in outer]
         _with_nodes(cells, name, np.array(follow, int), new)
-    groups, starts, total = {}, {}, 0
-    for name, block in cells.items():
-        starts[name] = total
-        total += len(block) + len(facets.get(name, ()))
+    groups = {}
+    starts = starts_of({name: range(len(block) + len(facets.get(name, ()))) for name, block in cells.items()})
     for own, members in mesh.cell_groups.items():
         parts = [starts[name] + rows for name, rows in mesh.split(members).items()]
         groups[own] = np.concatenate(parts) if parts else members

@@ -14,7 +14,7 @@ from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.generate._check import number, one_of
-from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.mesh import Mesh, starts_of
 
 Groups = dict[str, AnyArray]
 Names = Mapping[str, str | None] | Callable[[str], str | None]
@@ -114,7 +114,7 @@ def union(*meshes: Mesh) -> Mesh:
     shifts = np.cumsum([0] + [mesh.n_points for mesh in meshes])[:-1]
     both = list(zip(meshes, shifts, strict=True))
     cells = _joined({name: block + shift for name, block in mesh.cells.items()} for mesh, shift in both)
-    starts = _starts(cells)
+    starts = starts_of(cells)
     numbers = [(mesh, _renumbering(mesh, starts)) for mesh in meshes]
     return Mesh(
         np.concatenate([mesh.points for mesh in meshes]),
@@ -131,12 +131,6 @@ def _joined(parts: Iterable[Groups]) -> Groups:
         for name, values in groups_of_mesh.items():
             groups_of_all.setdefault(name, []).append(values)
     return {name: np.concatenate(arrays) for name, arrays in groups_of_all.items()}
-
-
-def _starts(cells: Mapping[str, AnyArray]) -> dict[str, int]:
-    """Number of the first cell of each element."""
-    lengths = [len(block) for block in cells.values()]
-    return dict(zip(cells, np.cumsum([0, *lengths[:-1]]).tolist(), strict=True))
 
 
 def _renumbering(mesh: Mesh, starts: dict[str, int]) -> AnyArray:
