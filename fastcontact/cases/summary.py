@@ -20,6 +20,8 @@ from fastcontact.results.units import units_of_results, valued, with_unit
 if TYPE_CHECKING:
     from fastcontact.analysis.modal.shapes import Modes
 
+# Of contact resultants, those that a summary has.
+RESULTANTS = ("normal_force", "moment", "area", "centre", "mean_gap", "pressure_mean")
 # Numbers that a theory must have to be compared as a whole.
 COMPARED = ("force", "pressure_max", "radius")
 
@@ -125,7 +127,7 @@ def _contact(contact: ContactResult, penalty: float | None) -> dict[str, Any]:
         "formulation": contact.formulation,
         "force": float(np.linalg.norm(contact.force)),
         "force_vector": contact.force.tolist(),
-        "radius": [finite(value) for value in contact.radius],
+        "radius": _plain(contact.radius),
         "pressure_max": contact.pressure_max,
         "middle": contact.middle.tolist(),
         "closed_nodes": int(contact.active.sum()),
@@ -141,14 +143,14 @@ def _resultants(case: Case, last: StepResult, name: str, steps: Sequence[Mapping
     """Return what `contact_resultants` tell of the last step, with the work of friction of all `steps`."""
     (resultants,) = contact_resultants(case.model, [last], name)
     return {
-        "normal_force": resultants.normal_force,
-        "moment": resultants.moment.tolist(),
-        "area": resultants.area,
-        "centre": [finite(value) for value in resultants.centre],
-        "mean_gap": finite(resultants.mean_gap),
-        "pressure_mean": resultants.pressure_mean,
+        **{name: _plain(getattr(resultants, name)) for name in RESULTANTS},
         "friction_work": sum(step.get("dissipation", {}).get(name, 0.0) for step in steps),
     }
+
+
+def _plain(value: Any) -> Any:
+    """Return a number, or an array of them, for JSON."""
+    return [finite(member) for member in value] if np.ndim(value) else finite(value)
 
 
 def finite(value: float) -> float | None:
