@@ -22,19 +22,33 @@ from fastcontact.results.step import ContactResult, StepResult
 
 @typed(ContactError)
 def contact_moment(contact: ContactResult, about: ArrayLike | None = None) -> Array:
-    """Return the moment of the contact forces on the secondary side, about a point, on the reference configuration.
+    """Return the moment of the contact forces on the secondary side about a point, in the reference configuration.
 
     Parameters
     ----------
     contact : ContactResult
     about : array_like (dim,), optional
-        The place it is about, by default the middle of the contact [length].
+        Point of reference, by default the middle of the contact [length].
 
     Returns
     -------
     ndarray (1,) or (3,)
-        In the plane about z, in space about x, y and z [force times length]. In axisymmetry no moment is left over the
-        circle, and this one means nothing.
+        In the plane about z, in 3D about x, y and z [force times length]. Meaningless in axisymmetry, where the moment
+        over the full circle is zero.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> mesh = fc.generate.block_on_block()
+    >>> model = fc.Model(mesh, kinematics="plane_strain")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    >>> model.fix("LOWER_BOTTOM", "xy")
+    >>> model.fix("UPPER_LEFT", "x")
+    >>> model.add_pressure("UPPER_TOP", 2.0)
+    >>> model.add_contact("joint", secondary="CONT_UPPER", primary="CONT_LOWER")
+    >>> steps = fc.solve(model, 2)
+    >>> fc.contact_moment(steps[-1].contact["joint"], about=(0.0, 5.0)).round(6)
+    array([100.])
     """
     centre = contact.middle if about is None else np.asarray(about, float)
     if centre.shape != (contact.coordinates.shape[1],) or not np.isfinite(centre).all():
@@ -54,23 +68,38 @@ class ContactResultants:
     force : ndarray (dim,)
         On the secondary side [force].
     normal_force : float
-        Sum of the nodal forces along the normals, whatever their directions: times a coefficient of friction what a press
-        fit holds, whose force cancels all round [force].
+        Sum of the normal components of the nodal forces, whatever their directions [force]. Multiplied by a coefficient of
+        friction, it is what a press fit holds, where the vector sum cancels.
     moment : ndarray (1,) or (3,)
-        Of it about the middle of the contact, see `contact_moment`; zero in axisymmetry [force times length].
+        Moment of the contact forces about the middle of the contact, see `contact_moment`; zero in axisymmetry
+        [force times length].
     area : float
-        Of the closed nodes, each with its share of its facets, in finite strain of the deformed ones; in the plane a length
-        times the unit of thickness, in axisymmetry that of the full circle [length^2]. Off by less than a row of facets at
-        the edge.
+        Area of contact: tributary areas of the closed nodes, in finite strain on the deformed facets; in the plane a length
+        times unit thickness, in axisymmetry of the full circle [length^2]. Accurate to a row of facets at the edge.
     centre : ndarray (dim,)
-        Centre of pressure, of the normal forces of this model; NaN without any [length]. In axisymmetry it lies on the axis,
-        and NaN stands for the mean radius of the forces, which is no centre.
+        Centre of pressure of the normal forces; NaN without contact [length]. In axisymmetry it lies on the axis, and its
+        radial component is NaN.
     mean_gap : float
-        Mean over the area that faces the other side [length]; NaN where none does.
+        Mean gap over the area that faces the other side [length]; NaN if there is none.
     pressure_mean, pressure_max : float
-        Normal force over area, and the largest nodal pressure [pressure].
+        Normal force divided by area, and the largest nodal pressure [pressure].
     dissipation, friction_work : float
-        Work of friction in this step, and of all steps so far [energy].
+        Work of friction in this step, and accumulated over all steps [energy].
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> mesh = fc.generate.block_on_block()
+    >>> model = fc.Model(mesh, kinematics="plane_strain")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    >>> model.fix("LOWER_BOTTOM", "xy")
+    >>> model.fix("UPPER_LEFT", "x")
+    >>> model.add_pressure("UPPER_TOP", 2.0)
+    >>> model.add_contact("joint", secondary="CONT_UPPER", primary="CONT_LOWER")
+    >>> steps = fc.solve(model, 2)
+    >>> joint = fc.contact_resultants(model, steps, "joint")[-1]
+    >>> joint.centre.round(6)
+    array([5., 0.])
     """
 
     force: Array
@@ -95,11 +124,33 @@ def contact_resultants(model: Model, steps: Iterable[StepResult], name: str) -> 
     ----------
     model : Model
     steps : iterable of StepResult
-        From the first one on, if the work of friction shall be all of it.
+        Beginning with the first one, so that the work of friction is complete.
     name : str
-        Of the contact pair.
+        Name of the contact pair.
 
-    ContactError if the model has no such pair.
+    Returns
+    -------
+    list of ContactResultants
+
+    Raises
+    ------
+    ContactError
+        If the model has no such pair.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> mesh = fc.generate.block_on_block()
+    >>> model = fc.Model(mesh, kinematics="plane_strain")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    >>> model.fix("LOWER_BOTTOM", "xy")
+    >>> model.fix("UPPER_LEFT", "x")
+    >>> model.add_pressure("UPPER_TOP", 2.0)
+    >>> model.add_contact("joint", secondary="CONT_UPPER", primary="CONT_LOWER")
+    >>> steps = fc.solve(model, 2)
+    >>> last = fc.contact_resultants(model, steps, "joint")[-1]
+    >>> round(last.normal_force, 9), round(last.area, 9), round(last.pressure_mean, 9)
+    (20.0, 10.0, 2.0)
     """
     pair = _bound(model, name)
     areas, work, resultants = lumped_areas(pair.secondary, pair.points, pair.axisymmetric), 0.0, []
@@ -151,6 +202,20 @@ def contact_history(model: Model, steps: Sequence[StepResult], name: str) -> NDA
     structured ndarray (n_steps,)
         ``step``, ``load_factor``; ``force_x`` ...; ``moment_z``, in space ``moment_x`` ...; ``area``; ``centre_x`` ...;
         ``normal_force``, ``mean_gap``, ``pressure_mean``, ``pressure_max``, ``dissipation``, ``friction_work``.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> mesh = fc.generate.block_on_block()
+    >>> model = fc.Model(mesh, kinematics="plane_strain")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    >>> model.fix("LOWER_BOTTOM", "xy")
+    >>> model.fix("UPPER_LEFT", "x")
+    >>> model.add_pressure("UPPER_TOP", 2.0)
+    >>> model.add_contact("joint", secondary="CONT_UPPER", primary="CONT_LOWER")
+    >>> steps = fc.solve(model, 2)
+    >>> fc.contact_history(model, steps, "joint")["normal_force"].round(9)
+    array([10., 20.])
     """
     answers = contact_resultants(model, steps, name)
     axes = "xyz"[: model.mesh.dim]
@@ -170,21 +235,21 @@ def contact_history(model: Model, steps: Sequence[StepResult], name: str) -> NDA
 
 @typed(ContactError)
 def wear(model: Model, steps: Iterable[StepResult], name: str, coefficient: float) -> Array:
-    """Return the depth of wear at the secondary nodes of a contact pair after Archard, added up over the load steps.
+    """Return the depth of wear at the secondary nodes of a contact pair by Archard's law, accumulated over the load steps.
 
     ``depth = sum of coefficient * pressure * slip``, with the mean of the pressures at both ends of a step. Slip is the
-    relative tangential displacement of a node and of what it faces at the end of the step; where friction holds nodes it is
-    zero. The geometry is not changed by it; with the option ``wear`` of the contact pair it is.
+    tangential displacement of a node relative to the opposite side at the end of the step, zero where it sticks. The
+    geometry is not updated; with the option ``wear`` of the contact pair it is.
 
     Parameters
     ----------
     model : Model
     steps : iterable of StepResult
-        One after the other from the first on.
+        Consecutive steps, beginning with the first one.
     name : str
-        Of the contact pair.
+        Name of the contact pair.
     coefficient : float
-        Archard's, by hardness [1 / pressure].
+        Archard's coefficient divided by the hardness [1 / pressure].
 
     Returns
     -------
@@ -199,6 +264,22 @@ def wear(model: Model, steps: Iterable[StepResult], name: str, coefficient: floa
     Notes
     -----
     Archard, J. Appl. Phys. 24, 1953.
+
+    Examples
+    --------
+    Nothing slides here, so nothing is worn off:
+
+    >>> import fastcontact as fc
+    >>> mesh = fc.generate.block_on_block()
+    >>> model = fc.Model(mesh, kinematics="plane_strain")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    >>> model.fix("LOWER_BOTTOM", "xy")
+    >>> model.fix("UPPER_LEFT", "x")
+    >>> model.add_pressure("UPPER_TOP", 2.0)
+    >>> model.add_contact("joint", secondary="CONT_UPPER", primary="CONT_LOWER")
+    >>> steps = fc.solve(model, 2)
+    >>> bool(fc.wear(model, steps, "joint", coefficient=1e-9).max() < 1e-20)
+    True
     """
     if not (np.isfinite(coefficient) and coefficient >= 0.0):
         raise ContactError(f"the coefficient of wear {coefficient} must be a number, zero or more")

@@ -15,32 +15,39 @@ LOOSEST = 1e-2
 @typed(ModelError)
 @dataclass(frozen=True)
 class Criteria:
-    """When a load step counts as converged.
+    """Convergence criteria of a load step.
 
     Parameters
     ----------
     relative : float
-        Largest out-of-balance force over the largest applied force, reaction or contact force (RESI_GLOB_RELA), at most
-        0.01. Where iterative linear solvers miss it, their tolerance is lowered or factors take over.
+        Largest residual force divided by the largest applied force, reaction or contact force (RESI_GLOB_RELA), at most
+        0.01. If an iterative linear solver misses it, its tolerance is lowered or a factorisation takes over.
     absolute : float, optional
-        Largest out-of-balance force [force] that is small enough by itself (RESI_GLOB_MAXI). Without forces a relative
-        criterion is 0/0; then, and by default, the bound is the round-off of the internal forces.
+        Largest residual force [force] that is accepted by itself (RESI_GLOB_MAXI). Without forces a relative criterion is
+        0/0; then, and by default, the bound is the round-off of the internal forces.
     geometry_updates : int or None
-        How many times to re-pair on the deformed configuration after the first pairing of a step; None: until the
-        displacement changes by less than `geometry` of its largest component.
+        Number of contact detections on the deformed configuration after the first one of a step; None: until the
+        displacement changes by less than `geometry` times its largest component.
     geometry : float
-        See `geometry_updates`; at most 0.01. Where round-off makes displacements scatter by more than that, a step ends as
-        soon as it shows, and ``iterations["scatter"]`` says by how much.
+        See `geometry_updates`; at most 0.01. If round-off makes the displacement scatter by more than that, the step ends
+        as soon as this is detected, and ``iterations["scatter"]`` holds the amount.
     keep_pairing : bool
-        Keep the pairing of the undeformed bodies through all steps, with its normals and projections (REAC_GEOM =
-        'SANS'); for small motions only. Without friction the state then does not depend on the steps that lead to it.
+        Keep the pairing of the undeformed configuration, with its normals and projections, in all steps (REAC_GEOM =
+        'SANS'); for small motions only. Without friction the solution is then independent of the load path.
     max_geometry_updates, max_active_set_iterations : int
         Limits per step, and per pairing.
     max_halvings : int
-        How many times a load step that does not converge is cut in halves before the analysis gives up (DECOUPE), twice
-        as often with nonlinear bodies. Those go on with parts of that size, and twice it after each that took few iterations.
-        Parts of a step are steps of their own, so that friction slides along their path; only the instants of the ramp
-        give a result, whose ``iterations["substeps"]`` lists the ends of its parts. 0: never.
+        How many times a load step that does not converge is halved before the analysis stops (DECOUPE), twice as often
+        with nonlinear bodies; these continue with substeps of that size, doubled after each one that took few iterations.
+        Substeps are complete load steps, along whose path friction slides, but only the instants of the ramp yield
+        results; ``iterations["substeps"]`` lists the ends of the substeps. 0: never.
+
+    Examples
+    --------
+    Contact detection three times per load step, as code_aster does by default:
+
+    >>> import fastcontact as fc
+    >>> criteria = fc.Criteria(geometry_updates=2)
     """
 
     relative: float = 1e-6

@@ -37,44 +37,58 @@ def solve(
     resume: Sequence[StepResult] = (),
     progress: bool = False,
 ) -> Steps:
-    """Solve a model along a load ramp, from its beginning or after steps that are there already.
+    """Solve a model along a load ramp, from its beginning or from the last of some earlier steps.
 
     Parameters
     ----------
     model : Model
     ramp : Ramp, int or array, optional
-        A number of equal steps (20 by default), the load factors (n,) at which steps end, or points (instant, multiplier)
-        (n, 2) of the load function, each but the first the end of a step [-].
+        A number of equal steps (20 by default); the load factors (n,) at the ends of the steps; or points (instant,
+        multiplier) (n, 2) of the load function, of which all but the first end a step [-].
     linear_solver : str
         ``"direct"``, ``"cholmod"``, ``"amg"``, ``"pyamg"`` or ``"auto"``; see `linear.choice.make`.
     linear_tolerance : float
-        Relative residual of iterative linear solvers, at most 0.001; `Criteria.relative` where that is smaller.
+        Relative residual of iterative linear solvers, at most 0.001; `Criteria.relative` if that is smaller.
     linear_precision : {"single", "double"}, optional
-        Of the numbers inside the multigrid cycle, single by default; the solution is always in double precision.
+        Precision inside the multigrid cycle, by default single; the solution is always in double precision.
     criteria : Criteria, optional
     on_step : callable, optional
         Called with every new `StepResult`, e.g. ``ResultWriter.write``. To keep only some steps, see `solve_steps`.
     resume : sequence of StepResult
-        Steps to continue as if they had not stopped: what `solve` returned, ``open_results(path)``, ``ResultWriter.done``.
-        Linear solver, tolerances, limits and the rest of the ramp may be others.
+        Earlier steps to continue from, as if the analysis had not stopped: those that `solve` returned,
+        ``open_results(path)`` or ``ResultWriter.done``. Linear solver, tolerances, limits and the rest of the ramp may
+        differ.
     progress : bool
-        Write a line on standard error that is drawn anew after every step, also in notebooks.
+        Show the progress on standard error, updated after every step, also in notebooks.
 
     Returns
     -------
     Steps
-        A list of StepResult, those of `resume` and the new ones; only the last one has its `restart`.
+        List of StepResult, those of `resume` and the new ones; only the last one holds its `restart`.
 
     Raises
     ------
     MeshError, ModelError, ContactError, ConvergenceError
-        If the model is wrong, or another one than that of `resume`; if a step does not converge, nor in parts
-        (`Criteria.max_halvings`): `on_step` has had the steps before it.
+        If the model is invalid or differs from that of `resume`; if a step does not converge even when halved
+        (`Criteria.max_halvings`), in which case `on_step` has received all steps before it.
 
     Warns
     -----
     FastcontactWarning
-        What is doubtful about the model and, at the end, the result, with figures; these steps keep the texts.
+        What is doubtful about the model and, at the end, about the result, with numbers; steps keep the messages.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> model = fc.Model(fc.generate.half_spheres(size=10.0), kinematics="axisymmetric")
+    >>> model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+    >>> model.fix("A1A2", "x")
+    >>> model.prescribe("A2B2", y=-2.0)
+    >>> model.prescribe("A1B1", y=+2.0)
+    >>> model.add_contact("hertz", secondary="CONT1", primary="CONT2")
+    >>> steps = fc.solve(model, 2)
+    >>> [step.load_factor for step in steps]
+    [0.5, 1.0]
     """
     steps, ramp = Steps(resume), ramp_of(ramp)
     total = len(steps) + len(restart.remaining(ramp, steps[-1] if steps else None))

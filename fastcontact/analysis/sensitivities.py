@@ -48,6 +48,14 @@ class Sensitivities:
         their pair, and of the gaps of open ones over the largest displacement; 1 where these are larger [-].
     solutions : int
         Linear solutions that the adjoint took: one, and those for the moving geometry of contact.
+
+    Examples
+    --------
+    See `sensitivities`.
+
+    >>> import fastcontact as fc
+    >>> result = fc.sensitivities(model, step, ("pressure_max", "hertz"), [("E", "BLOCK")])  # doctest: +SKIP
+    >>> result.derivatives["E", "BLOCK"]  # doctest: +SKIP
     """
 
     value: float
@@ -112,6 +120,22 @@ def sensitivities(
         If there is no such quantity or parameter; with friction, wear, or locked pretension sections, since results then
         depend on earlier steps; if an active constraint is about to open, or an open one to close; if nodes lie between two
         facets, so that there is one derivative to either side.
+
+    Examples
+    --------
+    The force on a block between rigid planes is proportional to its modulus:
+
+    >>> import fastcontact as fc
+    >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.0), "BLOCK")
+    >>> model.fix("LEFT", "x")
+    >>> floor = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
+    >>> model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor)
+    >>> model.prescribe("TOP", y=-0.001)
+    >>> step = fc.solve(model, 1)[-1]
+    >>> result = fc.sensitivities(model, step, ("contact_force", "floor", "y"), [("E", "BLOCK")], ramp=1)
+    >>> round(result.value, 9), round(result.derivatives["E", "BLOCK"], 9)
+    (1.0, 0.001)
     """
     asked = [tuple(parameter) for parameter in parameters]
     check_asked(model, quantity, parameters)

@@ -19,10 +19,10 @@ from fastcontact.results.step import StepResult
 
 @typed(ModelError)
 def support_forces(model: Model, step: StepResult) -> dict[str, Array]:
-    """Return the resultant (dim,) of the supports of each group that has some [force].
+    """Return the resultant support force of each group with supports.
 
-    `StepResult.reaction` also holds the forces of relations and of springs to the ground; these do not. Where a node has the
-    same component in several groups, the first one counts it, so that the sum over the groups is that of all supports.
+    Unlike `StepResult.reaction`, it excludes the forces of multi-point constraints and of springs to the ground. A component
+    that several groups support at a node is counted for the first of them, so that the sum over the groups is complete.
 
     Parameters
     ----------
@@ -39,6 +39,18 @@ def support_forces(model: Model, step: StepResult) -> dict[str, Array]:
     ------
     ModelError
         If the step is of another model.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> model = fc.Model(fc.generate.block(), kinematics="plane_stress")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    >>> model.fix("BOTTOM", "y")
+    >>> model.fix("BOTTOM_LEFT", "x")
+    >>> model.add_pressure("TOP", 2.0)
+    >>> step = fc.solve(model, 1)[-1]
+    >>> fc.support_forces(model, step)["BOTTOM"].round(9)
+    array([0., 2.])
     """
     _check(model, step)
     n, (held, _) = model.n_dofs, model.prescribed()
@@ -87,6 +99,18 @@ def spring_forces(model: Model, step: StepResult) -> dict[str, Array]:
     ------
     ModelError
         If the step is of another model.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> model = fc.Model(fc.generate.block(divisions=(1, 1)), kinematics="plane_stress")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    >>> model.fix("LEFT", "x")
+    >>> model.add_spring("BOTTOM", y=50.0)
+    >>> model.add_pressure("TOP", 2.0)
+    >>> step = fc.solve(model, 1)[-1]
+    >>> {name: tension.round(9) for name, tension in fc.spring_forces(model, step).items()}
+    {"spring on 'BOTTOM'": array([-1., -1.])}
     """
     _check(model, step)
     forces: dict[str, Array] = {}
@@ -104,6 +128,13 @@ def pretension_history(steps: Iterable[StepResult]) -> NDArray[np.void]:
     structured ndarray (n_steps,)
         ``step``, ``load_factor``; for each section ``NAME_force``, positive in tension [force], and ``NAME_shortening``
         [length]; NaN in steps without it.
+
+    Examples
+    --------
+    See `Model.add_pretension`.
+
+    >>> import fastcontact as fc
+    >>> fc.write_csv("bolts.csv", fc.pretension_history(steps))  # doctest: +SKIP
     """
     steps = list(steps)
     names = list(dict.fromkeys(name for step in steps for name in step.pretension))

@@ -207,6 +207,15 @@ def cattaneo_mindlin_line(
         Coulomb's coefficient f > 0.
     tangential_force : float
         Per unit length, between 0 and f times the normal force, beyond which the bodies slide [force/length].
+
+    Examples
+    --------
+    >>> from fastcontact import analytic
+    >>> contact = analytic.cattaneo_mindlin_line(
+    ...     E1=1000.0, nu1=0.3, R1=10.0, friction=0.5, force=8.0, tangential_force=2.0, E2=1000.0, nu2=0.3
+    ... )
+    >>> round(contact.stick_radius / contact.normal.radius, 6)  # (1 - Q / (mu F))^(1/2)
+    0.707107
     """
     normal = hertz_line(
         E1=E1, nu1=nu1, R1=R1, E2=E2, nu2=nu2, R2=R2, force=force, radius=radius, pressure_max=pressure_max
@@ -240,6 +249,15 @@ def cattaneo_mindlin_sphere(
         Coulomb's coefficient f > 0.
     tangential_force : float
         Between 0 and f times the normal force, beyond which the bodies slide [force].
+
+    Examples
+    --------
+    >>> from fastcontact import analytic
+    >>> contact = analytic.cattaneo_mindlin_sphere(
+    ...     E1=1000.0, nu1=0.3, R1=10.0, friction=0.5, force=8.0, tangential_force=2.0, E2=1000.0, nu2=0.3
+    ... )
+    >>> round(contact.stick_radius / contact.normal.radius, 6)  # (1 - Q / (mu F))^(1/3)
+    0.793701
     """
     normal = hertz_point(
         E1=E1, nu1=nu1, R1=R1, E2=E2, nu2=nu2, R2=R2,
@@ -282,6 +300,11 @@ def block_sliding(
         Material [pressure], [-], and Coulomb's coefficient f >= 0.
     height, pressure, displacement : float
         Height [length], uniform contact pressure [pressure] and sideways displacement of the top, >= 0 [length].
+
+    Examples
+    --------
+    >>> from fastcontact import analytic
+    >>> block = analytic.block_sliding(E=1000.0, nu=0.0, height=1.0, pressure=2.0, friction=0.5, displacement=0.01)
     """
     G = positive("E", E) / (2.0 * (1.0 + poisson("nu", nu)))
     H, shift = positive("height", height), not_negative("displacement", displacement)

@@ -119,6 +119,13 @@ def thick_cylinder(
     ----------
     E, nu, inner_radius, outer_radius, inner_pressure, outer_pressure, kinematics
         As the attributes of `LameShell`; "plane_strain" or "plane_stress".
+
+    Examples
+    --------
+    >>> from fastcontact import analytic
+    >>> tube = analytic.thick_cylinder(E=1000.0, nu=0.3, inner_radius=1.0, outer_radius=2.0, inner_pressure=1.0)
+    >>> round(float(tube.hoop_stress(1.0)), 9)  # (b^2 + a^2) / (b^2 - a^2)
+    1.666666667
     """
     plane_kinematics(kinematics)
     return LameShell(inner_radius, outer_radius, inner_pressure, outer_pressure, E, nu, kinematics)
@@ -133,7 +140,15 @@ def thick_sphere(
     inner_pressure: float = 0.0,
     outer_pressure: float = 0.0,
 ) -> LameShell:
-    """Return a hollow sphere under pressure (Lame 1852); parameters as for `thick_cylinder`."""
+    """Return a hollow sphere under pressure (Lame 1852); parameters as for `thick_cylinder`.
+
+    Examples
+    --------
+    >>> from fastcontact import analytic
+    >>> shell = analytic.thick_sphere(E=1000.0, nu=0.3, inner_radius=1.0, outer_radius=2.0, inner_pressure=1.0)
+    >>> float(shell.radial_stress(1.0))
+    -1.0
+    """
     return LameShell(inner_radius, outer_radius, inner_pressure, outer_pressure, E, nu, "sphere")
 
 
@@ -210,7 +225,18 @@ def press_fit_spheres(
     interference: float,
     inner_radius: float = 0.0,
 ) -> PressFit:
-    """Return the press fit of two concentric hollow spheres (Lame 1852); parameters as for `press_fit_cylinders`."""
+    """Return the press fit of two concentric hollow spheres (Lame 1852); parameters as for `press_fit_cylinders`.
+
+    Examples
+    --------
+    >>> from fastcontact import analytic
+    >>> fit = analytic.press_fit_spheres(
+    ...     E_inner=1000.0, nu_inner=0.3, E_outer=1000.0, nu_outer=0.3,
+    ...     interface_radius=1.0, outer_radius=2.0, interference=0.001,
+    ... )
+    >>> round(fit.pressure, 6)
+    0.833333
+    """
     radii = inner_radius, interface_radius, outer_radius
     return _pair((E_inner, nu_inner), (E_outer, nu_outer), radii, interference, "sphere")
 

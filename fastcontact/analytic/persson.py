@@ -67,7 +67,14 @@ def _clearance_ratio(angle: float) -> float:
 
 
 def persson_limit_angle() -> float:
-    """Return half the contact angle of a pin without clearance, the same under any force [degrees]."""
+    """Return half the contact angle of a pin without clearance, the same under any force [degrees].
+
+    Examples
+    --------
+    >>> from fastcontact import analytic
+    >>> round(analytic.persson_limit_angle(), 2)
+    84.83
+    """
     from scipy.optimize import brentq
 
     return float(brentq(_clearance_ratio, 60.0, 89.0, xtol=1e-13))
@@ -97,6 +104,13 @@ def persson_pin(
         Exactly one of them: force per unit length [force/length], or half the contact angle [degrees].
     kinematics : str
         "plane_stress" or "plane_strain".
+
+    Examples
+    --------
+    >>> from fastcontact import analytic
+    >>> pin = analytic.persson_pin(E=210_000.0, R=10.0, clearance=0.01, nu=0.3, force=1000.0)
+    >>> round(pin.contact_angle, 2)
+    49.66
     """
     from scipy.optimize import brentq
 

@@ -150,6 +150,12 @@ def bonded_stiffness_ratio(nu: float) -> float:
     """Return stiffness bonded over frictionless of a flat punch, (1 - nu) ln(3 - 4 nu)/(1 - 2 nu).
 
     Mossakovskii (1954); Spence (1968). The ratio is 1 for nu = 0.5.
+
+    Examples
+    --------
+    >>> from fastcontact import analytic
+    >>> round(analytic.bonded_stiffness_ratio(0.5), 9)  # incompressible: no difference
+    1.0
     """
     compressibility = 1.0 - 2.0 * poisson("nu", nu)
     if compressibility == 0.0:
@@ -176,6 +182,13 @@ def flat_punch(
         Exactly one of them: force [force] or indentation [length].
     bonded : bool
         The punch sticks; the force is larger by `bonded_stiffness_ratio`.
+
+    Examples
+    --------
+    >>> from fastcontact import analytic
+    >>> punch = analytic.flat_punch(E=1000.0, nu=0.3, radius=1.0, force=10.0)
+    >>> round(punch.approach, 9)  # F (1 - nu^2) / (2 E a)
+    0.00455
     """
     name, value = exactly_one(force=force, approach=approach)
     E_star, a = _modulus(E, nu), positive("radius", radius)
@@ -205,6 +218,11 @@ def power_law_punch(
         A > 0 [length^(1 - n)] and n > 0.
     force, approach, radius : float
         Exactly one of them: force [force], indentation [length] or contact radius [length].
+
+    Examples
+    --------
+    >>> from fastcontact import analytic
+    >>> punch = analytic.power_law_punch(E=1000.0, nu=0.3, coefficient=0.01, exponent=4.0, approach=0.1)
     """
     given = exactly_one(force=force, approach=approach, radius=radius)
     return _solve(_modulus(E, nu), positive("coefficient", coefficient), positive("exponent", exponent), *given)
@@ -227,6 +245,11 @@ def cone_punch(
         As for `power_law_punch`.
     slope_angle : float
         Angle between the cone's side and the surface, above 0 and below 90 [degrees]; the formula is linear: choose it small.
+
+    Examples
+    --------
+    >>> from fastcontact import analytic
+    >>> cone = analytic.cone_punch(E=1000.0, nu=0.3, slope_angle=0.1, force=10.0)
     """
     angle = number("slope_angle", slope_angle)
     if not 0.0 < angle < 90.0:
@@ -252,6 +275,15 @@ def paraboloid_punch(
         As for `power_law_punch`.
     R : float
         Radius of curvature [length].
+
+    Examples
+    --------
+    Hertz's solution for a rigid sphere:
+
+    >>> from fastcontact import analytic
+    >>> ball = analytic.paraboloid_punch(E=1000.0, nu=0.3, R=10.0, approach=0.1)
+    >>> round(ball.radius, 9)  # sqrt(R * approach)
+    1.0
     """
     given = exactly_one(force=force, approach=approach, radius=radius)
     return _solve(_modulus(E, nu), 0.5 / positive("R", R), 2.0, *given)
@@ -317,6 +349,13 @@ def flat_punch_2d(*, nu: float, half_width: float, force: float, bonded: bool = 
     ----------
     nu, half_width, force, bonded
         As the attributes of `FlatPunch2D`; without bond there is no friction.
+
+    Examples
+    --------
+    >>> from fastcontact import analytic
+    >>> punch = analytic.flat_punch_2d(nu=0.3, half_width=1.0, force=10.0)
+    >>> round(float(punch.pressure(0.0)), 6)  # F / (pi b)
+    3.183099
     """
     return FlatPunch2D(poisson("nu", nu), positive("half_width", half_width), positive("force", force), bool(bonded))
 
@@ -333,6 +372,12 @@ def spence_stick_ratio(*, nu: float, friction: float) -> float:
     ----------
     nu, friction : float
         Poisson ratio of the half plane and Coulomb's coefficient f > 0 [-].
+
+    Examples
+    --------
+    >>> from fastcontact import analytic
+    >>> round(analytic.spence_stick_ratio(nu=0.3, friction=0.1), 4)
+    0.045
     """
     from scipy.optimize import brentq
     from scipy.special import ellipk, ellipkm1

@@ -139,6 +139,13 @@ def receding_layer(
         The force is spread evenly over ``|x| <= load_half_width``, at most ten thicknesses; 0 is a line force [length].
     kinematics : str
         "plane_strain" or "plane_stress".
+
+    Examples
+    --------
+    >>> from fastcontact import analytic
+    >>> layer = analytic.receding_layer(E1=1000.0, nu1=0.3, thickness=1.0, force=10.0)
+    >>> round(layer.half_width, 4)  # whatever the force
+    0.857
     """
     bodies = Bodies(E1, nu1, E2, nu2)
     plane_kinematics(kinematics)

@@ -72,6 +72,13 @@ class FoundContacts(Sequence[FoundContact]):
     mesh : Mesh
         The mesh with a group of facets for each side.
     pairs : tuple of FoundContact
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> contacts = fc.find_contacts(fc.generate.block_on_block())
+    >>> [(pair.secondary, pair.primary) for pair in contacts]
+    [('LOWER on UPPER (secondary)', 'LOWER on UPPER (primary)')]
     """
 
     mesh: Mesh

@@ -193,6 +193,14 @@ class Anisotropic(Material):
         As of `LinearElastic`.
     conductivity : float, callable, ndarray (n,) or three of them, optional
         As of `Orthotropic` [power / (length temperature)].
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import fastcontact as fc
+    >>> D = np.diag([3.0, 3.0, 3.0, 1.0, 1.0, 1.0])
+    >>> D[:3, :3] += 1.0
+    >>> material = fc.Anisotropic(D, axes=fc.CylindricalAxes())
     """
 
     D: Any

@@ -31,6 +31,14 @@ class CylindricalAxes:
         A point of the line [length].
     direction : (float, float, float)
         Along the line, of any length [-].
+
+    Examples
+    --------
+    Wood whose rings lie around the z axis, and a coil wound around the axis of an axisymmetric model:
+
+    >>> import fastcontact as fc
+    >>> around_z = fc.CylindricalAxes(origin=(10.0, 0.0, 0.0))
+    >>> around_y = fc.CylindricalAxes(direction=(0, 1, 0))
     """
 
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)

@@ -355,6 +355,14 @@ class LinearElastic(Material):
         they have no mean dilatation. They cost three times the assembly and ten times the recovery of stress.
     conductivity : float, callable or ndarray (n,), optional
         Of heat [power / (length temperature)], positive; as E.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> steel = fc.LinearElastic(E=210_000.0, nu=0.3, density=7.85e-9, expansion=12e-6)
+    >>> steel.shear_modulus
+    80769.23076923077
+    >>> graded = fc.LinearElastic(E=lambda points: 1000.0 + 10.0 * points[:, 1], nu=0.3)
     """
 
     E: Constant

@@ -168,6 +168,12 @@ class NeoHookean(Hyperelastic):
         Young's modulus [pressure] and Poisson's ratio [-] of small strains: mu = E / (2 (1 + nu)), K = E / (3 (1 - 2 nu)).
     volumetric, density, expansion
         As of `LinearElastic`: from nu = 0.49 on the dilatation is projected, so that elements do not lock.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain", strain="finite")
+    >>> model.add_material(fc.NeoHookean(E=1.5, nu=0.4995))
     """
 
     def __post_init__(self) -> None:
@@ -218,6 +224,11 @@ class MooneyRivlin(Polynomial):
         Bulk modulus K [pressure].
     volumetric, density, expansion
         As of `NeoHookean`.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> rubber = fc.MooneyRivlin(C10=0.3, C01=0.1, bulk=1000.0)
     """
 
     C10: float = 0.0
@@ -247,6 +258,11 @@ class Yeoh(Polynomial):
         Bulk modulus K [pressure].
     volumetric, density, expansion
         As of `NeoHookean`.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> rubber = fc.Yeoh(C10=0.4, C20=-0.02, C30=0.002, bulk=1000.0)
     """
 
     C10: float = 0.0
@@ -280,6 +296,11 @@ class Ogden(Hyperelastic):
         Bulk modulus K of ``K (J - 1)^2 / 2`` [pressure].
     volumetric, density, expansion
         As of `NeoHookean`.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> rubber = fc.Ogden(mu=[0.6, 0.1], alpha=[1.3, 5.0], bulk=1000.0)
     """
 
     mu: Any = ()

@@ -39,6 +39,14 @@ def from_meshio(mesh: Any) -> Mesh:
     ------
     MeshError
         If it has no cells, or of a kind that fastcontact does not know, or its arrays do not fit together.
+
+    Examples
+    --------
+    >>> import meshio
+    >>> import fastcontact as fc
+    >>> triangle = meshio.Mesh([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], {"triangle": [[0, 1, 2]]})
+    >>> fc.from_meshio(triangle)
+    Mesh(3 points, 1 tri3; groups: none)
     """
     if not all(hasattr(mesh, name) for name in ("points", "cells", "cell_data", "cell_sets", "field_data")):
         raise MeshError(f"from_meshio takes a meshio.Mesh, not {type(mesh).__name__}")
@@ -65,6 +73,11 @@ def from_pyvista(grid: Any) -> Mesh:
     ------
     MeshError
         If it has no cells, or of a kind that fastcontact does not know.
+
+    Examples
+    --------
+    >>> import pyvista  # doctest: +SKIP
+    >>> mesh = fc.from_pyvista(pyvista.read("part.vtu"))  # doctest: +SKIP
     """
     if not hasattr(grid, "celltypes") and hasattr(grid, "cast_to_unstructured_grid"):
         grid = grid.cast_to_unstructured_grid()
@@ -107,6 +120,14 @@ def from_gmsh() -> Mesh:
     -----
     FastcontactWarning
         If solid cells are left out, with their number.
+
+    Examples
+    --------
+    >>> import gmsh  # doctest: +SKIP
+    >>> gmsh.initialize()  # doctest: +SKIP
+    >>> gmsh.open("part.geo")  # doctest: +SKIP
+    >>> gmsh.model.mesh.generate(3)  # doctest: +SKIP
+    >>> mesh = fc.from_gmsh()  # doctest: +SKIP
     """
     try:
         gmsh = importlib.import_module("gmsh")

@@ -211,6 +211,16 @@ def ordered_line(mesh: Mesh, group: str, start: str | int | None = None) -> Orde
         A group of line cells that form one open line.
     start : str or int, optional
         The end to start from: a group with one point, or a point number; by default the end nearest to x = 0.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> mesh = fc.generate.half_spheres(size=2.0)
+    >>> line = fc.ordered_line(mesh, "CONT1", start="C1")
+    >>> bool(line.points[0] == mesh.point("C1"))
+    True
+    >>> round(float(line.abscissa[-1]) / 50.0, 3)  # an eighth of a circle, pi / 4
+    0.785
     """
     blocks = mesh.cells_of(group, dim=1)
     if not blocks:

@@ -90,12 +90,47 @@ class Model(ModelSupports):
         return html_table(rows, caption=head)
 
     def describe(self) -> str:
-        """Return in words what will be solved: kinematics, materials, supports, loads, contact, a line each."""
+        """Return a description of the model in words, one line each for kinematics, materials, supports, loads and contact.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.add_material(fc.LinearElastic(E=210_000.0, nu=0.3))
+        >>> model.fix("BOTTOM", "xy")
+        >>> print(model.describe())
+        A model in plane strain (forces are those for a depth of 1) of 25 points, 16 quad4: 50 degrees of freedom.
+        Material: E = 210000, nu = 0.3 in all solid cells.
+        Support: x = 0, y = 0 on 'BOTTOM' (5 points).
+        Contact: none.
+        ...
+        """
         return "\n".join(sentences(self))
 
     @typed(ModelError)
     def check(self, ramp: Ramp | None = None) -> None:
-        """Check the whole model, and its histories against `ramp`; `solve` does so before any numerics."""
+        """Check the whole model and the consistency of its histories with `ramp`; `solve` begins with this check.
+
+        Parameters
+        ----------
+        ramp : Ramp, optional
+
+        Raises
+        ------
+        MeshError, ModelError, ContactError
+            With one line that names the error and its remedy.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.add_material(fc.LinearElastic(E=210_000.0, nu=0.3))
+        >>> model.fix("BOTTOM", "y")
+        >>> model.check()
+        Traceback (most recent call last):
+            ...
+        fastcontact.errors.ModelError: 1 rigid-body motion is not supported: body 'BLOCK': translation along x. ...
+        """
         self.material_numbers()
         if self.temperatures or self.initial_states:
             self.refuse_nonlinear("temperatures and initial states are")

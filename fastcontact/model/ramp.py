@@ -94,6 +94,16 @@ class Ramp:
         Load factors (pseudo-times) at which a step ends, ascending.
     table : sequence of (float, float)
         Points (instant, multiplier of the loads) of the function, ascending instants.
+
+    Examples
+    --------
+    Load in ten steps, then unload in five:
+
+    >>> import fastcontact as fc
+    >>> instants = [i / 10 for i in range(1, 11)] + [1 + i / 5 for i in range(1, 6)]
+    >>> ramp = fc.Ramp(instants, [(0.0, 0.0), (1.0, 1.0), (2.0, 0.0)])
+    >>> ramp.value(1.5)
+    0.5
     """
 
     instants: tuple[float, ...]
@@ -129,9 +139,15 @@ History = Ramp | Iterable[Iterable[float]] | None
 
 @typed(ModelError)
 def linear_ramp(steps: int = 20, end: float = 1.0) -> Ramp:
-    """Return a ramp of equal steps from zero to the full loads at `end`.
+    """Return a ramp of equal steps from zero load to full load at `end`.
 
     ModelError if `steps` is not a whole number from 1 to a million or `end` is not positive.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> fc.linear_ramp(4).instants
+    (0.25, 0.5, 0.75, 1.0)
     """
     if int(steps) != steps or steps < 1:
         raise ModelError(f"the number of load steps must be a positive whole number, not {steps}")

@@ -46,6 +46,22 @@ def write_med_results(path: PathLike, mesh: Mesh, steps: Iterable[StepResult], *
         If the file cannot be written, there is no step, or two steps have the same index.
     MeshError
         If a step does not belong to the mesh.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> mesh = fc.generate.block_on_block()
+    >>> model = fc.Model(mesh, kinematics="plane_strain")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    >>> model.fix("LOWER_BOTTOM", "xy")
+    >>> model.fix("UPPER_LEFT", "x")
+    >>> model.add_pressure("UPPER_TOP", 2.0)
+    >>> model.add_contact("joint", secondary="CONT_UPPER", primary="CONT_LOWER")
+    >>> steps = fc.solve(model, 2)
+    >>> fc.write_med_results("blocks.med", mesh, steps)
+    >>> times, displacements = fc.read_med_field("blocks.med", "DEPL")
+    >>> times
+    array([0.5, 1. ])
     """
     with new_file(path, mesh) as file:
         add_mesh(file, mesh, mesh_name)

@@ -55,20 +55,20 @@ class ContactResult:
         along the normal through the node with the smallest gap before any load (of equal ones the nearest to the origin)
         [length].
     gap : ndarray (m,)
-        Open positive, closed zero, clearance included; negative by what a penalty lets penetrate; infinite at nodes that
-        face nothing themselves, as at the edge of a hole, even where the facets around them press [length].
+        Gap function, clearance included: positive where open, zero where closed, negative where a penalty admits
+        penetration; infinite at nodes without an opposite point, as at the edge of a hole, even where the facets around
+        them carry pressure [length].
     pressure : ndarray (m,)
-        Contact pressure, >= 0 in compression, per reference area; negative only where tied or bilateral contact pulls. With
-        the shape functions of the facets its integral over the whole reference surface is the sum of the normal forces.
-        In finite strain per area of the deformed surface, in plane stress of unit thickness, as `multiplier` and `shear` are
-        [pressure].
+        Contact pressure, positive in compression, per reference area; negative only in tied or bilateral contact under
+        tension. Interpolated by the shape functions of the facets, it integrates to the sum of the normal forces. In finite
+        strain it refers to the deformed area (in plane stress of unit thickness), as `multiplier` and `shear` do [pressure].
     multiplier : ndarray (m,)
-        The pressure that the formulation finds at the nodes, before closed nodes take over what open ones have of it, and
-        tension [pressure].
+        Nodal pressure of the formulation itself, before that of open nodes and tension are redistributed to the closed
+        nodes [pressure].
     force_vectors : ndarray (m, dim)
         Contact force on each secondary node; axisymmetric: over the full circle [force].
     normal : ndarray (m, dim)
-        Unit outward normal of the primary facet faced [-].
+        Unit outward normal of the opposite primary facet [-].
     active : ndarray of bool (m,)
         Closed constraints.
     force : ndarray (dim,)
@@ -78,47 +78,62 @@ class ContactResult:
         outermost closed constraint, and to the first open one beyond it [length]; NaN without contact. In finite strain
         that of the deformed shape.
     shear : ndarray (m, dim)
-        Tangential traction on the secondary side, zero without friction or tie [pressure].
+        Tangential traction on the secondary side, zero for frictionless contact [pressure].
     sticking : ndarray of bool (m,)
-        Closed nodes that do not slide; all closed ones without friction.
+        Closed nodes that stick; without friction all closed nodes.
     dissipation : float
         Work of friction in this step [energy].
     obstacle_displacement : ndarray (dim,), optional
         Displacement of a rigid obstacle [length]; None for contact between bodies.
     obstacle_angle : float, optional
-        By which a rigid obstacle has turned [radian]; None where none turns.
+        Rotation of a rigid obstacle [radian]; None unless it rotates.
     torque : float, optional
-        On a rigid obstacle that turns, about its axis, to hold it against the contact: the moment of the contact forces on
-        the body, on the deformed shape [force times length]; None where none turns.
+        Torque about the axis of a rotating rigid obstacle that balances the contact, that is the moment of the contact
+        forces on the body in the deformed configuration [force times length]; None unless it rotates.
     middle : ndarray (dim,)
-        Middle of the contact on the reference surface: in axisymmetry on the axis; otherwise the centre of pressure, on the
-        planes of symmetry that the contact reaches, those on which supports hold an end of the surface [length].
+        Centre of the contact on the reference surface: in axisymmetry on the axis; otherwise the centre of pressure, moved
+        onto the planes of symmetry that the contact reaches, where supports hold an end of the surface [length].
     place : ndarray (m,)
-        How far from the middle each node lies: in axisymmetry its radius; in plane problems, and where an axisymmetric
-        surface runs along the axis, the length along the surface, negative on one side of the middle; in 3D the distance from
-        the line through the middle along the mean normal [length].
+        Distance of each node from the middle: in axisymmetry its radius; in plane problems, and where an axisymmetric
+        surface is parallel to the axis, the signed arc length from the middle; in 3D the distance from the line through the
+        middle along the mean normal [length].
     tangent : ndarray (dim,), optional
-        In plane problems the direction along which half-widths are measured, either way [-]; None where `place` counts: in
-        axisymmetry, in 3D, and on a ring that is pressed all round.
+        In plane problems the direction along which half-widths are measured [-]; None where `place` is used instead: in
+        axisymmetry, in 3D, and on a ring in contact along its whole circumference.
     wear : ndarray (m,), optional
-        Depth worn off so far, with the option ``wear`` [length]; the next load step begins with it. None without.
+        Accumulated depth of wear, with the option ``wear`` [length]; the next load step starts from it.
     heat_flux : ndarray (m,), optional
-        Heat that crosses from the secondary to the primary side by reference area, with the option ``conductance``; its
-        integral over the side is the heat [power / area]. None without.
+        Heat flux from the secondary to the primary side per reference area, with the option ``conductance``
+        [power / area].
     damage : ndarray (m,), optional
-        Of the cohesive layer with the option ``cohesion``, 0 as new, 1 broken [-]. None without.
+        Damage of the cohesive layer, from 0 (intact) to 1 (broken), with the option ``cohesion`` [-].
     fluid_pressure : ndarray (m,), optional
-        Of fluid that has come to the nodes [pressure]. None where `Model.add_fluid_pressure` names no source.
+        Pressure of the fluid that has reached the nodes, with `Model.add_fluid_pressure` [pressure].
     slip, slip_total : ndarray (m, dim)
-        Relative tangential displacement of closed nodes over what they face, in this step and the sum of all steps so far;
-        zero at nodes that friction holds, and for the step at open ones [length]. NaN in files from before it was told.
+        Tangential displacement of closed nodes relative to the opposite side, in this step and accumulated over all steps;
+        zero at sticking nodes, and for the step at open ones [length]. NaN in result files of versions without it.
     primary_points : ndarray of int (k,)
         Point numbers of the primary side; none for a rigid obstacle.
     primary_force_vectors : ndarray (k, dim)
-        Contact force on each of them; axisymmetric: over the full circle [force]. A node of both sides counts here alone.
+        Contact force on each of them; axisymmetric: over the full circle [force]. Forces on a node of both sides are
+        included here alone.
     units : mapping of str to str
-        Names of the units of ``length``, ``force``, ``pressure`` where the model names them, of plane models of forces per
-        thickness; reprs, pictures and tables show them.
+        Names of the units of ``length``, ``force`` and ``pressure`` where the model names them, in plane models with forces
+        per thickness; shown by reprs, pictures and tables.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    >>> model.fix("LEFT", "x")
+    >>> model.add_obstacle("floor", secondary="BOTTOM", obstacle=fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0)))
+    >>> model.add_pressure("TOP", 2.0)
+    >>> floor = fc.solve(model, 1)[-1].contact["floor"]
+    >>> floor.pressure.round(9)
+    array([2., 2., 2., 2., 2.])
+    >>> round(floor.normal_force, 9)
+    2.0
     """
 
     name: str
@@ -290,6 +305,18 @@ class StepResult:
         Restart data for the next step: plain numbers, strings and arrays. Result files keep those of their last step.
     units : mapping of str to str
         As of its `ContactResult`.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> model = fc.Model(fc.generate.block(), kinematics="plane_stress")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    >>> model.fix("BOTTOM", "y")
+    >>> model.fix("BOTTOM_LEFT", "x")
+    >>> model.add_pressure("TOP", 2.0)
+    >>> step = fc.solve(model, 1)[-1]
+    >>> round(float(step.stress[0, 1]), 9), round(float(step.reaction[:, 1].sum()), 9)
+    (-2.0, 2.0)
     """
 
     index: int

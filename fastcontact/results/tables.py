@@ -24,13 +24,13 @@ STRESS_COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 
 @typed(CaseError)
 def contact_table(contact: ContactResult, step: StepResult | None = None) -> AnyArray:
-    """Return the state of a contact pair, one row for each secondary node in order along the surface.
+    """Return the state of a contact pair as a table, one row for each secondary node in order along the surface.
 
     Parameters
     ----------
     contact : ContactResult
     step : StepResult, optional
-        The step the pair belongs to, for the fields at its nodes.
+        The step that the contact belongs to, for the fields at its nodes.
 
     Returns
     -------
@@ -41,6 +41,21 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Any
         where heat crosses ``heat_flux`` [power / area];
         ``active``, ``sticking`` (true or false). With `step` also ``displacement_x`` ... [length], ``stress_xx`` ...,
         ``normal_stress``, ``von_mises``, ``von_mises_signed`` [pressure].
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> mesh = fc.generate.block_on_block()
+    >>> model = fc.Model(mesh, kinematics="plane_strain")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    >>> model.fix("LOWER_BOTTOM", "xy")
+    >>> model.fix("UPPER_LEFT", "x")
+    >>> model.add_pressure("UPPER_TOP", 2.0)
+    >>> model.add_contact("joint", secondary="CONT_UPPER", primary="CONT_LOWER")
+    >>> steps = fc.solve(model, 2)
+    >>> table = fc.contact_table(steps[-1].contact["joint"], steps[-1])
+    >>> table["pressure"].round(9)
+    array([2., 2., 2., 2., 2., 2., 2.])
     """
     columns = {
         **_places(contact.points, contact.coordinates, contact.abscissa),
@@ -68,10 +83,24 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Any
 
 
 def normal_stress(contact: ContactResult, step: StepResult) -> Array:
-    """Return the stress ``n . sigma . n`` (m,) at the nodes of a contact along the normals n they face [pressure].
+    """Return the normal stress ``n . sigma . n`` (m,) at the secondary nodes of a contact [pressure].
 
-    `step` is the one that the contact belongs to. Where contact presses it is minus the pressure, up to the mesh error. NaN
-    at nodes that face nothing.
+    `step` is the one that the contact belongs to, n the normal of the opposite facet. In contact it is minus the pressure, up
+    to the discretisation error; NaN at nodes without an opposite facet.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> mesh = fc.generate.block_on_block()
+    >>> model = fc.Model(mesh, kinematics="plane_strain")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    >>> model.fix("LOWER_BOTTOM", "xy")
+    >>> model.fix("UPPER_LEFT", "x")
+    >>> model.add_pressure("UPPER_TOP", 2.0)
+    >>> model.add_contact("joint", secondary="CONT_UPPER", primary="CONT_LOWER")
+    >>> steps = fc.solve(model, 2)
+    >>> fc.normal_stress(steps[-1].contact["joint"], steps[-1]).round(9)
+    array([-2., -2., -2., -2., -2., -2., -2.])
     """
     stress, (x, y) = step.stress[contact.points].T, contact.normal.T[:2]
     across = x * x * stress[0] + y * y * stress[1] + 2.0 * x * y * stress[3]
@@ -83,7 +112,7 @@ def normal_stress(contact: ContactResult, step: StepResult) -> Array:
 
 @typed(CaseError)
 def line_table(mesh: Mesh, step: StepResult, group: str, start: str | int | None = None) -> AnyArray:
-    """Return the fields along a line of nodes, one row a node, in order.
+    """Return the fields along a line of nodes as a table, one row for each node in order.
 
     Parameters
     ----------
@@ -105,6 +134,18 @@ def line_table(mesh: Mesh, step: StepResult, group: str, start: str | int | None
     ------
     MeshError
         If there is no such group, or it is no open line.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> mesh = fc.generate.block(divisions=(2, 2))
+    >>> model = fc.Model(mesh, kinematics="plane_stress")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    >>> model.fix("BOTTOM", "xy")
+    >>> model.add_pressure("TOP", 2.0)
+    >>> table = fc.line_table(mesh, fc.solve(model, 1)[-1], "RIGHT", start="BOTTOM_RIGHT")
+    >>> table["displacement_y"].round(9)
+    array([ 0.   , -0.001, -0.002])
     """
     line = ordered_line(mesh, group, start)
     places = mesh.points[line.points]
@@ -122,7 +163,7 @@ def with_column(table: AnyArray, name: str, values: AnyArray) -> AnyArray:
 def write_csv(path: PathLike, table: AnyArray, units: Mapping[str, str] | None = None) -> None:
     """Write a table as comma-separated values (RFC 4180) with one header line.
 
-    Numbers are written with all their digits: whoever reads them gets the same bits.
+    Numbers are written with all digits, so that reading them back gives the same bits.
 
     Parameters
     ----------
@@ -138,6 +179,19 @@ def write_csv(path: PathLike, table: AnyArray, units: Mapping[str, str] | None =
         If `units` names a column that is not there.
     FileError
         If the file cannot be written.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> mesh = fc.generate.block_on_block()
+    >>> model = fc.Model(mesh, kinematics="plane_strain")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    >>> model.fix("LOWER_BOTTOM", "xy")
+    >>> model.fix("UPPER_LEFT", "x")
+    >>> model.add_pressure("UPPER_TOP", 2.0)
+    >>> model.add_contact("joint", secondary="CONT_UPPER", primary="CONT_LOWER")
+    >>> steps = fc.solve(model, 2)
+    >>> fc.write_csv("joint.csv", fc.contact_table(steps[-1].contact["joint"]), units={"pressure": "MPa"})
     """
     columns, units = _columns(table), dict(units or {})
     for name in units:

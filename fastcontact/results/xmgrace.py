@@ -82,6 +82,15 @@ def write_agr(
         If no curve has a point to show.
     FileError
         If the file cannot be written.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import fastcontact as fc
+    >>> from fastcontact.results.xmgrace import Curve
+    >>> x = np.linspace(0.0, 1.0, 50)
+    >>> curve = Curve(x, np.sqrt(1.0 - x**2), legend="Hertz")
+    >>> fc.write_agr("hertz.agr", [curve], title="Pressure", xlabel="r / a", ylabel="p / p0")
     """
     shown = [curve for curve in curves if len(curve.x)]
     if not shown:

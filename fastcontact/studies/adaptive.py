@@ -77,6 +77,12 @@ def adaptive_study(
     ------
     CaseError, FastcontactError
         If the case, a name or a number is wrong, or a mesh could not be solved.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> study = fc.adaptive_study("forma04c.toml", "pressure_max", tolerance=0.005)  # doctest: +SKIP
+    >>> print(study)  # doctest: +SKIP
     """
     case = _checked(case, tolerance)
     chosen = settings(case)

@@ -39,6 +39,13 @@ class ErrorEstimate:
         The part that stems from the contact surface [energy^(1/2)].
     energy : float
         Energy norm of the solution [energy^(1/2)].
+
+    Examples
+    --------
+    See `estimate_error`.
+
+    >>> import fastcontact as fc
+    >>> fc.estimate_error(model, step).relative  # doctest: +SKIP
     """
 
     cells: Array

@@ -55,6 +55,13 @@ class ErrorNorms:
         Of the solution minus the theory.
     energy_of_theory, displacement_of_theory : float
         Of the theory.
+
+    Examples
+    --------
+    See `error_against`.
+
+    >>> import fastcontact as fc
+    >>> fc.error_against(fc.analytic.hertz_box(), model, step.displacement).relative_energy  # doctest: +SKIP
     """
 
     energy: float

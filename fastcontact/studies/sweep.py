@@ -77,6 +77,21 @@ def parameter_sweep(
     ------
     CaseError, FastcontactError
         If the case, a parameter or a value is wrong, or no point could be solved.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> def block(nu):
+    ...     model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+    ...     model.add_material(fc.LinearElastic(E=1000.0, nu=nu))
+    ...     model.fix("LEFT", "x")
+    ...     obstacle = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
+    ...     model.add_obstacle("floor", secondary="BOTTOM", obstacle=obstacle)
+    ...     model.prescribe("TOP", y=-0.001)
+    ...     return fc.solve(model, 1)
+    >>> sweep = fc.parameter_sweep(block, [0.0, 0.3])
+    >>> [round(point.values["force"], 6) for point in sweep.points]
+    [1.0, 1.098901]
     """
     options = {
         "executor": executor,

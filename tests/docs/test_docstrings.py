@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import doctest
 import importlib
+import inspect
 
 import arrays
 import numpy as np
 import pages
 import pytest
 from numpy.typing import ArrayLike
+
+import fastcontact as fc
+from fastcontact.model.model import PUBLIC
 
 PACKAGE = pages.ROOT / "fastcontact"
 WITH_EXAMPLES = [path for path in sorted(PACKAGE.rglob("*.py")) if ">>>" in path.read_text(encoding="utf-8")]
@@ -27,6 +31,25 @@ def test_examples_of_a_module(path, tmp_path, monkeypatch):
     name = ".".join(path.relative_to(pages.ROOT).with_suffix("").parts).removesuffix(".__init__")
     found = doctest.testmod(importlib.import_module(name), optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
     assert not found.failed
+
+
+def public_values():
+    """Yield (name, value): public functions, the classes that users make or get, and what builds a model."""
+    for module in (fc, fc.analytic, fc.generate, fc.obstacles, fc.plot):
+        values = {name: getattr(module, name) for name in module.__all__}
+        for name, value in values.items():
+            made_by_functions = module is fc.analytic or getattr(value, "_is_protocol", False)
+            if inspect.isfunction(value) or (inspect.isclass(value) and not made_by_functions):
+                yield f"{module.__name__}.{name}", value
+    for name, value in inspect.getmembers(fc.Model, inspect.isfunction):
+        if name.startswith("add_") or name in PUBLIC:
+            yield f"Model.{name}", value
+
+
+def test_every_public_name_has_an_example():
+    values = [(name, value) for name, value in public_values() if not name.endswith(("Error", "Warning"))]
+    assert len(values) > 120
+    assert [name for name, value in values if ">>>" not in inspect.getdoc(value)] == []
 
 
 def test_every_public_array_has_a_shape_and_a_unit():

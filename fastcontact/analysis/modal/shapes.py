@@ -84,6 +84,17 @@ class Modes(Shapes):
         Of each mode; None where none were asked for.
     twins : ndarray of int (n,), optional
         The mode of the same frequency a quarter of a wave further round the ring; the mode itself where it is alone.
+
+    Examples
+    --------
+    The first three modes of a free steel plate in mm, tonnes and seconds are rigid motions:
+
+    >>> import fastcontact as fc
+    >>> model = fc.Model(fc.generate.block((100.0, 10.0), (20, 2), "quad8"), kinematics="plane_stress")
+    >>> model.add_material(fc.LinearElastic(E=210_000.0, nu=0.3, density=7.85e-9))
+    >>> modes = fc.modes(model, n=4)
+    >>> modes.frequencies[3].round(0)
+    np.float64(5139.0)
     """
 
     frequencies: Array
@@ -164,6 +175,13 @@ class RingModes(Shapes):
     mesh : Mesh
         All sectors, the modelled one first; their ends are not merged.
     kinematics : str
+
+    Examples
+    --------
+    See `Modes.whole_ring`.
+
+    >>> import fastcontact as fc
+    >>> ring = fc.modes(sector, n=4, nodal_diameters=[2]).whole_ring()  # doctest: +SKIP
     """
 
     modes: Modes

@@ -50,6 +50,14 @@ class Deck:
         Of a plane model [length]; forces that `solve` returns are those of all of it.
     modes : dict, optional
         What ``*FREQUENCY`` asks for, as arguments of `fastcontact.modes` about the last step; None without.
+
+    Examples
+    --------
+    See `read_deck`.
+
+    >>> import fastcontact as fc
+    >>> deck = fc.read_deck("press-fit.inp")  # doctest: +SKIP
+    >>> steps = deck.solve()  # doctest: +SKIP
     """
 
     path: Path

@@ -47,6 +47,15 @@ class HalfSpace:
         A point of the plane [length].
     normal : sequence of float
         Outward direction, of any length.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from fastcontact import obstacles
+    >>> floor = obstacles.HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
+    >>> gaps, normals = floor.distance(np.array([[3.0, 0.5]]))
+    >>> gaps
+    array([0.5])
     """
 
     point: tuple[float, ...]
@@ -77,6 +86,15 @@ class Sphere:
         Radius [length].
     hollow : bool
         The body lies inside.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from fastcontact import obstacles
+    >>> ball = obstacles.Sphere(centre=(0.0, 10.0), R=10.0)
+    >>> gaps, normals = ball.distance(np.array([[0.0, -1.0]]))
+    >>> gaps
+    array([1.])
     """
 
     centre: tuple[float, ...]
@@ -110,6 +128,15 @@ class Cylinder:
         Radius [length].
     hollow : bool
         The body lies inside.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from fastcontact import obstacles
+    >>> hole = obstacles.Cylinder(point=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0), R=10.0, hollow=True)
+    >>> gaps, normals = hole.distance(np.array([[9.0, 0.0, 5.0]]))
+    >>> gaps
+    array([1.])
     """
 
     point: tuple[float, float, float]
@@ -142,6 +169,18 @@ class Height:
         Height [length] for positions (n, dim - 1), and its slopes: ``f(x) -> (h (n,), slope (n, dim - 1))``.
     side : str
         ``"below"`` the body (the obstacle is what lies lower), or ``"above"`` it.
+
+    Examples
+    --------
+    A wavy floor in the plane:
+
+    >>> import numpy as np
+    >>> from fastcontact import obstacles
+    >>> def waves(x):
+    ...     return 0.1 * np.cos(x[:, 0]), -0.1 * np.sin(x)
+    >>> gaps, normals = obstacles.Height(waves).distance(np.array([[0.0, 1.0]]))
+    >>> gaps
+    array([0.9])
     """
 
     function: Callable[[Array], tuple[Array, Array]]
@@ -165,6 +204,14 @@ def paraboloid(R: float, tip: float = 0.0, side: str = "above") -> Height:
     """Return a paraboloid of revolution (a parabola in two dimensions) of radius `R` [length] at its tip.
 
     `tip` is the height of its tip over the origin [length]; the obstacle lies `side` ("above" or "below") the body.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from fastcontact import obstacles
+    >>> gaps, normals = obstacles.paraboloid(R=10.0, tip=1.0).distance(np.array([[0.0, 0.0]]))
+    >>> gaps
+    array([1.])
     """
     _positive(R=R)
     sign, low = -_direction(side), float(np.asarray(tip))
@@ -180,6 +227,14 @@ def cone(slope: float, tip: float = 0.0, side: str = "above") -> Height:
     """Return a cone (a wedge in two dimensions) that rises by `slope` from its tip.
 
     Slope is the tangent of the angle between its side and the plane. At the tip itself the normal is the axis.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from fastcontact import obstacles
+    >>> gaps, normals = obstacles.cone(slope=0.1, tip=1.0).distance(np.array([[0.0, 0.0]]))
+    >>> gaps
+    array([1.])
     """
     _positive(slope=slope)
     sign = -_direction(side)
@@ -205,6 +260,14 @@ class FlatPunch:
         Of the face over the origin [length].
     side : str
         ``"above"`` or ``"below"`` the body.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from fastcontact import obstacles
+    >>> gaps, normals = obstacles.FlatPunch(radius=1.0, height=2.0).distance(np.array([[0.5, 1.0], [3.0, 1.0]]))
+    >>> gaps
+    array([ 1., inf])
     """
 
     radius: float

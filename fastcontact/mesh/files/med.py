@@ -306,6 +306,13 @@ def read_med_field(path: PathLike, field: str) -> tuple[Array, Array]:
     ------
     FileError
         If the file cannot be read, has no such field, or the field is not given at nodes.
+
+    Examples
+    --------
+    See `write_med_results`.
+
+    >>> import fastcontact as fc
+    >>> times, displacements = fc.read_med_field("blocks.med", "DEPL")  # doctest: +SKIP
     """
     times, values, _ = read_point_field(path, field)
     return times, values

@@ -32,8 +32,8 @@ def read_field(
 ) -> Array:
     """Return a field of a file as an array over the cells or points of a mesh.
 
-    It can be a constant of a material: ``fc.LinearElastic(E=fc.read_field(mesh, "scan.vtu", "E"), nu=0.3)``. Points and cells
-    are found by their places, so that the file may have others besides, in any order.
+    It can serve as a constant of a material: ``fc.LinearElastic(E=fc.read_field(mesh, "scan.vtu", "E"), nu=0.3)``. Points and
+    cells are matched by position, so that the file may contain others, in any order.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def read_field(
     field : str
         Its name in the file.
     over : {"cells", "points"}
-        What it has a number for.
+        Where the values of the field are.
     groups : str or sequence of str, optional
         Groups of solid cells that the file has values for; all by default.
     instant : float, optional
@@ -58,6 +58,12 @@ def read_field(
     ------
     FileError, MeshError
         If the file cannot be read, or has no such field or instant; if a cell or point has no value, or two.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> E = fc.read_field(mesh, "scan.vtu", "E")  # doctest: +SKIP
+    >>> model.add_material(fc.LinearElastic(E=E, nu=0.3))  # doctest: +SKIP
     """
     if over not in OVER:
         raise FileError(f"over must be {' or '.join(OVER)}, not '{over}'")

@@ -129,6 +129,14 @@ def write_mesh(path: PathLike, mesh: Mesh) -> None:
     -----
     FastcontactWarning
         If the format cannot hold all groups.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> mesh = fc.generate.half_spheres("tri6", size=2.0)
+    >>> fc.write_mesh("half-spheres.med", mesh)
+    >>> fc.read_mesh("half-spheres.med").n_points == mesh.n_points
+    True
     """
     target = checked_target(path)
     if target.suffix.lower() in MED_SUFFIXES:

@@ -49,6 +49,12 @@ def block(
         Name of the solid group.
     distortion : float
         How far inner nodes are moved, 0 to 0.24 of a cell, in a fixed pattern.
+
+    Examples
+    --------
+    >>> from fastcontact import generate
+    >>> generate.block((2.0, 1.0), (8, 4), "quad8").cells["quad8"].shape
+    (32, 8)
     """
     one_of("element", element, FACES)
     width, height = each(positive, "size", size)
@@ -105,6 +111,12 @@ def block_on_block(
         x of the upper block's left side; the lower one's stands at 0. The blocks must face each other [length].
     distortion : float
         How far inner nodes are moved, 0 to 0.24 of a cell, in a fixed pattern.
+
+    Examples
+    --------
+    >>> from fastcontact import generate
+    >>> generate.block_on_block("tri3", divisions_lower=(2, 1), divisions_upper=(3, 1)).n_cells
+    24
     """
     width_lower, height = each(positive, "size_lower", size_lower)
     width_upper, _ = each(positive, "size_upper", size_upper)
@@ -156,6 +168,13 @@ def cylinder_on_block(
         Longest edges far from the contact, R/10 by default [length].
     contact_size : float, optional
         Edges along the surfaces at the contact, R/100 by default [length].
+
+    Examples
+    --------
+    >>> from fastcontact import generate
+    >>> mesh = generate.cylinder_on_block("quad8", R=50.0, size=10.0, contact_size=1.0)
+    >>> "CONT_CYLINDER" in mesh.group_names
+    True
     """
     one_of("element", element, FACES)
     R = positive("R", R)

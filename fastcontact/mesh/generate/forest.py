@@ -54,6 +54,14 @@ class Forest:
         Two-dimensional: line2, tri3, quad4.
     curves : iterable of Curve
         True shapes of the boundary: new points on facets that lie on a curve are put on it.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from fastcontact import generate
+    >>> forest = generate.Forest(generate.block(divisions=(2, 2)))
+    >>> forest.refine(np.array([True, False, False, False]))
+    >>> mesh = forest.mesh()
     """
 
     @typed(MeshError)

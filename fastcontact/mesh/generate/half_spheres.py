@@ -101,6 +101,13 @@ def quarter_disc(
         As for `half_spheres`.
     body : {"lower", "upper"}
         Which one.
+
+    Examples
+    --------
+    >>> from fastcontact import generate
+    >>> disc = generate.quarter_disc("tri6", body="upper", R=50.0, size=5.0)
+    >>> disc.group_names[:4]
+    ['SPHHAU', 'A2B2', 'D2B2', 'CONT2']
     """
     one_of("element", element, FACES)
     one_of("body", body, ("lower", "upper"))

@@ -48,6 +48,14 @@ class Circle:
         Greater than 0 [length].
     group : str, optional
         Group of facets that lie on it; by default all outer facets whose ends do.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from fastcontact import generate
+    >>> generate.Circle(centre=(0.0, 0.0), radius=2.0).project(np.array([[3.0, 0.0], [0.0, 1.0]]))
+    array([[2., 0.],
+           [0., 2.]])
     """
 
     centre: tuple[float, float]
@@ -84,6 +92,15 @@ def to_quadratic(mesh: Mesh, curves: Iterable[Curve] = (), *, centre_nodes: bool
         True shapes of the boundary, for example `Circle`.
     centre_nodes : bool
         Whether quadrangles get a centre node (quad9); 2D only.
+
+    Examples
+    --------
+    Mid-side nodes on the circles that the sides of two half-spheres lie on, as mesh B of FORMA04 has them:
+
+    >>> from fastcontact import generate
+    >>> mesh = generate.half_spheres("tri3", size=10.0)
+    >>> generate.to_quadratic(mesh, generate.circles(mesh)).cells["tri6"].shape
+    (140, 6)
     """
     names = _quadratic_names(mesh, centre_nodes)
     edges = _edges(mesh.cells)

@@ -94,6 +94,12 @@ def refined(mesh: Mesh, curves: Iterable[Curve] = ()) -> Mesh:
         Two-dimensional; tri3, tri6, quad4, quad8, quad9, line2, line3.
     curves : iterable of Curve
         True shapes of the boundary, for example `Circle`; see also `circles`.
+
+    Examples
+    --------
+    >>> from fastcontact import generate
+    >>> generate.refined(generate.block(divisions=(2, 2))).cells["quad4"].shape
+    (16, 4)
     """
     new = _new_points(mesh)
     points = np.concatenate([mesh.points, np.empty((len(new.keys), mesh.dim))])
@@ -210,6 +216,12 @@ def linearised(mesh: Mesh) -> Mesh:
     """Return the mesh on its corners alone: tri6 to tri3, quad8 and quad9 to quad4, line3 to line2.
 
     Points that no cell uses any more are dropped; the others keep their order.
+
+    Examples
+    --------
+    >>> from fastcontact import generate
+    >>> sorted(generate.linearised(generate.block(element="quad8")).cells)
+    ['line2', 'quad4']
     """
     cells = {name: block[:, : elements.get(name).n_corners] for name, block in mesh.cells.items()}
     used = np.ones(mesh.n_points, bool)
@@ -239,6 +251,12 @@ def circles(mesh: Mesh) -> list[Circle]:
 
     A circle through the nodes is found by least squares. It counts if all nodes lie on it to rounding, there are more than
     three, and the line turns gently: four corners of a square lie on a circle, too.
+
+    Examples
+    --------
+    >>> from fastcontact import generate
+    >>> {round(circle.radius, 9) for circle in generate.circles(generate.half_spheres(size=10.0))}
+    {50.0}
     """
     circles_of_curves = []
     for group in mesh.cell_groups:

@@ -104,6 +104,12 @@ def sphere_octant(
     ----------
     element, R, size, contact_size, contact_radius, growth
         As for `sphere_on_block`.
+
+    Examples
+    --------
+    >>> from fastcontact import generate
+    >>> generate.sphere_octant("hex8", R=50.0, size=20.0).n_cells
+    2868
     """
     one_of("element", element, SOLIDS)
     R = positive("R", R)

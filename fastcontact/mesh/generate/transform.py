@@ -32,6 +32,12 @@ def renamed(mesh: Mesh, names: Names) -> Mesh:
     names : mapping or callable
         New name by old name. A name that a mapping lacks stays; None drops the group. Groups that get the same
         name are united.
+
+    Examples
+    --------
+    >>> from fastcontact import generate
+    >>> generate.renamed(generate.block(), {"TOP": "LID"}).group_names[:4]
+    ['BLOCK', 'BOTTOM', 'RIGHT', 'LID']
     """
 
     def groups(old: Mapping[str, AnyArray]) -> Groups:
@@ -60,6 +66,13 @@ def mirrored(mesh: Mesh, axis: str, at: float = 0.0, rename: Names | None = None
         Where the mirror stands on that axis [length].
     rename : mapping or callable, optional
         New names of groups, as in `renamed`.
+
+    Examples
+    --------
+    >>> from fastcontact import generate
+    >>> whole = generate.mirrored(generate.block(), "x")
+    >>> float(whole.points[:, 0].min())
+    -1.0
     """
     column = _AXES.index(one_of("axis", axis, _AXES[: mesh.dim]))
     points = mesh.points.copy()
@@ -84,6 +97,12 @@ def transformed(mesh: Mesh, *, translate: ArrayLike | None = None, scale: float 
         Factor, greater than 0.
     rotate : float
         Angle, counter-clockwise [degrees].
+
+    Examples
+    --------
+    >>> import math
+    >>> from fastcontact import generate
+    >>> turned = generate.transformed(generate.block(), translate=(1.0, 0.0), rotate=math.pi / 2)
     """
     if not number("scale", scale) > 0.0:
         raise MeshError(f"scale = {scale:g} is out of range: it must be greater than 0 (reflect with mirrored)")
@@ -106,6 +125,16 @@ def union(*meshes: Mesh) -> Mesh:
     """Return one mesh of several: points one after the other, none merged, groups of the same name united.
 
     MeshError if there is no mesh or the dimensions differ.
+
+    Examples
+    --------
+    Two bodies in one mesh, which share no points; their groups keep their names:
+
+    >>> from fastcontact import generate
+    >>> lower = generate.block(name="LOWER")
+    >>> upper = generate.block(name="UPPER", origin=(0.0, 1.0))
+    >>> generate.union(lower, upper).n_points
+    50
     """
     if not meshes:
         raise MeshError("union needs at least one mesh")
@@ -155,6 +184,14 @@ def merge_points(mesh: Mesh, tolerance: float) -> Mesh:
     mesh : Mesh
     tolerance : float
         Largest distance of points that are the same, at least 0 [length].
+
+    Examples
+    --------
+    >>> from fastcontact import generate
+    >>> first = generate.block(name="A")
+    >>> second = generate.block(name="B", origin=(1.0, 0.0))
+    >>> generate.merge_points(generate.union(first, second), 1e-9).n_points
+    45
     """
     from scipy.spatial import cKDTree
 

@@ -37,9 +37,9 @@ class ModelConnections(ModelInitialStates):
         normal: Sequence[float] | None = None,
         ramp: History = None,
     ) -> None:
-        """Tighten a bolt across a section through it: its sides approach each other along the bolt, without shear.
+        """Tighten a bolt by a pretension section: the two sides of a cut approach each other along the bolt, without shear.
 
-        The mesh is cut there, see `fastcontact.generate.cut`. Results are in ``step.pretension[name]``.
+        The mesh must be cut at the section, see `fastcontact.generate.cut`. Results are in ``step.pretension[name]``.
 
         Parameters
         ----------
@@ -47,22 +47,37 @@ class ModelConnections(ModelInitialStates):
         section : str
             Group on one side of the cut.
         force : float, optional
-            In the bolt, positive in tension [force]; in axisymmetry over the full circle.
+            Bolt force, positive in tension [force]; in axisymmetry over the full circle.
         shortening : float, optional
-            By how much the sides approach, instead of the force [length].
+            Relative approach of the two sides, instead of a force [length].
         locked_from : float, optional
-            Instant, the end of a load step, from which the bolt keeps the length that the force has brought it to.
+            Instant, the end of a load step, after which the length of the bolt is kept and its force follows.
         opposite : str, optional
             Group on the other side, by default ``"<section> opposite"``.
         normal : sequence of float (dim,), optional
-            Along the bolt [-]; by default across the plane of the nodes.
+            Axis of the bolt [-]; by default the normal of the plane through the nodes.
         ramp : Ramp or iterable of (float, float), optional
             History of the force or the shortening.
 
         Raises
         ------
         MeshError, ModelError
-            If the sides do not lie upon each other, share points, or the numbers do not fit.
+            If the sides do not coincide or share points, or the arguments are inconsistent.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> bar = fc.generate.block()
+        >>> bar = bar.with_facet_group("CUT", lambda points: abs(points[:, 1] - 0.5) < 1e-9, between=True)
+        >>> mesh = fc.generate.cut(bar, "CUT")
+        >>> model = fc.Model(mesh, kinematics="plane_stress")
+        >>> model.add_material(fc.LinearElastic(E=210_000.0, nu=0.3))
+        >>> model.fix("BOTTOM", "xy")
+        >>> model.fix("TOP", "xy")
+        >>> model.add_pretension("bolt", "CUT", force=1000.0)
+        >>> step = fc.solve(model, 1)[-1]
+        >>> step.pretension["bolt"]
+        {'force': 1000.0000000000002, 'shortening': 0.0046104351967446435}
         """
         if name in {other.label for other in self.pretensions}:
             raise ModelError(f"there is already a pretension '{name}': names must differ")
@@ -80,9 +95,19 @@ class ModelConnections(ModelInitialStates):
 
     @typed(ModelError)
     def couple(self, group: str, component: str) -> None:
-        """Let all nodes of a group move together in one displacement component, or several (``"xy"``).
+        """Constrain all nodes of a group to the same displacement component.
 
-        ``"normal"``: by the same along the normals of a group of facets.
+        Parameters
+        ----------
+        group : str
+        component : str
+            One or several, such as ``"y"`` or ``"xy"``; or ``"normal"``, along the normals of a group of facets.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.couple("TOP", "y")  # stays straight and level
         """
         nodes = self.mesh.points_of(group)
         if len(nodes) < 2:
@@ -110,9 +135,9 @@ class ModelConnections(ModelInitialStates):
         translation: Sequence[float] | None = None,
         ramp: History = None,
     ) -> None:
-        """Relate the displacements of every node of a group to those of the node of another group that lies upon it.
+        """Constrain each node of a group to the coincident node of another group.
 
-        By default both move together, as the two ends of a part that repeats itself do.
+        By default both have the same displacement, as at the two ends of a period.
 
         Parameters
         ----------
@@ -125,8 +150,14 @@ class ModelConnections(ModelInitialStates):
         value : float
             Times the ramp [length times the unit of the coefficients].
         translation : sequence of float, optional
-            What brings the first group upon the second; by default the way from middle to middle [length].
+            Maps the first group onto the second; by default the vector between their centroids [length].
         ramp : Ramp or iterable of (float, float), optional
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.relate_groups("LEFT", "RIGHT", "xy")
         """
         name = f"the relation of {component} of '{first}' and '{second}'"
         if len(coefficients) != 2:
@@ -160,28 +191,36 @@ class ModelConnections(ModelInitialStates):
         translation: Sequence[float] | None = None,
         ramp: History = None,
     ) -> None:
-        """Let the model be one period of a part that repeats itself: its two ends deform alike.
+        """Model one period of a periodic structure: both ends have the same displacement.
 
-        Rigid translations stay free and need supports. Contact is best open at the ends: of two nodes that are one place
-        only the sum of the forces follows from the gap, and pressures of their neighbours may waver.
+        Rigid translations stay free and need supports. Contact should be open at the ends: of two nodes that represent one
+        point only the sum of the forces follows from the gap, and pressures of their neighbours may oscillate.
 
         Parameters
         ----------
         first, second : str
-            The ends: groups whose nodes lie upon each other after a translation.
+            The ends: groups whose nodes coincide after a translation.
         x, y, z : float
-            How much farther the second end moves than the first, at multiplier 1: the mean strain times the period [length].
+            Displacement of the second end relative to the first at multiplier 1: mean strain times period [length].
         free : str
-            Components (``"x"``, ``"xy"``, ...) in which that is the same everywhere, but follows from the loads.
+            Components (``"x"``, ``"xy"``, ...) whose relative displacement is uniform, but follows from the loads.
         translation : sequence of float (dim,), optional
-            From the first end to the second one; by default from middle to middle [length].
+            From the first end to the second one; by default the vector between their centroids [length].
         ramp : Ramp or iterable of (float, float), optional
             History of x, y, z.
 
         Raises
         ------
         MeshError, ModelError
-            If there are no such groups, or their nodes do not lie upon each other; the largest distance is told.
+            If there are no such groups, or their nodes do not coincide; the message states the largest distance.
+
+        Examples
+        --------
+        A cell of an endless layer, stretched by 0.1 %:
+
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.add_periodicity("LEFT", "RIGHT", x=0.001)
         """
         name = f"the periodicity of '{first}' and '{second}'"
         given = {key: value for key, value in {"x": x, "y": y, "z": z}.items() if value != 0.0}
@@ -207,29 +246,37 @@ class ModelConnections(ModelInitialStates):
         origin: Sequence[float] | None = None,
         direction: Sequence[float] = (0.0, 0.0, 1.0),
     ) -> None:
-        """Let the model be one of equal sectors round an axis: its two ends deform alike, turned by the angle of a sector.
+        """Model one of several identical sectors of a ring: both ends have the same displacement in cylindrical components.
 
-        Loads repeat themselves, too; forces are those of one sector. The rotation about the axis, and in space the way along
-        it, stay free and need supports. Ends may be curved, and may meet on the axis. Contact at the ends: as in
+        Loads are periodic, too, and forces are those of one sector. Rotation about the axis and, in 3D, translation along it
+        stay free and need supports. The ends may be curved and may meet on the axis. For contact at the ends see
         `add_periodicity`.
 
         Parameters
         ----------
         first, second : str
-            The ends: groups whose nodes lie upon each other after the turn, either way. Where meshes differ, groups of facets
-            that do: nodes of the end with more of them then follow the facets of the other one.
+            The ends: groups whose nodes coincide after a rotation by the angle of a sector, in either direction. Where the
+            meshes differ, groups of facets that coincide: nodes of the finer end are then tied to facets of the coarser one.
         sectors : int
-            How many make the whole.
+            Number of sectors in the ring.
         origin : sequence of float (dim,), optional
-            A point of the axis, by default the origin [length].
+            A point on the axis, by default the origin [length].
         direction : sequence of float (3,)
-            Along the axis [-]; in the plane always z.
+            Of the axis [-]; in the plane always z.
 
         Raises
         ------
         MeshError, ModelError
-            If there are no such groups, they do not lie upon each other (the largest distance is told), or
-            kinematics are axisymmetric.
+            If there are no such groups, they do not coincide (the message states the largest distance), or the kinematics
+            are axisymmetric.
+
+        Examples
+        --------
+        A quarter of a ring stands for all of it:
+
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.rings(), kinematics="plane_strain")
+        >>> model.add_cyclic_symmetry("SYMMETRY_Y", "SYMMETRY_X", sectors=4)
         """
         name = f"the cyclic symmetry of '{first}' and '{second}'"
         if self.kinematics == "axisymmetric":
@@ -258,15 +305,23 @@ class ModelConnections(ModelInitialStates):
     def relate(
         self, terms: Iterable[tuple[str | int, str, float]], value: float = 0.0, *, ramp: History = None
     ) -> None:
-        """Hold a linear combination of displacement components at `value` times the ramp.
+        """Constrain a linear combination of displacement components to a value (multi-point constraint).
 
         Parameters
         ----------
         terms : iterable of (str or int, str, float)
-            Group or point number, component, coefficient. A group of several nodes stands for their sum; a long sum
-            costs much, since it ties every displacement in it to every other.
+            Group or point number, component, coefficient. A group of several nodes stands for the sum over them; long sums
+            are expensive, since they couple all displacements in them.
         value : float
-            [length times the unit of the coefficients].
+            At multiplier 1 [length times the unit of the coefficients].
+
+        Examples
+        --------
+        One corner moves down by twice as much as another one:
+
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.relate([("TOP_LEFT", "y", 1.0), ("TOP_RIGHT", "y", -2.0)])
         """
         row: dict[int, float] = {}
         listed = [(point, component, coefficient) for point, component, coefficient in terms]
@@ -297,9 +352,9 @@ class ModelConnections(ModelInitialStates):
         weighting: str = "uniform",
         radius: float | None = None,
     ) -> None:
-        """Couple a reference point with the nodes of a group, for small rotations.
+        """Couple a reference point to the nodes of a group, for small rotations.
 
-        Forces, moments and supports at the reference point then act on the group; see
+        Forces, moments and supports at the reference point are transferred to the group; see
         `fastcontact.generate.with_reference_points`, `add_force` and `add_moment`.
 
         Parameters
@@ -308,20 +363,29 @@ class ModelConnections(ModelInitialStates):
             Name of the reference point.
         group : str
         kind : str
-            ``"rigid"``: all nodes follow the reference point and its rotation as one stiff body (RBE2).
-            ``"distributing"``: it follows the mean motion of the group, by area where that is one of facets, and stiffens
-            nothing (RBE3).
+            ``"rigid"``: the nodes move as a rigid body with the reference point (RBE2). ``"distributing"``: the reference
+            point follows the mean motion of the group, weighted by area for groups of facets, without stiffening it (RBE3).
         components : str, optional
-            Displacements that follow in a rigid coupling, such as ``"z"``; by default all.
+            Displacement components of a rigid coupling, such as ``"z"``; by default all.
         weighting : str
-            Of a distributing coupling, by the distance from the reference point, as of `add_force`.
+            Of a distributing coupling, by distance from the reference point, as in `add_force`.
         radius : float, optional
-            As of `add_force` [length].
+            As in `add_force` [length].
 
         Raises
         ------
         MeshError, ModelError
             If there are no such groups, or kinematics are axisymmetric.
+
+        Examples
+        --------
+        A moment on the end of a block, through a reference point:
+
+        >>> import fastcontact as fc
+        >>> mesh = fc.generate.with_reference_points(fc.generate.block(), {"HANDLE": (1.5, 0.5)})
+        >>> model = fc.Model(mesh, kinematics="plane_strain")
+        >>> model.add_coupling("HANDLE", "RIGHT", kind="distributing")
+        >>> model.add_moment("HANDLE", z=20.0)
         """
         letters = "xyz"[: self.mesh.dim] if components is None else components
         axes = axes_of(f"the coupling of '{reference}'", dict.fromkeys(letters, 1.0), self.mesh.dim)
@@ -343,24 +407,31 @@ class ModelConnections(ModelInitialStates):
         direction: Sequence[float] | None = None,
         translation: Sequence[float] | None = None,
     ) -> None:
-        """Hang every node of a group on the ground by springs, or join two nodes or two groups by them.
+        """Connect every node of a group to the ground, two nodes, or the nodes of two groups by springs.
 
         Parameters
         ----------
         group : str or int
             Group or point number.
         to : str or int, optional
-            Group or point number: springs then join each node of `group` with the one of this group that lies upon it after a
-            `translation`, as of `relate_groups`; a single node is joined with all of the other group.
+            Group or point number: springs connect each node of `group` to the coincident node of this group, after a
+            `translation` as in `relate_groups`; a single node is connected to all nodes of the other group.
         x, y, z : float
             Stiffness along the axes [force / length]; in axisymmetry over the full circle.
         axial, transverse : float
-            Stiffness along the line between the two nodes, and along every direction across it [force / length]. The line
-            keeps its reference direction.
+            Stiffness along the line between the two nodes, and along every direction normal to it [force / length]. The
+            line keeps its reference direction.
         direction : sequence of float, optional
-            Takes the place of the line between the two nodes: a vector of any length.
+            Vector of any length that replaces the line between the two nodes.
         translation : sequence of float (dim,), optional
-            What brings the first group upon the second; by default the way from middle to middle [length].
+            Maps the first group onto the second; by default the vector between their centroids [length].
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.add_spring("BOTTOM", y=1000.0)  # a soft foundation, by node
+        >>> model.add_spring("TOP_LEFT", "BOTTOM_RIGHT", axial=50.0)
         """
         name = f"the spring on '{group}'" if to is None else f"the spring between '{group}' and '{to}'"
         given = {"x": x, "y": y, "z": z}

@@ -52,7 +52,7 @@ class ModelContact(ModelConnections):
         formulation: str | None = None,
         **options: Unpack[ContactOptions],
     ) -> None:
-        """Let the facets of group `secondary` come into contact with those of group `primary`.
+        """Add a contact pair: the facets of group `secondary` may touch those of group `primary`.
 
         Parameters
         ----------
@@ -62,57 +62,63 @@ class ModelContact(ModelConnections):
             The side whose nodes or integration points are projected and carry the constraints, and the side
             projected upon. Facets are oriented from the solid behind them.
         formulation : str, optional
-            ``"node_to_segment"``, ``"continuous"`` or ``"mortar"``. By default mortar with dual multipliers, which is right
-            on any two surfaces; ``repr(model)`` and the log tell it.
+            ``"node_to_segment"``, ``"continuous"`` or ``"mortar"``. By default mortar with dual Lagrange multipliers, which
+            suits any two surfaces; ``repr(model)`` and the log state it.
         **options
-            What every formulation takes, in addition to the fields of the formulation itself; None is the default:
+            Options of all formulations, in addition to those of the formulation itself; None is the default:
 
             - ``friction``: coefficient of Coulomb friction.
-            - ``kind``: ``"unilateral"`` (default) contact closes and opens. ``"bilateral"`` closes every gap that faces
-              the other side from the beginning and never opens, but slides without friction. In
-              ``"bilateral_once_closed"`` what is closed at the end of a load step never opens again. ``"tied"`` neither
-              opens nor slides: the two sides are paired once, as they lie, and their relative displacement stays zero,
-              also across initial gaps, which are kept (a rotation then strains by its angle times the gap).
-              ``"gap_only"`` watches the gaps, negative where the sides penetrate, and has no forces.
+            - ``kind``: ``"unilateral"`` (default): contact opens and closes. ``"bilateral"``: all gaps that have an opposite
+              side are closed from the beginning and stay so (no separation), with frictionless sliding.
+              ``"bilateral_once_closed"``: no separation of what is closed at the end of a load step. ``"tied"``: neither
+              separation nor sliding; the sides are paired once, in the reference configuration, and their relative
+              displacement is zero, also across initial gaps, which are kept (a rotation then strains by its angle times the
+              gap). ``"gap_only"``: gaps are evaluated, negative where the sides penetrate, without forces.
             - ``clearance``: added to the gap, a number or a function from reference positions (n, dim) on the secondary
-              side to lengths (n,); positive opens the gap, negative is an interference, as of a press fit [length].
-              ``friction_ramp``: history of the coefficient of friction, as multipliers.
-              ``clearance_primary``: the same on the primary side, at the positions faced. ``clearance_ramp``: their
-              history, as pairs (instant, multiplier); without one they are there from the beginning.
-            - ``surface_smoothing``: whether gaps are those between the smooth surfaces that straight facets of curved sides
-              stand for; by default with mortar alone.
-            - ``excluded``: groups whose nodes carry no contact, and what they stand for carries no pressure: their share of
-              the area with multipliers at nodes (node-to-segment, mortar with one gap per node), where there are integration
-              points those nearer to such a node than to any other. The two sides may share such nodes. ``frictionless``:
-              groups whose nodes carry no friction, likewise. ``frictionless_along``: a vector (dim,) along which these, or
-              without ``frictionless`` all, have no friction, nor slip that counts; across it they keep it [-].
-            - ``penalty``: pressure by penetration [pressure / length], instead of none at all; or a table of pairs
-              (overclosure, pressure) that ascend from no pressure [length, pressure]; results tell the penetration. It does
-              not soften friction; ``tangential_penalty`` does: shear by slip of what sticks, a number or a function of the
-              secondary position [pressure / length].
-            - ``cohesion``: a layer between the sides that stretches up to its ``strength`` [pressure] and then breaks, which
-              takes its ``energy`` by area [pressure length]: a mapping of these, and of ``shear_strength``, ``shear_energy``
-              (by default as in opening), ``stiffness`` (by default the strength is reached at a hundredth of the opening at
-              break) [pressure / length], ``exponent``, between the modes (2) [-], ``mixed_mode``, its law: ``"bk"``
-              (Benzeggagh and Kenane) or ``"power"``, and ``initiation``: ``"bk"``, ``"quadratic"`` or ``"maximum"``. It is
-              without stress as the sides lie, also across gaps, and has its stiffness where it is pressed. Damage
-              is in the results. ``adhesion``: attraction without memory, a mapping of ``work``, of adhesion by area,
-              ``strength`` and ``stiffness``, likewise; along the sides it has no resistance.
-            - ``slip``: ``"symmetric"`` (default): closing a gap along the mean of both sides' normals is no slip;
-              ``"primary"``: all relative motion along the tangents to the primary side is, as in code_aster.
-            - ``wear``: Archard's coefficient by hardness: ``coefficient * pressure * slip`` is worn off the secondary side in
-              each load step, and the next one begins with it; depths are in the results [1 / pressure].
-            - ``conductance``: of heat that crosses, by area and difference of temperatures: a number, where the sides touch;
-              a function of pressures and gaps (m,); pairs (pressure, conductance); or a mapping of ``"pressure"``, ``"gap"``
-              to pairs. Without one none crosses. ``friction_heat``: what part of the work of friction becomes heat, half of
-              it on each side, with load factors as times [-]. ``obstacle_temperature``: of a rigid obstacle, to which heat
-              crosses by its conductance [temperature].
-            - ``search_distance``: what is farther off than this, or deeper inside, now and as the load step begins, is not
-              faced [length].
-            - ``normals``: ``"facet"`` or ``"averaged"`` between the facets that meet at a node at less than 45 degrees, which
-              curved sides that fit closely need; ``"secondary"``: those of the secondary side; a vector (dim,) out of the
-              primary side's body: one normal for all of it [-]. ``projection_tolerance``: how far points may stand out
-              beyond the end of the primary side and still carry force, in facet lengths.
+              side to lengths (n,): positive for a clearance, negative for an interference, as of a press fit [length].
+              ``clearance_primary``: the same on the primary side, at the opposite positions. ``clearance_ramp``: their
+              history, as pairs (instant, multiplier), by default constant. ``friction_ramp``: history of the coefficient of
+              friction, as multipliers.
+            - ``surface_smoothing``: whether gaps are measured between the smooth surfaces that straight facets of curved
+              sides approximate; by default with mortar alone.
+            - ``excluded``: groups whose nodes carry no contact. Their tributary area carries no pressure (node-to-segment,
+              mortar with one gap per node), nor do integration points nearer to such a node than to any other. Both sides
+              may share such nodes. ``frictionless``: groups whose nodes carry no friction, likewise.
+              ``frictionless_along``: a vector (dim,) along which these nodes, or without ``frictionless`` all, have neither
+              friction nor slip; across it they keep both [-].
+            - ``penalty``: pressure per penetration [pressure / length], by default exact constraints; or a table of pairs
+              (overclosure, pressure), ascending from zero pressure [length, pressure]. It does not regularise friction;
+              ``tangential_penalty`` does: shear per tangential displacement of sticking nodes, a number or a function of
+              the secondary position [pressure / length].
+            - ``cohesion``: bilinear cohesive zone, a mapping of ``strength`` [pressure] and fracture ``energy`` per
+              area [pressure length], and optionally ``shear_strength``, ``shear_energy`` (by default those of opening),
+              ``stiffness`` (by default such that the strength is reached at a hundredth of the opening at break)
+              [pressure / length], ``mixed_mode``, ``"bk"`` (Benzeggagh and Kenane) or ``"power"``, with its ``exponent`` (2)
+              [-], and ``initiation``: ``"bk"``, ``"quadratic"`` or ``"maximum"``. It is stress-free in the reference
+              configuration, also across gaps, and keeps its stiffness in compression. ``adhesion``: reversible attraction,
+              a mapping of the ``work`` of adhesion per area, ``strength`` and ``stiffness``, without tangential resistance.
+            - ``slip``: ``"symmetric"`` (default): closing a gap along the mean normal of both sides is no slip;
+              ``"primary"``: all relative motion tangential to the primary side is slip, as in code_aster.
+            - ``wear``: Archard's coefficient divided by the hardness: ``coefficient * pressure * slip`` is removed from the
+              secondary side at the end of each load step [1 / pressure].
+            - ``conductance``: heat flux per temperature difference: a number, valid in contact; a function of pressures and
+              gaps (m,); pairs (pressure, conductance); or a mapping of ``"pressure"`` and ``"gap"`` to pairs. By default the
+              contact is insulated. ``friction_heat``: fraction of the work of friction that becomes heat, half of it on each
+              side, with load factors as times [-]. ``obstacle_temperature``: of a rigid obstacle [temperature].
+            - ``search_distance``: largest distance, and largest penetration, at which points have an opposite side, both now
+              and at the beginning of the load step [length].
+            - ``normals``: ``"facet"``; ``"averaged"`` over the facets that meet at a node at less than 45 degrees, which
+              conforming curved sides need; ``"secondary"``: those of the secondary side; or a vector (dim,), the outward
+              normal of the whole primary side [-]. ``projection_tolerance``: how far points may project beyond the end of
+              the primary side and still carry force, in facet lengths.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.half_spheres(size=10.0), kinematics="axisymmetric")
+        >>> model.add_contact("hertz", secondary="CONT1", primary="CONT2", friction=0.2)
+        >>> model.contact[0].formulation
+        'mortar'
         """
         given: dict[str, Any] = {option: value for option, value in options.items() if value is not None}
         if formulation is None:
@@ -130,28 +136,35 @@ class ModelContact(ModelConnections):
         formulation: str | None = None,
         **options: Unpack[ContactOptions],
     ) -> FoundContacts:
-        """Find the surfaces of different bodies that face each other, and let each two of them come into contact.
+        """Find the surfaces of different bodies that face each other, and add a contact pair for each two of them.
 
-        The mesh of the model gets the groups of their facets. Contacts that were added before stay: what they join is left
-        out, and so are pretension sections.
+        Groups of their facets are added to the mesh of the model. Surfaces of pairs that were added before and pretension
+        sections are skipped.
 
         Parameters
         ----------
         distance, angle, groups
-            As in `find_contacts`. Of equally fine sides that of the softer material is the secondary one, where materials
-            were given before.
+            As in `find_contacts`. Between equally fine sides, that of the softer material is secondary if materials have been
+            assigned.
         formulation, **options
-            Of all these contacts, as in `add_contact`: ``friction=0.2``, ``kind="tied"``.
+            Of all pairs, as in `add_contact`: ``friction=0.2``, ``kind="tied"``.
 
         Returns
         -------
         FoundContacts
-            What was added.
+            The pairs that were added.
 
         Raises
         ------
         ContactError
-            If no bodies face each other; the message tells how far apart they are.
+            If no bodies face each other; the message states their distance.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block_on_block(), kinematics="plane_strain")
+        >>> len(model.add_contacts(friction=0.2))
+        1
         """
         moduli = None
         if self.materials:
@@ -179,23 +192,29 @@ class ModelContact(ModelConnections):
 
     @typed(ModelError)
     def add_fluid_pressure(self, contact: str, pressure: float, *, source: str, ramp: History = None) -> None:
-        """Let fluid press the sides of a contact pair apart wherever they are open and connected with its source.
+        """Let a fluid penetrate a contact pair: it acts on both sides wherever they are open and connected to its source.
 
-        It enters where the sides have a gap, or press on each other by no more than the fluid, and comes on from facet to
-        facet. There it acts on both sides along the normal of the contact: ``fluid_pressure`` of the results, whose
-        ``pressure`` is what the sides press on each other elsewhere. What fluid does to other surfaces are loads, see
-        `add_pressure`.
+        Starting at the source, the fluid advances from facet to facet where the sides are open, or where their contact
+        pressure does not exceed its own. There it acts on both sides along the contact normal (``fluid_pressure`` of the
+        results). Its action on other surfaces is a load, see `add_pressure`.
 
         Parameters
         ----------
         contact : str
-            Name of a pair, or of an obstacle.
+            Name of a contact pair or an obstacle.
         pressure : float
-            At multiplier 1 [pressure].
+            Fluid pressure at multiplier 1 [pressure].
         source : str
-            A group with nodes of the secondary side, from which the fluid comes: its edge, or all of it.
+            Group with the nodes of the secondary side where the fluid enters: its edge, or all of it.
         ramp : Ramp or iterable of (float, float), optional
-            A history of its own.
+            History of the fluid pressure.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block_on_block(), kinematics="plane_strain")
+        >>> model.add_contact("seal", secondary="CONT_UPPER", primary="CONT_LOWER")
+        >>> model.add_fluid_pressure("seal", 5.0, source="UPPER_BOTTOM_LEFT", ramp=[(0, 0), (1, 0), (2, 1)])
         """
         check_number(f"the fluid pressure in contact '{contact}'", pressure)
         if pressure < 0.0:
@@ -223,7 +242,7 @@ class ModelContact(ModelConnections):
         formulation: str | None = None,
         **options: Unpack[ContactOptions],
     ) -> None:
-        """Let the facets of group `secondary` come into contact with a rigid obstacle.
+        """Add contact of the facets of group `secondary` with a rigid obstacle.
 
         Parameters
         ----------
@@ -232,23 +251,37 @@ class ModelContact(ModelConnections):
         obstacle : Obstacle
             A shape of `fastcontact.obstacles`, or any object with their ``distance`` method.
         motion : mapping of str to float, optional
-            Its displacement at multiplier 1, e.g. ``{"y": -0.1}`` [length]; it stands still without.
+            Its displacement at multiplier 1, e.g. ``{"y": -0.1}``; by default zero [length].
         force : mapping of str to float, optional
-            The force on it at multiplier 1, e.g. ``{"y": -100.0}`` [force], in axisymmetry over the full circle. In
-            these components the obstacle is a rigid body that moves freely until contact holds it; in the others it
-            follows `motion`. Results tell where it is.
+            The force on it at multiplier 1, e.g. ``{"y": -100.0}`` [force], in axisymmetry over the full circle. In these
+            components the obstacle is a free rigid body, held by contact alone; in the others it follows `motion`. Its
+            displacement is in the results.
         rotation : mapping, optional
-            How it turns: ``angle`` at multiplier 1 [radian]; ``centre``, a point of the axis (dim,) before any motion, with
-            which it moves [length]; in space ``axis``, the direction; ``ramp``, a history of its own. Results tell the torque
-            on the obstacle's axis. Not in axisymmetry.
+            Rotation about an axis: ``angle`` at multiplier 1 [radian]; ``centre``, a point on the axis (dim,) before any
+            motion, which the axis follows [length]; in 3D ``axis``, its direction; ``ramp``, a history of its own. The
+            torque about the axis is in the results. Not in axisymmetry.
         ramp : Ramp or iterable of (float, float), optional
-            History of motion and force, and of a rotation without one of its own.
+            History of motion and force, and of a rotation without its own.
         formulation : str, optional
-            ``"node_to_segment"`` (then: node against obstacle), by default on linear triangles and, in space, on
-            facets whose nodes all carry pressure (tri3, quad4, quad9); ``"mortar"`` with one weighted gap a node, by default
-            in space on the other, quadratic facets where there is friction; or ``"continuous"``, by default on all others.
+            ``"node_to_segment"`` (node against obstacle), the default on linear triangles and, in 3D, on facets whose nodes
+            all carry pressure (tri3, quad4, quad9); ``"mortar"`` with one weighted gap per node, the default in 3D on
+            other quadratic facets with friction; or ``"continuous"``, the default elsewhere.
         **options
-            Fields of the formulation.
+            As in `add_contact`.
+
+        Examples
+        --------
+        A rigid ball pressed into a block with 100 N:
+
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.graded_block(), kinematics="axisymmetric")
+        >>> model.add_material(fc.LinearElastic(E=70_000.0, nu=0.33))
+        >>> model.fix("BOTTOM", "y")
+        >>> ball = fc.obstacles.Sphere(R=10.0, centre=(0.0, 10.0))
+        >>> model.add_obstacle("ball", secondary="CONTACT", obstacle=ball, force={"y": -100.0})
+        >>> step = fc.solve(model, 1)[-1]
+        >>> round(float(step.contact["ball"].force[1]), 6)
+        -100.0
         """
         moves = axes_of(f"the motion of obstacle '{name}'", dict(motion), self.mesh.dim) if motion else {}
         displacement = tuple(float(moves.get(axis, 0.0)) for axis in range(self.mesh.dim))  # type: ignore[arg-type]

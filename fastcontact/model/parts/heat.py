@@ -40,38 +40,96 @@ class ModelHeat(ModelMaterials):
         value : float or callable
             A number, or a function from reference positions (n, dim) [length] to temperatures (n,) [temperature].
         ramp : Ramp or iterable of (float, float), optional
-            History of the rise over `Model.reference_temperature`.
+            History of the rise above `Model.reference_temperature`.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain", reference_temperature=20.0)
+        >>> model.fix_temperature("TOP", 120.0)
         """
         self._heat(FixedTemperature(group, value, table_of(ramp, f"the ramp of the temperature on '{group}'")))
 
     @typed(ModelError)
     def add_heat_flux(self, group: str, value: Value, *, ramp: History = None) -> None:
-        """Heat a group of facets by `value` [power / area], positive into the body; values as in `fix_temperature`."""
+        """Apply a heat flux to a group of facets.
+
+        Parameters
+        ----------
+        group : str
+        value : float or callable
+            Positive into the body, as in `fix_temperature` [power / area].
+        ramp : Ramp or iterable of (float, float), optional
+            History of the flux.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.add_heat_flux("TOP", 3.0)
+        """
         self._heat(HeatFlux(group, value, table_of(ramp, f"the ramp of the heat flux on '{group}'")))
 
     @typed(ModelError)
     def add_heat_source(self, value: Value, groups: Sequence[str] | str | None = None, *, ramp: History = None) -> None:
-        """Heat groups of solid cells, by default all, by `value` [power / length^3]; values as in `fix_temperature`."""
+        """Apply a heat source to groups of solid cells.
+
+        Parameters
+        ----------
+        value : float or callable
+            Power per volume, as in `fix_temperature` [power / length^3].
+        groups : str or sequence of str, optional
+            By default all solid cells.
+        ramp : Ramp or iterable of (float, float), optional
+            History of the source.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.add_heat_source(0.1, "BLOCK")
+        """
         self._heat(HeatSource(group_names(groups), value, table_of(ramp, "the ramp of the heat source")))
 
     @typed(ModelError)
     def add_nodal_heat(self, group: str, value: Value, *, ramp: History = None) -> None:
-        """Heat every node of a group by `value` [power], in axisymmetry over the full circle; as in `fix_temperature`."""
+        """Apply a concentrated heat source to every node of a group.
+
+        Parameters
+        ----------
+        group : str
+        value : float or callable
+            As in `fix_temperature`; in axisymmetry over the full circle [power].
+        ramp : Ramp or iterable of (float, float), optional
+            History of the source.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.add_nodal_heat("TOP_LEFT", 5.0)
+        """
         self._heat(NodalHeat(group, value, table_of(ramp, f"the ramp of the heat at nodes of '{group}'")))
 
     @typed(ModelError)
     def add_film(self, group: str, coefficient: Value, ambient: Value, *, ramp: History = None) -> None:
-        """Let a group of facets pass heat to its surroundings, ``coefficient * (temperature - ambient)`` by area.
+        """Apply convection to a group of facets: the outward flux is ``coefficient * (temperature - ambient)``.
 
         Parameters
         ----------
         group : str
         coefficient : float or callable
-            Of convection, zero or more [power / (area temperature)].
+            Film coefficient, zero or positive [power / (area temperature)].
         ambient : float or callable
             Temperature of the surroundings [temperature].
         ramp : Ramp or iterable of (float, float), optional
-            History of the ambient temperature's rise over `Model.reference_temperature`.
+            History of the rise of the ambient temperature above `Model.reference_temperature`.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.add_film("TOP", 1.5, 20.0)
         """
         self._heat(Film(group, coefficient, ambient, table_of(ramp, f"the ramp of the film on '{group}'")))
 

@@ -39,10 +39,10 @@ class ModelInitialStates(ModelLoads):
         times: Sequence[float] | None = None,
         ramp: History = None,
     ) -> None:
-        """Heat or cool groups of solid cells, by default all; their materials expand by their `expansion`.
+        """Prescribe the temperature of groups of solid cells, whose materials expand by their `expansion`.
 
-        Temperatures are those of the nodes: cells beside a group have a gradient where they share nodes with it. The rises of
-        several add up.
+        Temperatures are nodal: cells beside a group have a gradient where they share nodes with it. Several temperatures add
+        up by their rise above the reference.
 
         Parameters
         ----------
@@ -51,11 +51,19 @@ class ModelInitialStates(ModelLoads):
             mesh, or that at several instants [temperature].
         groups : str or sequence of str, optional
         reference : float
-            At which there is no thermal strain [temperature].
+            Temperature without thermal strain [temperature].
         times : sequence of float (n_instants,), optional
-            Load factors of the instants, between which temperatures follow linearly [-].
+            Load factors of the instants, between which temperatures are interpolated linearly [-].
         ramp : Ramp or iterable of (float, float), optional
-            History of the rise, value minus reference.
+            History of the rise, that is of the value minus the reference.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.add_material(fc.LinearElastic(E=210_000.0, nu=0.3, expansion=12e-6))
+        >>> model.add_temperature(120.0, reference=20.0)
+        >>> model.add_temperature(lambda points: 10.0 * points[:, 1], "BLOCK")
         """
         names = group_names(groups)
         checked = checked_value(value)
@@ -83,31 +91,38 @@ class ModelInitialStates(ModelLoads):
         times: Sequence[float] | None = None,
         ramp: History = None,
     ) -> None:
-        """Heat or cool groups of solid cells, by default all, by a nodal field of a file, or of several files.
+        """Prescribe the temperature of groups of solid cells by a nodal field of one or several files.
 
-        Read are MED, VTKHDF, such as result files, and what meshio reads, such as .vtu. A file with the points of the mesh in
-        their order gives the temperature of each; otherwise it is that of the point at the same place.
+        Formats are MED, VTKHDF (such as result files) and those of meshio (such as .vtu). If the file has the points of the
+        mesh in the same order, its values are taken as they stand; otherwise points are matched by position.
 
         Parameters
         ----------
         file : path-like or sequence of them
-            One file, with one instant or several; or a file for each instant.
+            One file with one or several instants, or one file for each instant.
         field : str
-            Its name.
+            Name of the field.
         groups : str or sequence of str, optional
         reference : float
-            At which there is no thermal strain [temperature].
+            Temperature without thermal strain [temperature].
         instant : float, optional
-            Time of the file to take alone.
+            The only time of the file to use.
         times : sequence of float (n_instants,), optional
-            Load factors of the instants [-]; by default the times of the file. Between them temperatures follow linearly.
+            Load factors of the instants, between which temperatures are interpolated linearly [-]; by default the times of
+            the file.
         ramp : Ramp or iterable of (float, float), optional
             History of the rise of a single instant.
 
         Raises
         ------
         FileError, MeshError, ModelError
-            If a file cannot be read or lacks the field, a point has no temperature, or instants and times do not fit.
+            If a file cannot be read or lacks the field, a point has no temperature, or instants and times conflict.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.add_temperature_file("furnace.med", "TEMP", reference=20.0)  # doctest: +SKIP
         """
         from fastcontact.model.temperature_files import read_temperatures
 
@@ -140,19 +155,26 @@ class ModelInitialStates(ModelLoads):
         axes: Axes = None,
         ramp: History = None,
     ) -> None:
-        """Give groups of solid cells, by default all, a stress that they have where nothing is displaced.
+        """Prescribe an initial stress in groups of solid cells, by default all.
 
-        What of it is not in balance deforms the bodies. In axisymmetry x, y, z are radius, axis and circumference.
+        Its part that is not in equilibrium deforms the bodies. In axisymmetry x, y, z stand for radius, axis and
+        circumference.
 
         Parameters
         ----------
         groups : str or sequence of str, optional
         xx, yy, zz, xy, yz, xz : float, callable or ndarray (n,), optional
-            Components, zero where not given; numbers, functions or arrays as E of `LinearElastic` [pressure].
+            Components, by default zero; numbers, functions or arrays like E of `LinearElastic` [pressure].
         axes : sequence or callable, optional
-            What they are along, as of `Orthotropic`: unit vectors in rows (3, 3) [-], or a function, taken at each place.
+            Axes of the components, as in `Orthotropic`: unit vectors in rows (3, 3) [-], or a function of position.
         ramp : Ramp or iterable of (float, float), optional
-            History; by default the whole of it is there from the first step on.
+            History; by default the stress acts in full from the first step.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.add_initial_stress(xx=lambda points: 100.0 * (1.0 - 2.0 * points[:, 1]))
         """
         given = {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "yz": yz, "xz": xz}
         self._add_initial("stress", groups, given, axes, ramp)
@@ -171,17 +193,23 @@ class ModelInitialStates(ModelLoads):
         axes: Axes = None,
         ramp: History = None,
     ) -> None:
-        """Give groups of solid cells, by default all, a strain that costs no stress: shrinkage, swelling, misfit.
+        """Prescribe a stress-free strain, such as shrinkage, swelling or misfit, in groups of solid cells, by default all.
 
         Parameters
         ----------
         groups : str or sequence of str, optional
         xx, yy, zz, xy, yz, xz : float, callable or ndarray (n,), optional
-            Components, as of `add_initial_stress`; xy, yz and xz are shears, twice those of the tensor [-].
+            Components, as in `add_initial_stress`; xy, yz and xz are engineering shears, twice those of the tensor [-].
         axes : sequence or callable, optional
-            What they are along: unit vectors in rows (3, 3) [-], or a function.
+            Axes of the components: unit vectors in rows (3, 3) [-], or a function of position.
         ramp : Ramp or iterable of (float, float), optional
-            History; by default the whole of it is there from the first step on.
+            History; by default the strain acts in full from the first step.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.add_initial_strain("BLOCK", xx=-0.002, yy=-0.002, zz=-0.002)  # shrinkage
         """
         given = {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "yz": yz, "xz": xz}
         self._add_initial("strain", groups, given, axes, ramp)

@@ -37,9 +37,23 @@ class ModelLoads(ModelHeat):
 
     @typed(ModelError)
     def add_pressure(self, group: str, value: Value, *, ramp: History = None) -> None:
-        """Press on a group of outer facets with `value` [pressure], positive along their normals into the body.
+        """Apply a pressure to a group of outer facets.
 
-        It is a number, or a function from reference positions (n, dim) [length] to pressures (n,) [pressure].
+        Parameters
+        ----------
+        group : str
+        value : float or callable
+            Positive in compression, that is along the inward normal: a number, or a function from reference positions
+            (n, dim) [length] to pressures (n,) [pressure]. In finite strain it follows the deformed surface.
+        ramp : Ramp or iterable of (float, float), optional
+            History of the pressure.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.add_pressure("TOP", 2.0)
+        >>> model.add_pressure("RIGHT", lambda points: 10.0 * (1.0 - points[:, 1]))
         """
         self._add(Pressure(group, value, table_of(ramp, f"the ramp of the pressure on '{group}'")))
 
@@ -53,7 +67,22 @@ class ModelLoads(ModelHeat):
         z: Value | None = None,
         ramp: History = None,
     ) -> None:
-        """Load a group of facets with forces per reference area [pressure]; values as in `add_pressure`."""
+        """Apply a traction, force per reference area, to a group of facets.
+
+        Parameters
+        ----------
+        group : str
+        x, y, z : float or callable
+            Components, as `value` of `add_pressure` [pressure].
+        ramp : Ramp or iterable of (float, float), optional
+            History of the traction.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.add_traction("TOP", x=1.0, y=-5.0)
+        """
         axes = axes_of(f"the traction on '{group}'", {"x": x, "y": y, "z": z}, self.mesh.dim)
         self._add(Traction(group, axes, table_of(ramp, f"the ramp of the traction on '{group}'")))
 
@@ -67,7 +96,24 @@ class ModelLoads(ModelHeat):
         z: Value | None = None,
         ramp: History = None,
     ) -> None:
-        """Load groups of solid cells, by default all, with forces per volume [force / length^3], such as the weight."""
+        """Apply a body force to groups of solid cells.
+
+        Parameters
+        ----------
+        groups : str or sequence of str, optional
+            By default all solid cells.
+        x, y, z : float or callable
+            Force per volume, as `value` of `add_pressure` [force / length^3].
+        ramp : Ramp or iterable of (float, float), optional
+            History of the force.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.add_body_force(y=-7.7e-5)
+        >>> model.add_body_force("BLOCK", x=lambda points: 1e-6 * points[:, 0])
+        """
         names = group_names(groups)
         axes = axes_of("the body force", {"x": x, "y": y, "z": z}, self.mesh.dim)
         self._add(BodyForce(names, axes, table_of(ramp, "the ramp of the body force")))
@@ -82,9 +128,26 @@ class ModelLoads(ModelHeat):
         z: float | None = None,
         ramp: History = None,
     ) -> None:
-        """Load groups of solid cells, by default all, with their weight: density times acceleration [length / time^2].
+        """Apply the weight of groups of solid cells, from the densities of their materials.
 
-        The densities are those of the materials; units must fit, as do N, mm, MPa with tonnes, seconds and y=-9810.0.
+        Parameters
+        ----------
+        groups : str or sequence of str, optional
+            By default all solid cells.
+        x, y, z : float
+            Gravitational acceleration [length / time^2], in units consistent with the others: -9810 with N, mm, MPa,
+            tonnes and seconds.
+        ramp : Ramp or iterable of (float, float), optional
+            History of the acceleration.
+
+        Examples
+        --------
+        Steel in mm, tonnes and seconds, so that forces are in N:
+
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.add_material(fc.LinearElastic(E=210_000.0, nu=0.3, density=7.85e-9))
+        >>> model.add_gravity(y=-9810.0)
         """
         names = group_names(groups)
         axes = axes_of("gravity", {"x": x, "y": y, "z": z}, self.mesh.dim)
@@ -100,7 +163,7 @@ class ModelLoads(ModelHeat):
         direction: Sequence[float] | None = None,
         ramp: History = None,
     ) -> None:
-        """Load groups of solid cells with the centrifugal force of a rotation, from the densities of the materials.
+        """Apply the centrifugal force of a rotation to groups of solid cells, from the densities of their materials.
 
         Parameters
         ----------
@@ -113,7 +176,17 @@ class ModelLoads(ModelHeat):
         direction : sequence of 3 floats, optional
             Along the axis, of any length [-]. By default (0, 0, 1), in axisymmetry the axis (0, 1, 0).
         ramp : Ramp or iterable of (float, float), optional
-            History of the force, that is of the square of the speed.
+            History of the force, which is proportional to the square of the speed.
+
+        Examples
+        --------
+        A ring at 6000 revolutions per minute:
+
+        >>> import math
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.rings(), kinematics="plane_strain")
+        >>> model.add_material(fc.LinearElastic(E=210_000.0, nu=0.3, density=7.85e-9))
+        >>> model.add_centrifugal(6000.0 / 60.0 * 2.0 * math.pi)
         """
         names = group_names(groups)
         if direction is None:
@@ -130,18 +203,26 @@ class ModelLoads(ModelHeat):
     def add_hydrostatic_pressure(
         self, group: str, *, weight: float, level: float, axis: str | None = None, ramp: History = None
     ) -> None:
-        """Press on a group of outer facets as a liquid does: `weight` times the depth below its level.
+        """Apply the pressure of a liquid, `weight` times the depth below its level, to a group of outer facets.
 
         Parameters
         ----------
         group : str
         weight : float
-            Of the liquid by volume [force / length^3].
+            Weight of the liquid per volume [force / length^3].
         level : float
-            Coordinate of its surface; above it nothing presses [length].
+            Coordinate of its free surface, above which there is no pressure [length].
         axis : str, optional
-            Along which the level is measured, upwards: by default the last one, y or z.
+            Vertical axis, positive upwards: by default the last one, y or z.
         ramp : Ramp or iterable of (float, float), optional
+
+        Examples
+        --------
+        Water in N and mm, filled to y = 0.8:
+
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.add_hydrostatic_pressure("RIGHT", weight=9.81e-6, level=0.8)
         """
         name = "xyz"[self.mesh.dim - 1] if axis is None else axis
         (along,) = axes_of(f"the hydrostatic pressure on '{group}'", {name: 1.0}, self.mesh.dim)
@@ -163,26 +244,34 @@ class ModelLoads(ModelHeat):
         radius: float | None = None,
         ramp: History = None,
     ) -> None:
-        """Load a group with forces [force].
+        """Apply a force to a group.
 
         Parameters
         ----------
         group : str
         x, y, z : float or callable
-            Components: numbers, or for nodes functions of position, as in `prescribe`. In axisymmetry forces are those over
-            the full circle; on facets a radial one is refused.
+            Components: numbers, or functions of position for forces on nodes, as in `prescribe` [force]. In axisymmetry they
+            are those over the full circle; a radial force on facets is refused.
         distribute : bool, optional
-            True: the total force, spread as a uniform traction over the facets of the group. False: the force on every
-            node of the group. By default True for a group of facets and False for a group of points.
+            True: the components are the resultant, applied as a uniform traction to the facets of the group. False: they
+            act on every node of the group. By default True for a group of facets and False for a group of points.
         at : sequence of float (dim,), optional
-            Place through which the total force acts, spread over the group by area and distance from there, with the arms of
-            the group for what moment is left [length].
+            Point through which the resultant acts [length]. It is distributed over the group in proportion to area and
+            distance from this point; linear terms balance the remaining moment.
         weighting : str
-            Of the force spread about `at`: ``"uniform"``, or falling to zero at the radius as ``"linear"``, ``"quadratic"``
-            or ``"cubic"`` functions of the distance.
+            How the force decays with the distance from `at`: ``"uniform"``, or to zero at the radius by a ``"linear"``,
+            ``"quadratic"`` or ``"cubic"`` function.
         radius : float, optional
-            Beyond which the group bears nothing [length]; by default the distance of its farthest node.
+            Distance from `at` beyond which no force acts [length]; by default that of the farthest node.
         ramp : Ramp or iterable of (float, float), optional
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.add_force("TOP", y=-100.0)  # in all, as a uniform traction
+        >>> model.add_force("TOP_RIGHT", x=1.0)  # on the node
+        >>> model.add_force("TOP", y=-100.0, at=(0.25, 1.0))  # off the centre
         """
         self.mesh.points_of(group)
         spread = spread_of(f"the force on '{group}'", at, weighting, radius)
@@ -220,9 +309,23 @@ class ModelLoads(ModelHeat):
         z: float | None = None,
         ramp: History = None,
     ) -> None:
-        """Load a reference point, or a group, with a moment [force times length]; in the plane about z.
+        """Apply a moment to a reference point or to a group.
 
-        On a group of facets it is spread in proportion to area and distance from the middle, without a resultant force.
+        Parameters
+        ----------
+        group : str
+            On a group of facets the moment is distributed in proportion to area and distance from the centroid, without a
+            resultant force.
+        x, y, z : float
+            Components [force times length]; in the plane z alone.
+        ramp : Ramp or iterable of (float, float), optional
+            History of the moment.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+        >>> model.add_moment("TOP", z=20.0)
         """
         name = f"the moment on '{group}'"
         given = {"x": x, "y": y, "z": z}

@@ -35,10 +35,23 @@ class ModelSupports(ModelContact):
 
     @typed(ModelError)
     def fix(self, group: str, components: str, *, axes: SupportAxes = None) -> None:
-        """Hold displacement components (``"x"``, ``"y"``, ``"xy"``, in 3D also ``"z"``) of a group's nodes at zero.
+        """Fix displacement components of all nodes of a group at zero.
 
-        ``"normal"``: those along the normals of a group of facets. With `axes` (k, 3) [-]
-        components are along these, see `prescribe`.
+        Parameters
+        ----------
+        group : str
+        components : str
+            ``"x"``, ``"y"``, ``"xy"``, in 3D also ``"z"``; or ``"normal"``, along the normals of a group of facets.
+        axes : sequence or callable, optional
+            Directions (k, 3) [-] of the components, as in `prescribe`.
+
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.rings(), kinematics="plane_strain")
+        >>> model.fix("SYMMETRY_X", "x")
+        >>> model.fix("SYMMETRY_Y", "y")
+        >>> model.fix("RIM", "x", axes=fc.CylindricalAxes())  # the radial component
         """
         if not components:
             raise ModelError(f"fix('{group}', ...) names no component: give for example 'x' or 'xy'")
@@ -60,17 +73,37 @@ class ModelSupports(ModelContact):
         ramp: History = None,
         **components: Value,
     ) -> None:
-        """Prescribe displacement components of all nodes of a group, e.g. ``y=-2.0`` [length], times the ramp.
+        """Prescribe displacement components of all nodes of a group.
 
-        A component is a number, or a function from reference positions (n, dim) [length] to displacements (n,) [length].
-        `normal` is the displacement out of the body along the mean normal of the facets at each node, for groups of facets.
-        With `axes` (k, 3) [-], vectors in rows or a function as those of materials, in the plane also one vector of two
-        numbers, x, y and z are along the first, second and third of them: ``axes=fc.CylindricalAxes()`` stands for radial,
-        circumferential and axial components.
+        Parameters
+        ----------
+        group : str
+        normal : float or callable, optional
+            Outward displacement along the mean normal of the facets at each node, for groups of facets [length].
+        axes : sequence or callable, optional
+            Directions (k, 3) [-] of x, y and z, as unit vectors in rows or a function like those of materials; in the plane
+            a single vector of two numbers will do. ``axes=fc.CylindricalAxes()``: radial, circumferential and axial.
+        rotation : mapping, optional
+            Rigid rotation of the group about an axis, exact for any angle: ``angle`` at multiplier 1 [radian]; ``centre``,
+            a point of the axis (dim,) [length]; in 3D ``axis``, its direction; ``ramp``, a history of its own. All
+            components are then prescribed, and x, y and z translate the axis. Not in axisymmetry.
+        ramp : Ramp or iterable of (float, float), optional
+            History of the displacement.
+        **components : float or callable
+            ``x``, ``y``, ``z``: numbers, or functions from reference positions (n, dim) [length] to displacements (n,)
+            [length].
 
-        `rotation` turns the group about an axis, exactly by any angle, and holds all its components: ``angle`` at multiplier
-        1 [radian]; ``centre``, a point of the axis (dim,) [length]; in space ``axis``, its direction; ``ramp``, a history of
-        its own. The components x, y and z are then what the axis moves by. Not in axisymmetry.
+        Examples
+        --------
+        >>> import fastcontact as fc
+        >>> model = fc.Model(fc.generate.rings(), kinematics="plane_strain")
+        >>> model.prescribe("RIM", normal=-0.1)  # shrinks the rim
+        >>> model.prescribe("BORE", x=lambda points: 0.01 * points[:, 1], y=0.0)
+
+        A group that turns by a quarter of a circle while the load factor goes from 0 to 1:
+
+        >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain", strain="finite")
+        >>> model.prescribe("TOP", rotation={"angle": 1.5707963, "centre": (0.5, 1.0)})
         """
         if rotation is not None:
             if axes is not None or normal is not None:

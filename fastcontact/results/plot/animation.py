@@ -90,6 +90,19 @@ def animate(
         If there are no steps, the suffix is another one, ffmpeg is missing or fails.
     FileError
         If the file cannot be written.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> mesh = fc.generate.block_on_block()
+    >>> model = fc.Model(mesh, kinematics="plane_strain")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    >>> model.fix("LOWER_BOTTOM", "xy")
+    >>> model.fix("UPPER_LEFT", "x")
+    >>> model.add_pressure("UPPER_TOP", 2.0)
+    >>> model.add_contact("joint", secondary="CONT_UPPER", primary="CONT_LOWER")
+    >>> steps = fc.solve(model, 2)
+    >>> picture = fc.plot.animate(mesh, steps, "joint.gif", scale=10.0)
     """
     if not len(steps):
         raise FastcontactError("there are no steps to animate")

@@ -58,6 +58,19 @@ def axis_stress(
     ------
     FastcontactError
         If the mesh is three-dimensional or has no nodes on the axis.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> mesh = fc.generate.block_on_block()
+    >>> model = fc.Model(mesh, kinematics="plane_strain")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    >>> model.fix("LOWER_BOTTOM", "xy")
+    >>> model.fix("UPPER_LEFT", "x")
+    >>> model.add_pressure("UPPER_TOP", 2.0)
+    >>> model.add_contact("joint", secondary="CONT_UPPER", primary="CONT_LOWER")
+    >>> steps = fc.solve(model, 2)
+    >>> ax = fc.plot.axis_stress(mesh, steps[-1], "joint")
     """
     depth, side, stress = stresses_on_axis(mesh, step, pair)
     upright = abs(_axis(step, pair)[1][1]) > 0.5

@@ -65,6 +65,18 @@ def contact_map(
 
     Returns a tuple of Axes: of the pressure, and where there is any of the shear or slip. Raises FastcontactError if the
     mesh is not three-dimensional, its surface is not that of the contact, or what is closed of it goes around a body.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> mesh = fc.generate.box(divisions=(2, 2, 2))
+    >>> model = fc.Model(mesh, kinematics="3d")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    >>> model.fix("ZMIN", "xyz")
+    >>> ball = fc.obstacles.Sphere(centre=(0.5, 0.5, 3.0), R=2.0)
+    >>> model.add_obstacle("ball", secondary="ZMAX", obstacle=ball, motion={"z": -0.05})
+    >>> step = fc.solve(model, 1)[-1]
+    >>> axes = fc.plot.contact_map(mesh, step.contact["ball"])
     """
     if mesh.dim != 3:
         raise FastcontactError("maps of a contact are for meshes in three dimensions: draw the pressure profile")

@@ -35,6 +35,11 @@ def contacts(
         In 3D, height of the eye over the x-y plane and its direction around z [degrees].
     ax : matplotlib Axes, optional
         In 3D with ``projection="3d"``.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> ax = fc.plot.contacts(fc.find_contacts(fc.generate.block_on_block()))
     """
     mesh = found_contacts.mesh
     axes = new_axes(ax, size_around(mesh.points) if mesh.dim == 2 else (6.4, 6.2), "3d" if mesh.dim == 3 else None)

@@ -52,6 +52,20 @@ def history(
     title, units
         As in `pressure_profile`.
     axes : two matplotlib Axes, optional
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> mesh = fc.generate.block_on_block()
+    >>> model = fc.Model(mesh, kinematics="plane_strain")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    >>> model.fix("LOWER_BOTTOM", "xy")
+    >>> model.fix("UPPER_LEFT", "x")
+    >>> model.add_pressure("UPPER_TOP", 2.0)
+    >>> model.add_contact("joint", secondary="CONT_UPPER", primary="CONT_LOWER")
+    >>> steps = fc.solve(model, 2)
+    >>> axes = fc.plot.history(steps, "joint")
+    >>> axes[0].figure.savefig("history.png")
     """
     if axes is None:
         axes = Panels(new_panels(2, 1, (6.0, 5.8), sharex=True)[:, 0])
@@ -118,6 +132,19 @@ def contact_zones(
     ------
     FastcontactError
         If there is no step.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> mesh = fc.generate.block_on_block()
+    >>> model = fc.Model(mesh, kinematics="plane_strain")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    >>> model.fix("LOWER_BOTTOM", "xy")
+    >>> model.fix("UPPER_LEFT", "x")
+    >>> model.add_pressure("UPPER_TOP", 2.0)
+    >>> model.add_contact("joint", secondary="CONT_UPPER", primary="CONT_LOWER")
+    >>> steps = fc.solve(model, 2)
+    >>> ax = fc.plot.contact_zones(steps, "joint")
     """
     if not steps:
         raise FastcontactError("there is no step whose contact could be plotted")

@@ -51,6 +51,20 @@ def pressure_profile(
         Names of the units of ``length``, ``force`` and ``pressure`` for the labels, by default those of the model (none
         where it names none); see `UNITS`.
     ax : matplotlib Axes, optional
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> mesh = fc.generate.block_on_block()
+    >>> model = fc.Model(mesh, kinematics="plane_strain")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    >>> model.fix("LOWER_BOTTOM", "xy")
+    >>> model.fix("UPPER_LEFT", "x")
+    >>> model.add_pressure("UPPER_TOP", 2.0)
+    >>> model.add_contact("joint", secondary="CONT_UPPER", primary="CONT_LOWER")
+    >>> steps = fc.solve(model, 2)
+    >>> ax = fc.plot.pressure_profile(steps[-1].contact["joint"], title="joint")
+    >>> ax.figure.savefig("joint.png")
     """
     ax, units = new_axes(ax, (6.4, 4.4)), units or contact.units
     order = np.argsort(contact.place, kind="stable")

@@ -76,6 +76,17 @@ def section(
     ------
     FastcontactError
         If the mesh is not three-dimensional, the normal is zero, or the plane does not meet the mesh.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> mesh = fc.generate.box(divisions=(2, 2, 2))
+    >>> model = fc.Model(mesh, kinematics="3d")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    >>> model.fix("ZMIN", "xyz")
+    >>> model.add_pressure("ZMAX", 1.0)
+    >>> step = fc.solve(model, 1)[-1]
+    >>> ax = fc.plot.section(mesh, step, point=(0.5, 0.5, 0.5), normal=(0.0, 1.0, 0.0))
     """
     at, direction = _plane(mesh, point, normal)
     shown, units = field_of(mesh, step, field), units or step.units

@@ -29,6 +29,12 @@ def view(results: Any, step: StepResult, *, scale: float = 1.0, title: str = "",
     ------
     FastcontactError
         If PyVista is not installed, or a window is asked for without a display.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> results = fc.open_results("press-fit.vtkhdf")  # doctest: +SKIP
+    >>> fc.plot.view(results, results[-1])  # doctest: +SKIP
     """
     try:
         import pyvista
