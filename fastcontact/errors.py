@@ -6,7 +6,7 @@ import difflib
 import os
 import sys
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -114,7 +114,7 @@ def names_of(module: str, known: list[str]) -> tuple[Callable[[str], object], Ca
     return missing, lambda: known
 
 
-def check_known(kind: str, name: object, known: Iterable[str], error: type[FastcontactError]) -> None:
+def check_known(kind: str, name: object, known: Collection[str], error: type[FastcontactError]) -> None:
     """Raise `error` for a name that is not among the `known` ones, with the nearest of them."""
     if name not in known:
         raise error(unknown(kind, str(name), known))

@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fastcontact import analytic
+from fastcontact._tools import toml_text
+from fastcontact._tools.paths import existing_file, is_stream
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.cases.checks import CHECK, Check, read_check
 from fastcontact.cases.input_files import files_named
@@ -17,9 +19,7 @@ from fastcontact.cases.shipped import case_path, shipped_cases
 from fastcontact.errors import CaseError, in_file, unknown
 from fastcontact.linear.choice import check_tolerance
 from fastcontact.mesh import generate
-from fastcontact.mesh.files import toml_text
 from fastcontact.mesh.files.mesh_files import read_mesh
-from fastcontact.mesh.files.paths import existing_file, is_stream
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, linear_ramp

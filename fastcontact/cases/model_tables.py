@@ -12,6 +12,7 @@ from pathlib import Path
 from reprlib import repr
 from typing import Any
 
+from fastcontact._tools.argument_types import types_of
 from fastcontact.cases.keys import AXES, FIELD, NUMBER, ROTATION, SURFACE, at, called, check_keys, tables
 from fastcontact.contact.obstacles import SHAPES, MeshedSurface, Obstacle
 from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
@@ -21,7 +22,6 @@ from fastcontact.elasticity.materials import CONSTANTS, LinearElastic, Material,
 from fastcontact.elasticity.nonlinear_materials import ElasticPlastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
 from fastcontact.elasticity.varying_constants import Tabulated
 from fastcontact.errors import CaseError, unknown
-from fastcontact.mesh.argument_types import types_of
 from fastcontact.mesh.companion_groups import OPPOSITE
 from fastcontact.mesh.files.mesh_fields import read_field
 from fastcontact.mesh.files.mesh_files import read_mesh

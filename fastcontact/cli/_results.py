@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools import toml_text
 from fastcontact.analytic.pressure_curve import PressureCurve, pressure_curve
 from fastcontact.cli._terminal import say
 from fastcontact.errors import CaseError, check_known
-from fastcontact.mesh.files import toml_text
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

@@ -57,7 +57,7 @@ def _lines(path: Path) -> list[str]:
 
 def copied(case: Path, target: Path) -> list[Path]:
     """Copy a case file, and beside it the mesh file it reads, if any; refuse to overwrite."""
-    from fastcontact.mesh.files.paths import replacing
+    from fastcontact._tools.paths import replacing
 
     text = case.read_text(encoding="utf-8")
     mesh: dict[str, Any] = tomllib.loads(text).get("mesh", {})

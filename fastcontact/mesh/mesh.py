@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fastcontact._tools.argument_types import typed
+from fastcontact._tools.html_table import html_table
 from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.errors import MeshError, unknown
 from fastcontact.mesh import elements
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.facet_search import added, facets_with_nodes
-from fastcontact.mesh.html_table import html_table
 
 
 def _read_only(values: ArrayLike, dtype: Any) -> AnyArray:

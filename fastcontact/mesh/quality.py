@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Mask
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements, quality_kernels
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
 
 # A Jacobian below this fraction of the squared (cubed) longest edge is rounding, not area.

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Numbers
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements, topology_kernels
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
 
 Found = TypeVar("Found")

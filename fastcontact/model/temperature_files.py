@@ -7,11 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fastcontact._tools.paths import PathLike
 from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ModelError
 from fastcontact.mesh.files.file_fields import read_file_field
 from fastcontact.mesh.files.mesh_fields import at_points_of
-from fastcontact.mesh.files.paths import PathLike
 from fastcontact.mesh.mesh import Mesh
 
 # How far a time of a file may lie from the one that is wanted, relative to the latest.

@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
+from fastcontact._tools import toml_text
+from fastcontact._tools.argument_types import typed
+from fastcontact._tools.hdf5 import check_contents
+from fastcontact._tools.html_table import html_table
+from fastcontact._tools.packing import unpacked
+from fastcontact._tools.paths import PathLike, existing_file
 from fastcontact.arrays import Array, Numbers
 from fastcontact.errors import FileError
-from fastcontact.mesh.argument_types import typed
-from fastcontact.mesh.files import toml_text
-from fastcontact.mesh.files.hdf5 import check_contents
-from fastcontact.mesh.files.packing import unpacked
-from fastcontact.mesh.files.paths import PathLike, existing_file
-from fastcontact.mesh.html_table import html_table
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results import conversions, journal, layout
 from fastcontact.results.file_lock import is_being_written

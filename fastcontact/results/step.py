@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.html_table import html_table
 from fastcontact.arrays import Array, Mask, Numbers
 from fastcontact.errors import unknown
-from fastcontact.mesh.html_table import html_table
 from fastcontact.results.material_stress import MaterialStress
 from fastcontact.results.units import with_unit
 

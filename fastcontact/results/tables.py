@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
+from fastcontact._tools.paths import PathLike, replacing
 from fastcontact.arrays import AnyArray, Array
 from fastcontact.errors import CaseError, check_known
-from fastcontact.mesh.argument_types import typed
-from fastcontact.mesh.files.paths import PathLike, replacing
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import ordered_line
 from fastcontact.results.step import ContactResult, StepResult

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fastcontact._tools.argument_types import typed
+from fastcontact._tools.paths import PathLike, replacing
 from fastcontact.arrays import Array
 from fastcontact.errors import CaseError, FileError, check_known
-from fastcontact.mesh.argument_types import typed
-from fastcontact.mesh.files.paths import PathLike, replacing
 
 STYLES = ("line", "symbols", "line+symbols")
 

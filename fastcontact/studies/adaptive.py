@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.analysis.progress import StatusLine
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.cases.case import Case, build_case, read_case
 from fastcontact.errors import CaseError, FastcontactWarning, check_known
 from fastcontact.mesh import elements
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.generate import Forest, circles, linearised, to_quadratic
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.step import StepResult

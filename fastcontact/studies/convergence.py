@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.cases.case import Case, read_case
 from fastcontact.errors import CaseError, check_known, warn
-from fastcontact.mesh.argument_types import typed
 from fastcontact.studies import function_runs as functions
 from fastcontact.studies.affordable import check_levels, check_runs
 from fastcontact.studies.convergence_report import Study

@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import Any
 
 from fastcontact import errors
+from fastcontact._tools.paths import replacing
 from fastcontact.errors import CaseError, FastcontactError, FileError
-from fastcontact.mesh.files.paths import replacing
 from fastcontact.results.committed_file import uninterrupted
 from fastcontact.studies.job import Run, run
 from fastcontact.studies.progress import told

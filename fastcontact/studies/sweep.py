@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.cases.case import Case, build_case, described, read_case
 from fastcontact.errors import CaseError, FastcontactError
-from fastcontact.mesh.argument_types import typed
 from fastcontact.studies import function_runs as functions
 from fastcontact.studies.affordable import check_runs
 from fastcontact.studies.case_parameters import substituted

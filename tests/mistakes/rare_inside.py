@@ -17,6 +17,7 @@ from scipy.sparse import bsr_array, csr_array
 
 import fastcontact as fc
 from fastcontact import generate
+from fastcontact._tools import hdf5
 from fastcontact.analysis.floating_bodies import FloatingBodies
 from fastcontact.cases.case import read_case
 from fastcontact.cases.keys import called
@@ -29,8 +30,8 @@ from fastcontact.linear.elimination import pivot_order
 from fastcontact.linear.multigrid import solver
 from fastcontact.linear.solvers import amg
 from fastcontact.linear.solvers.direct import Direct
-from fastcontact.mesh.files import aster_mail, hdf5, med, meshio_content
-from fastcontact.mesh.generate import _check, _triangulate
+from fastcontact.mesh.files import aster_mail, med, meshio_content
+from fastcontact.mesh.generate import _triangulate
 from fastcontact.mesh.generate.transform import renamed
 from fastcontact.results import reader
 from fastcontact.studies import execute, levels
@@ -235,8 +236,8 @@ CALLS = [
     ("a file name beyond all limits", name_too_long, fc.errors.FileError, r"cannot be written \(File name too long\): name another file"),
     ("a table that a function cannot take", lambda: called("mesh", pair_of, {"size": 3}), fc.errors.CaseError, r"'mesh': size = 3 are not of the kinds that it takes \(cannot unpack"),
     ("a table with a text for numbers", lambda: called("mesh", pair_of, {"size": "ab"}), fc.errors.CaseError, r"'mesh': size = 'ab' are not of the kinds that it takes \(could not convert"),
-    ("a size that is no number", lambda: _check.number("size", "x"), fc.MeshError, r"^size must be a number, not 'x'$"),
-    ("one size for two", lambda: _check.each(_check.number, "size", 1.0), fc.MeshError, r"^size must be two numbers, not 1\.0$"),
+    ("a size that is no number", lambda: fc.generate.quarter_disc(size="x"), fc.MeshError, r"^the argument size of quarter_disc must be a number or None, not the string 'x'$"),
+    ("one size for two", lambda: fc.generate.block(1.0), fc.MeshError, r"^the argument size of block must be two numbers, not the float 1\.0$"),
     ("arrays of meshio that do not fit together", arrays_apart, fc.MeshError, r"the arrays of meshio's mesh do not fit together: list index out of range"),
     ("a .mail file without cells", without_cells, fc.MeshError, r"a\.mail': the mesh has no cells: nothing can be computed on points alone"),
     ("a .mail file that is gone", lambda: aster_mail.read(Path("gone.mail")), fc.errors.FileError, r"cannot read 'gone\.mail': .*No such file"),

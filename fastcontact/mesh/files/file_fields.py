@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fastcontact._tools.hdf5 import check_size, opened, values
+from fastcontact._tools.paths import PathLike, existing_file
 from fastcontact.arrays import AnyArray, Array
 from fastcontact.errors import FileError, unknown
 from fastcontact.mesh.files import med, meshio_files
-from fastcontact.mesh.files.hdf5 import check_size, opened, values
-from fastcontact.mesh.files.paths import PathLike, existing_file
 
 MED_SUFFIXES = (".med", ".rmed", ".mmed")
 VTKHDF_SUFFIXES = (".vtkhdf", ".hdf")

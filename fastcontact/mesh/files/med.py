@@ -12,16 +12,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
+from fastcontact._tools.hdf5 import attribute, check_size, opened, values
+from fastcontact._tools.hdf5_driver import new_hdf5
+from fastcontact._tools.paths import PathLike, replacing
 from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.errors import FileError, MeshError, unknown
 from fastcontact.mesh import elements
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.files import med_families
 from fastcontact.mesh.files.blocks import VERTEX, Block, build_mesh, check_known
-from fastcontact.mesh.files.hdf5 import attribute, check_size, opened, values
-from fastcontact.mesh.files.hdf5_driver import new_hdf5
 from fastcontact.mesh.files.med_families import Families, checked_name, decoded
-from fastcontact.mesh.files.paths import PathLike, replacing
 from fastcontact.mesh.mesh import Mesh
 
 # Elements whose nodes MED numbers otherwise than we do: our node k is node NODE_ORDER[code][k] of MED. MED sees the

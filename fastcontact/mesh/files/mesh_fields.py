@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
+from fastcontact._tools.paths import PathLike
 from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.errors import FileError, MeshError, check_known
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.files.file_fields import FileField, read_file_field
-from fastcontact.mesh.files.paths import PathLike
 from fastcontact.mesh.mesh import Mesh
 
 # How far points of a file may lie from those of a mesh, relative to its size, and count as the same.

@@ -16,14 +16,15 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from fastcontact._tools import hdf5
+from fastcontact._tools.paths import existing_file
 from fastcontact.arrays import AnyArray, Numbers
 from fastcontact.errors import FileError, MeshError, unknown, warn
 from fastcontact.mesh import elements
-from fastcontact.mesh.files import abaqus, gmsh_versions, hdf5
+from fastcontact.mesh.files import abaqus, gmsh_versions
 from fastcontact.mesh.files.blocks import VERTEX
 from fastcontact.mesh.files.meshio_content import NODE_ORDER, UNFIT, Orders, mesh_of
 from fastcontact.mesh.files.meshio_process import CELL_PREFIX, POINT_PREFIX, library, read_in_process
-from fastcontact.mesh.files.paths import existing_file
 from fastcontact.mesh.mesh import Mesh
 
 logger = logging.getLogger("fastcontact")

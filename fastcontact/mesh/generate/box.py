@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.elements import Element
 from fastcontact.mesh.generate._check import affordable, count, each, number, one_of, positive
 from fastcontact.mesh.generate.blocks import block as rectangle

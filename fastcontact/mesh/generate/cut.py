@@ -8,10 +8,10 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.companion_groups import OPPOSITE
 from fastcontact.mesh.mesh import Mesh, starts_of
 

@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import AnyArray, Array
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.generate.quadratic import ON_CURVE, Circle, Curve, all_on, facets_of
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
@@ -103,8 +103,8 @@ def refined(mesh: Mesh, curves: Iterable[Curve] = ()) -> Mesh:
     """
     new = _new_points(mesh)
     points = np.concatenate([mesh.points, np.empty((len(new.keys), mesh.dim))])
-    for name, point, cells, rows in new.sources:
-        points[rows] = np.einsum("n,cnd->cd", _pattern(name).shape[point], mesh.points[mesh.cells[name][cells]])
+    for name, point, parents, rows in new.sources:
+        points[rows] = np.einsum("n,cnd->cd", _pattern(name).shape[point], mesh.points[mesh.cells[name][parents]])
     for curve in curves:
         rows = _on_curve(mesh, curve, new.keys)
         points[rows] = curve.project(points[rows])
@@ -138,7 +138,7 @@ def _new_points(mesh: Mesh) -> _NewPoints:
         for point in range(block.shape[1], len(pattern.shape)):
             edge = pattern.on_edge[point]
             if edge >= 0:
-                codes.append(_keys(*ends[:, edge].T, int(pattern.along[point]), mesh.n_points))
+                codes.append(_keys(ends[:, edge, 0], ends[:, edge, 1], int(pattern.along[point]), mesh.n_points))
             else:  # each cell has its own
                 codes.append(inside + np.arange(len(block)))
                 inside += len(block)

@@ -9,10 +9,10 @@ from numpy.typing import ArrayLike
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.generate._check import number, one_of
 from fastcontact.mesh.mesh import Mesh, starts_of
 

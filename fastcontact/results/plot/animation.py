@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
+from fastcontact._tools.paths import checked_target, replacing
 from fastcontact.arrays import Array
 from fastcontact.errors import FastcontactError
-from fastcontact.mesh.argument_types import typed
-from fastcontact.mesh.files.paths import checked_target, replacing
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.plot._axes import UNKNOWN, Units, new_axes, settled, size_around
 from fastcontact.results.plot.fields import field_of

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import AnyArray, Array
 from fastcontact.elasticity.recovery import von_mises
 from fastcontact.errors import FastcontactError
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.plot._axes import UNKNOWN, Units, contacts_of, new_axes
 from fastcontact.results.step import StepResult

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.errors import FastcontactError, check_known
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets
 from fastcontact.results.plot._axes import UNKNOWN, Panels, Units, new_panels

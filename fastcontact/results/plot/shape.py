@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array
 from fastcontact.errors import FastcontactError
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.plot._axes import (
     UNKNOWN,

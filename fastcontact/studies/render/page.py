@@ -7,8 +7,8 @@ import html
 from collections.abc import Sequence
 from typing import Any
 
+from fastcontact._tools.html_table import html_table
 from fastcontact.cases.summary import versions
-from fastcontact.mesh.html_table import html_table
 from fastcontact.results.plot._axes import png
 
 STYLE = """

@@ -194,9 +194,8 @@ def kind_of(annotation: Any) -> Kind:
         return _series(kind, members)
     if kind in (abc.Mapping, dict):
         return _mapping(members)
-    name = {str: "string", os.PathLike: "path", abc.Callable: "function"}.get(kind) or getattr(
-        kind, "__name__", str(kind)
-    )
+    known = {str: "string", os.PathLike: "path", abc.Callable: "function"}
+    name = str(known.get(kind) or getattr(kind, "__name__", kind))
     return Kind(_test(annotation, kind, members), f"{'an' if name[0] in 'AEIOU' else 'a'} {name}")
 
 
