@@ -231,7 +231,7 @@ def _series(kind: Any, members: tuple[Any, ...]) -> Kind:
         count = {2: "two", 3: "three"}.get(len(members), str(len(members)))
         phrase = f"{count} numbers" if {*members} <= {int, float} else f"a sequence of {count}"
         return Kind(lambda value: _is_series(value) and hasattr(value, "__len__") and len(value) == len(kinds)
-                    and all(own.fits(member) for own, member in zip(kinds, value)), phrase)  # fmt: skip
+                    and all(member_kind.fits(member) for member_kind, member in zip(kinds, value)), phrase)  # fmt: skip
 
     def fits(value: Any) -> bool:
         if not kinds or not isinstance(value, list | tuple | set | frozenset | np.ndarray):

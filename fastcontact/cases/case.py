@@ -304,11 +304,11 @@ def _ramp(data: dict[str, Any]) -> Ramp:
 
 def _probes(mesh: Mesh, data: dict[str, Any]) -> dict[str, int]:
     check_keys("probes", data, dict.fromkeys(data, str))
-    found = {}
+    points_of_probes = {}
     for name, group in data.items():
         with at(f"probes.{name}"):
-            found[name] = mesh.point(group)
-    return found
+            points_of_probes[name] = mesh.point(group)
+    return points_of_probes
 
 
 def _theories(

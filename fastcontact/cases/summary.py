@@ -241,8 +241,8 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
         rows.append(_regularised_line(summary["regularised"], unit))
     for name, theory in summary["theory"].items():
         rows += _theory_lines(name, theory)
-    for found_here in summary["sensitivities"]:
-        rows += _sensitivity_lines(found_here)
+    for entry in summary["sensitivities"]:
+        rows += _sensitivity_lines(entry)
     if "modes" in summary:
         rows += _mode_lines(summary["modes"])
     for check in summary["checks"]:
@@ -257,14 +257,14 @@ def _mode_lines(table: Mapping[str, Any]) -> list[str]:
         table.get("nodal_diameters", [None] * len(frequencies)),
         table.get("twins", range(len(frequencies))),
     )
-    found = []
+    rows = []
     for d in dict.fromkeys(diameters):
-        own = [k for k, other in enumerate(diameters) if other == d and k <= twins[k]]
-        shown = ", ".join(f"{frequencies[k]:.6g}" for k in own)
-        pairs = ", each of two modes" if any(twins[k] > k for k in own) else ""
+        modes = [k for k, other in enumerate(diameters) if other == d and k <= twins[k]]
+        shown = ", ".join(f"{frequencies[k]:.6g}" for k in modes)
+        pairs = ", each of two modes" if any(twins[k] > k for k in modes) else ""
         where = "" if d is None else f", {count(d, 'nodal diameter')}{pairs}"
-        found.append(f"  frequencies about the last step{where}: {shown}")
-    return found
+        rows.append(f"  frequencies about the last step{where}: {shown}")
+    return rows
 
 
 def count(number: int, noun: str) -> str:

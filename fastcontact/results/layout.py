@@ -259,17 +259,17 @@ def check_step(mesh: Mesh, step: StepResult, cell_fields: Iterable[str]) -> None
             continue
         if np.ma.isMaskedArray(field):
             raise FileError(f"step {step.index}: {name} is a masked array, and files keep no masks: fill it first")
-        found = np.shape(field)
-        if found != shape:
-            raise FileError(f"step {step.index}: {name} has shape {found}, but the mesh of the file needs {shape}")
+        given = np.shape(field)
+        if given != shape:
+            raise FileError(f"step {step.index}: {name} has shape {given}, but the mesh of the file needs {shape}")
     for name, contact in step.contact.items():
         check_contact(f"step {step.index}, contact '{name}'", contact, mesh)
     count = sum(map(len, mesh.solids.values()))
     for name in cell_fields:
-        found = np.shape(step.cell_fields.get(name, ()))
-        if found != (count,):
+        given = np.shape(step.cell_fields.get(name, ()))
+        if given != (count,):
             raise FileError(
-                f"step {step.index}: the cell field '{name}' that was announced has shape {found}, but ({count},) is "
+                f"step {step.index}: the cell field '{name}' that was announced has shape {given}, but ({count},) is "
                 "needed, a number for each solid cell"
             )
 

@@ -371,12 +371,12 @@ class Results(Sequence[StepResult]):
         if not formulations:
             return {}
         pairs = {_read_json(pair["name"], self._raw): pair for pair in self._file["fastcontact/contact"].values()}
-        found = {name: _read_contact(pairs[name], number, name, kind) for name, kind in formulations.items()}
-        for name, contact in found.items():
+        contacts = {name: _read_contact(pairs[name], number, name, kind) for name, kind in formulations.items()}
+        for name, contact in contacts.items():
             if contact.force.shape != (self.mesh.dim,) or contact.points.dtype.kind not in "iu":
                 raise ValueError(f"the contact table of '{name}' is of another kind")
             layout.check_contact(f"step {number}, contact '{name}'", contact, self.mesh)
-        return found
+        return contacts
 
     @contextlib.contextmanager
     def _explained(self) -> Iterator[None]:

@@ -343,7 +343,7 @@ class StepResult:
     @property
     def shown(self) -> dict[str, str]:
         """What reprs and tables tell, as texts: load factor, largest displacement and stress, iterations."""
-        moved, stressed = (float(np.abs(own).max(initial=0.0)) for own in (self.displacement, self.von_mises))
+        moved, stressed = (float(np.abs(field).max(initial=0.0)) for field in (self.displacement, self.von_mises))
         shown = {
             "load factor": f"{self.load_factor:.6g}",
             "largest displacement": with_unit(f"{moved:.6g}", self.units, "length"),

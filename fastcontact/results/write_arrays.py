@@ -299,15 +299,15 @@ def _append_contact(pair: Any, number: int, contact: ContactResult | None) -> No
     _set_row(pair["steps"], number, row)
 
 
-def _append_sides(own: Any, mesh: Mesh, number: int, sides: MaterialStress) -> None:
+def _append_sides(parent: Any, mesh: Mesh, number: int, sides: MaterialStress) -> None:
     """Append the stress of each side where materials meet; the tables are made with the first one."""
-    if "materials" not in own:
-        group = own.create_group(None)  # without a name until it is whole: the program may be interrupted
+    if "materials" not in parent:
+        group = parent.create_group(None)  # without a name until it is whole: the program may be interrupted
         _packed(group, "cells", np.asarray(sides.cells, np.int32))
         growing_table(group, "rows", layout.material_row(mesh.dim))
         growing_table(group, "steps", layout.SIDES_STEP)
-        own["materials"] = group
-    group = own["materials"]
+        parent["materials"] = group
+    group = parent["materials"]
     table = np.zeros(len(sides.points), group["rows"].dtype)
     for name in ("points", "material", "stress"):
         table[name] = getattr(sides, name)

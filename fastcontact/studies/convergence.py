@@ -177,8 +177,8 @@ def gathered(case: Case, jobs: Sequence[Job], results: Sequence[Result], wanted:
         member = Combination(job.marks["element"], job.marks["formulation"])
         by_combination.setdefault(member, []).append((job.marks["level"], result))
     checked = [check.quantity for check in case.checks]
-    own = case.theories.get(settings(case).pair or "", {})
-    theory, share = own.get("theory"), own.get("share", 1.0)
+    theories = case.theories.get(settings(case).pair or "", {})
+    theory, share = theories.get("theory"), theories.get("share", 1.0)
     compared = "at equal approach" if settings(case).pair in case.approach else "under the given load"
     series, failed = [], {}
     for member, runs in by_combination.items():

@@ -73,7 +73,7 @@ def run_all(
     Raises CaseError if the number of workers is wrong, FastcontactError if no worker process can start.
     """
     kept = None if store is None else Store(store)
-    results = {i: found for i, job in enumerate(jobs) if kept and (found := kept.get(job)) is not None}
+    results = {i: stored_result for i, job in enumerate(jobs) if kept and (stored_result := kept.get(job)) is not None}
     waiting = {index: job.label for index, job in enumerate(jobs)}
 
     def ended(index: int, stored: bool = False) -> None:

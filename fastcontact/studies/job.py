@@ -109,10 +109,10 @@ class Job(Run):
         data = {key: value for key, value in self.data.items() if key not in ("title", "units", "check")}
         whole = {"version": __version__, "schema": SCHEMA, "data": data, "pair": self.pair, "recipe": self.recipe}
         whole["files"] = digest(files_named({key: data[key] for key in data if key != "mesh"}, self.folder))
-        found = hashlib.sha256(json.dumps(whole, sort_keys=True, default=str).encode())
+        hashed = hashlib.sha256(json.dumps(whole, sort_keys=True, default=str).encode())
         if self.base is not None:
-            found.update(_fingerprint(self.base))
-        return found.hexdigest()[:32]
+            hashed.update(_fingerprint(self.base))
+        return hashed.hexdigest()[:32]
 
     def solved(self) -> tuple[Case, list[StepResult]]:
         """See `Run`."""

@@ -102,12 +102,12 @@ def _default_element(generator: str) -> Any:
 
 
 def _not_makeable(settings: Settings, element: str) -> str:
-    own = settings.own.element or "mixed cells"
+    present = settings.own.element or "mixed cells"
     if settings.by_shape:
         shape = shape_of(element) or "triangles"
         return f"there are no meshes of {element} in this study: give the arguments of level 0 in [study.{shape}]"
     return (
-        f"meshes of {element} cannot be made from the case's {own}: give a generator and its arguments of level 0 in "
+        f"meshes of {element} cannot be made from the case's {present}: give a generator and its arguments of level 0 in "
         "[study], or choose an element on the same corners"
     )
 

@@ -90,19 +90,19 @@ def settings(case: Case, data: dict[str, Any] | None = None) -> Settings:
     """Return the settings of a case's studies, checked; `data` replaces the parsed case file, e.g. with other values."""
     data = data_of(case) if data is None else data
     study = data.get("study", {})
-    pair = study.get("contact") or next((own.name for own in case.model.contact), None)
+    pair = study.get("contact") or next((combination.name for combination in case.model.contact), None)
     formulations = {pair.name: pair.formulation for pair in case.model.contact}
     if pair is not None:
         check_known("contact pair in study.contact", pair, formulations, CaseError)
     solids = list(case.mesh.solids)
-    own = Combination(solids[0] if len(solids) == 1 else None, formulations.get(pair or ""))
+    combination = Combination(solids[0] if len(solids) == 1 else None, formulations.get(pair or ""))
     generator, arguments = _generator(data, study)
     for name in study.get("options", {}):
         check_known("formulation in study.options", name, FORMULATIONS, CaseError)
     curves = tuple(_circle(i, entry) for i, entry in enumerate(study.get("curves", ())))
     return Settings(
         data=data,
-        own=own,
+        combination=combination,
         pair=pair,
         formulations=formulations,
         generator=generator,
@@ -113,7 +113,7 @@ def settings(case: Case, data: dict[str, Any] | None = None) -> Settings:
         load_steps=study.get("load_steps"),
         options=study.get("options", {}),
         quantities=tuple(study.get("quantities", ())),
-        combinations=tuple(_combination(entry) for entry in study.get("combinations", ())) or (own,),
+        combinations=tuple(_combination(entry) for entry in study.get("combinations", ())) or (combination,),
     )
 
 
@@ -193,8 +193,8 @@ def makeable(settings: Settings, element: str) -> bool:
     """Whether meshes of this element can be made for the case."""
     if settings.by_shape:
         return shape_of(element) in settings.arguments
-    own = settings.own.element
-    return elements.get(own).linear == elements.get(element).linear if own else settings.generator is not None
+    present = settings.own.element
+    return elements.get(present).linear == elements.get(element).linear if present else settings.generator is not None
 
 
 def shape_of(element: str) -> str:

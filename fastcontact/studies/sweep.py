@@ -182,7 +182,7 @@ def _theory_curves(case: Case, parameters: Mapping[str, Sequence[Value]], pair: 
     data = data_of(case)
     linked = data.get("study", {}).get("parameters", {})
     curves = []
-    for choice in itertools.product(*(own for _, own in others)):
+    for choice in itertools.product(*(values_of_other for _, values_of_other in others)):
         rest = dict(zip((name for name, _ in others), choice, strict=True))
         rows = [_theory_at(data, {first: float(value), **rest}, linked, pair) for value in x]
         known = [name for name in rows[0] if all(name in row for row in rows)]

@@ -86,7 +86,7 @@ class Assembled:
     @cached_property
     def of_solids(self) -> set[int]:
         """The points of all solids."""
-        return {point for own in self.solids for point in own.points}
+        return {point for solid in self.solids for point in solid.points}
 
     @cached_property
     def discrete(self) -> list[Element]:
@@ -133,7 +133,7 @@ class Assembled:
             if label in self.open:
                 raise location.refuse(f"set '{part.set_names[name]}' contains itself")
             self.open.append(label)
-            members = [own for entry in sets[name] for own in self._entry(kind, scope, entry)]
+            members = [member for entry in sets[name] for member in self._entry(kind, scope, entry)]
             self.open.pop()
             self.resolved[label] = list(dict.fromkeys(members)) if len(sets[name]) > 1 or len(members) > 1 else members
         return self.resolved[label]
@@ -159,8 +159,8 @@ class Assembled:
     def _all_existing(self, kind: str, scope: str, entry: Members) -> Iterator[Any]:
         there = self._there(kind, scope)
         for number in entry.numbers:
-            found = there.get(number)
-            yield self._existing(kind, scope, number, entry.place_of(number)) if found is None else found
+            item = there.get(number)
+            yield self._existing(kind, scope, number, entry.place_of(number)) if item is None else item
 
     def _named(self, kind: str, scope: str, entry: Members) -> Iterable[Any]:
         if not scope and any(entry.name.upper().startswith(name) for name in self.content.instances):

@@ -95,8 +95,8 @@ class Building:
             add(self.model)
         self._contact()
         self.gap_ends: dict[str, dict[int, int]] = {}
-        for own in gaps:
-            self.gap_ends.update(add_gap(self.model, self.found, own, conditions))
+        for gap in gaps:
+            self.gap_ends.update(add_gap(self.model, self.found, gap, conditions))
         self.ramp = self._ramp(conditions)
 
     def _mechanics(self, conditions: Conditions, groups: list[tuple[str, Table]]) -> None:

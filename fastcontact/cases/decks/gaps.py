@@ -51,7 +51,7 @@ class GapGroup:
 
 def check_discrete(made: Assembled, kind: str, given: Mapping[str, Any], needed: str) -> None:
     """Refuse springs and gap elements without properties."""
-    with_one = {own for name, entry in given.items() for own in made.elements_of(name, entry[0])}
+    with_one = {element for name, entry in given.items() for element in made.elements_of(name, entry[0])}
     for element in made.discrete:
         if element.cell.type == kind and element not in with_one:
             raise element.cell.location.refuse(f"element {element.number} of type {kind} has no {needed}")
@@ -62,11 +62,11 @@ def gap_groups(found: DeckMesh) -> list[GapGroup]:
     made, groups = found.made, []
     check_discrete(made, "GAPUNI", made.content.gaps, "*GAP")
     for name, (location, clearance, vector) in made.content.gaps.items():
-        own = made.elements_of(name, location)
-        if any(element.cell.type != "GAPUNI" for element in own):
+        gap_elements = made.elements_of(name, location)
+        if any(element.cell.type != "GAPUNI" for element in gap_elements):
             raise location.refuse("acts on elements of type GAPUNI only")
         shown = made.content.root.set_names.get(name, name)
-        ends = np.array([element.points for element in own], np.intp)
+        ends = np.array([element.points for element in gap_elements], np.intp)
         bodies = all(point in made.of_solids for point in ends[:, 1].tolist())
         groups.append(
             GapGroup(

@@ -97,24 +97,24 @@ def element_set(content: Content, part: Part, block: Block) -> None:
 def _members(block: Block) -> list[Members]:
     """Return the entries of a set."""
     instance = folded(block.get("INSTANCE"))
-    found = []
+    entries = []
     for row in block.each():
         if "GENERATE" in block.parameters:
             first, last, increment = row.whole(0), row.whole(1), row.whole(2, 1)
             if increment < 1 or last < first:
                 raise row.location.refuse(f"the range {first} to {last} by {increment} is empty: it must ascend")
-            found.append(Members(row.location, range(first, last + 1, increment), instance=instance))
+            entries.append(Members(row.location, range(first, last + 1, increment), instance=instance))
             continue
         for numbers, group in groupby(row.entries, lambda entry: entry.isdecimal() and len(entry) < 19):
             if numbers:
                 members = array("q", map(int, group))
-                if found and isinstance(found[-1].numbers, array) and len(found[-1].numbers):
-                    found[-1].add(members, row.location.line)  # one entry for the lines that follow each other
+                if entries and isinstance(entries[-1].numbers, array) and len(entries[-1].numbers):
+                    entries[-1].add(members, row.location.line)  # one entry for the lines that follow each other
                 else:
-                    found.append(Members(row.location, members, instance=instance))
+                    entries.append(Members(row.location, members, instance=instance))
             else:
-                found += [Members(row.location, name=entry, instance=instance) for entry in group if entry]
-    return found
+                entries += [Members(row.location, name=entry, instance=instance) for entry in group if entry]
+    return entries
 
 
 def surface(content: Content, part: Part, block: Block) -> None:

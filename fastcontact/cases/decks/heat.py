@@ -234,27 +234,27 @@ class HeatConditions:
             if label != letter:
                 raise row.location.refuse(f"{label[:40]} on a surface is not supported, only {letter}")
             return [Exchange(keyword, face, (), coefficient) for face in self.made.faces(row.text(0), row.location)]
-        own = self.made.elements_of(row.text(0), row.location)
+        elements = self.made.elements_of(row.text(0), row.location)
         if label[:1] == letter and label[1:].isdigit():
-            faces = [(element, self.made.facet(element, int(label[1:]), row.location)) for element in own]
+            faces = [(element, self.made.facet(element, int(label[1:]), row.location)) for element in elements]
             return [Exchange(keyword, face, (), coefficient) for face in faces]
         if label == "BF" and keyword == "DFLUX":
-            return [Exchange(keyword, None, tuple(own))]
+            return [Exchange(keyword, None, tuple(elements))]
         known = f"{letter}1, {letter}2, ..." + (", BF" if keyword == "DFLUX" else "")
         raise row.location.refuse(f"{label[:40]} is not supported; known are {known}")
 
     def advance(self, number: int, step: Step) -> None:
         """Go on to the end of step `number`, from 1."""
-        for history, what in ((self.temperatures, "a temperature"), (self.films, "a film")):
+        for history, noun in ((self.temperatures, "a temperature"), (self.films, "a film")):
             given: Histories[Any] = history  # type: ignore[assignment]
             for name, (_, _, location) in given.changing.items():
                 if self.begun and name not in given.tracks:
                     raise location.refuse(
-                        f"{what} that comes in a later step is not supported: give it from the first one on"
+                        f"{noun} that comes in a later step is not supported: give it from the first one on"
                     )
             for name in given.dying:
                 raise step.location.refuse(
-                    f"{what} of line {given.tracks[name].location.line} that is let go is not supported"
+                    f"{noun} of line {given.tracks[name].location.line} that is let go is not supported"
                 )
         for other in self.histories:
             other.advance(number, step)

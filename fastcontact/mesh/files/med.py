@@ -328,7 +328,7 @@ def read_point_field(path: PathLike, field: str) -> tuple[Array, Array, Array | 
         instants.sort(key=_order)
         count, points = int(attribute(group, "NCO")), None if mesh is None else _read_points(_first_step(mesh), mesh)
         profiles = [profile for entry in instants for profile in entry["NOE"].values()]
-        n_points = max(values(own, "CO").size // count for own in profiles) if points is None else len(points)
+        n_points = max(values(profile, "CO").size // count for profile in profiles) if points is None else len(points)
         check_size(f"field '{field}' of '{path}'", (len(instants), n_points, count), file)
         parts = [_read_instant(file, entry["NOE"], n_points, count) for entry in instants]
         return np.array([attribute(entry, "PDT") for entry in instants], np.float64), np.stack(parts), points

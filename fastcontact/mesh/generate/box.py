@@ -72,11 +72,11 @@ def box(
     block, lattice = _solids(solid, shape)
     facets, sides = _sides(solid, block, lattice, STEPS * shape)
     cells, groups, first = {element: block}, {name: np.arange(len(block))}, len(block)
-    for kind, found in facets.items():
-        cells[kind] = found
+    for kind, outer in facets.items():
+        cells[kind] = outer
         for side, rows in sides[kind].items():
             groups[side] = np.concatenate([groups.get(side, rows[:0]), first + rows])
-        first += len(found)
+        first += len(outer)
     return Mesh(corner + lattice / (STEPS * shape) * lengths, cells, groups)
 
 
@@ -105,12 +105,12 @@ def _sides(
         on = lattice[:, axis] == (last[axis] if end == "MAX" else 0)
         for local, kind in zip(solid.facets, solid.facet_elements, strict=True):
             nodes = block[:, local]
-            found = nodes[on[nodes].all(axis=1)]
-            if len(found):
+            on_side = nodes[on[nodes].all(axis=1)]
+            if len(on_side):
                 start = sum(map(len, facets.setdefault(kind, [])))
-                facets[kind].append(found)
+                facets[kind].append(on_side)
                 rows, side = sides.setdefault(kind, {}), f"{AXES[axis].upper()}{end}"
-                rows[side] = np.concatenate([rows.get(side, found[:0, 0]), start + np.arange(len(found))])
+                rows[side] = np.concatenate([rows.get(side, on_side[:0, 0]), start + np.arange(len(on_side))])
     return {kind: np.concatenate(parts) for kind, parts in facets.items()}, sides
 
 

@@ -170,10 +170,10 @@ def _arrows(ax: Any, flat: Array, vectors: Array, size: Array) -> None:
 
 def _carrying(contact: ContactResult, blocks: dict[str, Indices]) -> Mask:
     """Return which nodes (m,) are closed, or have a facet with pressure."""
-    found = contact.active.copy()
+    carrying = contact.active.copy()
     for facets in blocks.values():
-        found[facets[(contact.pressure[facets] != 0.0).any(axis=1)]] = True
-    return found
+        carrying[facets[(contact.pressure[facets] != 0.0).any(axis=1)]] = True
+    return carrying
 
 
 def _limit(ax: Any, flat: Array, closed: Mask) -> float:
