@@ -12,7 +12,7 @@ from fastcontact.analytic.manufactured import HertzBox
 from fastcontact.analytic.pressure_curve import pressure_curve
 from fastcontact.arrays import Array, Numbers
 from fastcontact.cases.case import Case
-from fastcontact.cases.checks import OF_PROBES, ONLY_IN_SPACE, STRESS, at_point
+from fastcontact.cases.checks import OF_PROBES, ONLY_IN_SPACE
 from fastcontact.contact.integration import facet_measure
 from fastcontact.contact.surface import Surface, surface
 from fastcontact.errors import CaseError, check_known
@@ -44,17 +44,22 @@ def measure(case: Case, last: StepResult, pair: str | None) -> dict[str, float]:
     values_measured["von_mises_max"], where = peak(case.mesh, last.von_mises, case.model.kinematics == "axisymmetric")
     if pair is not None:
         values_measured["von_mises_depth"] = _depth(case, pair, where)
-    for name, point in case.probes.items():
-        values_measured |= _of_probe(name, point, last)
+    for probe, point in case.probes.items():
+        of_probe = {f"{probe}.{kind}": OF_PROBES[kind][1](last, point) for kind in _kinds(case)}
+        values_measured |= {k: float(v) for k, v in of_probe.items() if v is not None and np.isfinite(v)}
     return values_measured
 
 
 def check_names(case: Case, names: Iterable[str]) -> None:
     """Raise CaseError for the name of a quantity that no run of the case can have, see `measure`."""
-    kinds = [kind for kind in OF_PROBES if kind != "shear" and (case.mesh.dim == 3 or kind not in ONLY_IN_SPACE)]
-    of_probes = [f"{probe}.{kind}" for probe in case.probes for kind in kinds]
+    of_probes = [f"{probe}.{kind}" for probe in case.probes for kind in _kinds(case)]
     for name in names:
         check_known("quantity", name, [*LABELS, *of_probes], CaseError)
+
+
+def _kinds(case: Case) -> list[str]:
+    """Return the quantities that every probe of a case has."""
+    return [kind for kind in OF_PROBES if kind != "shear" and (case.mesh.dim == 3 or kind not in ONLY_IN_SPACE)]
 
 
 def of_contacts(last: StepResult) -> dict[str, float]:
@@ -207,18 +212,6 @@ def _depth(case: Case, pair: str, where: Array) -> float:
     sides = next((p.secondary, *filter(None, [p.primary])) for p in case.model.contact if p.name == pair)
     nodes = np.concatenate([case.mesh.points[case.mesh.points_of(side)] for side in sides])
     return float(np.linalg.norm(nodes - where, axis=1).min())
-
-
-def _of_probe(name: str, point: int, last: StepResult) -> dict[str, float]:
-    quantities = {f"{name}.von_mises": float(last.von_mises[point])}
-    for component, value in zip(STRESS, last.stress[point], strict=False):
-        quantities[f"{name}.stress.{component}"] = float(value)
-    for axis, value in zip("xyz", last.displacement[point], strict=False):
-        quantities[f"{name}.displacement.{axis}"] = float(value)
-    if at := at_point(last, point):
-        contact, row = at
-        quantities[f"{name}.pressure"] = float(contact.pressure[row])
-    return quantities
 
 
 def mesh_size(case: Case, pair: str | None) -> float:

@@ -102,7 +102,7 @@ def settings(case: Case, data: dict[str, Any] | None = None) -> Settings:
     curves = tuple(_circle(i, entry) for i, entry in enumerate(study.get("curves", ())))
     return Settings(
         data=data,
-        combination=combination,
+        own=combination,
         pair=pair,
         formulations=formulations,
         generator=generator,
