@@ -6,7 +6,7 @@ import difflib
 import os
 import sys
 import warnings
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -103,6 +103,21 @@ def no_attribute(module: str, name: str, known: Iterable[str]) -> AttributeError
         return AttributeError(text)
     near = difflib.get_close_matches(name.casefold(), known, n=3, cutoff=0.5)
     return AttributeError(text + (": did you mean " + " or ".join(map(repr, near)) + "?" if near else ""))
+
+
+def names_of(module: str, known: list[str]) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
+    """Return ``__getattr__`` and ``__dir__`` of a module with some public names."""
+
+    def missing(name: str) -> object:
+        raise no_attribute(module, name, known)
+
+    return missing, lambda: known
+
+
+def check_known(kind: str, name: object, known: Collection[str], error: type[FastcontactError]) -> None:
+    """Raise `error` for a name that is not among the `known` ones, with the nearest of them."""
+    if name not in known:
+        raise error(unknown(kind, str(name), known))
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> str:

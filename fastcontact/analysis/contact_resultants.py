@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastcontact._tools.argument_types import typed
+from fastcontact._tools.html_table import fields_table
 from fastcontact.analysis.wear import worn_in_step
 from fastcontact.arrays import Array
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.integration import lumped_areas
 from fastcontact.errors import ContactError, unknown
-from fastcontact.mesh.argument_types import typed
-from fastcontact.mesh.html_table import fields_table
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.errors import ModelError
-from fastcontact.mesh.argument_types import typed
 
 # Criteria beyond this are none: a state that misses them has nothing to do with the solution.
 LOOSEST = 1e-2

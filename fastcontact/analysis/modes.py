@@ -9,6 +9,7 @@ import numpy as np
 from scipy.sparse import bsr_array
 
 from fastcontact._jit import parallel
+from fastcontact._tools.argument_types import typed
 from fastcontact.analysis.modal.cyclic import Sectors, Wave, pairs_of, without_ends
 from fastcontact.analysis.modal.eigenpairs import lowest
 from fastcontact.analysis.modal.held_contact import Conditions, held_contact, joined
@@ -28,7 +29,6 @@ from fastcontact.elasticity.springs import stiffened
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.errors import ModelError, warn
 from fastcontact.linear import choice
-from fastcontact.mesh.argument_types import typed
 from fastcontact.model.model import Model
 from fastcontact.results.step import StepResult
 

@@ -8,6 +8,7 @@ from functools import partial
 from typing import Any
 
 from fastcontact._jit import ahead
+from fastcontact._tools.argument_types import typed
 from fastcontact.analysis import restart, step_halving
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.problem import Problem, prepare
@@ -16,7 +17,6 @@ from fastcontact.analysis.result_warnings import result_warnings
 from fastcontact.analysis.stages import go_on, stage_of
 from fastcontact.errors import ModelError, warn
 from fastcontact.linear.choice import DIRECT_UP_TO, check_tolerance
-from fastcontact.mesh.argument_types import typed
 from fastcontact.model.model import Model
 from fastcontact.model.model_warnings import model_warnings
 from fastcontact.model.ramp import Ramp, RampLike, ramp_of

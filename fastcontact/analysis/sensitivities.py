@@ -15,6 +15,8 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact._jit import parallel
+from fastcontact._tools.argument_types import typed
+from fastcontact._tools.html_table import fields_table
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.sensitivity.adjoint import Adjoint, Change, Gradient
 from fastcontact.analysis.sensitivity.moving_contact import REMEDY, MovingContact
@@ -23,8 +25,6 @@ from fastcontact.analysis.sensitivity.quantities import check_quantity, with_gra
 from fastcontact.analysis.sensitivity.settled_step import checked_margin, settled_step
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
-from fastcontact.mesh.argument_types import typed
-from fastcontact.mesh.html_table import fields_table
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import RampLike, ramp_of
 from fastcontact.results.step import StepResult

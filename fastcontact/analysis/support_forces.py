@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 from scipy.sparse.linalg import lsqr
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Mask
 from fastcontact.elasticity.springs import ground_force
 from fastcontact.errors import ModelError
-from fastcontact.mesh.argument_types import typed
 from fastcontact.model.model import Model
 from fastcontact.results.step import StepResult
 

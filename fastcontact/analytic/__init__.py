@@ -50,7 +50,7 @@ from fastcontact.analytic.punches import (
     spence_stick_ratio,
 )
 from fastcontact.analytic.receding import RecedingLayer, receding_layer
-from fastcontact.errors import no_attribute
+from fastcontact.errors import names_of
 
 THEORIES: dict[str, Callable[..., Any]] = {
     factory.__name__: factory
@@ -73,10 +73,4 @@ __all__ = [
 
 
 if not TYPE_CHECKING:  # to whom all names are known
-
-    def __getattr__(name: str) -> object:
-        raise no_attribute("fastcontact.analytic", name, __all__)
-
-
-def __dir__() -> list[str]:
-    return __all__
+    __getattr__, __dir__ = names_of("fastcontact.analytic", __all__)

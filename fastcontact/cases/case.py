@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fastcontact import analytic
+from fastcontact._tools import toml_text
+from fastcontact._tools.paths import existing_file, is_stream
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.cases.checks import CHECK, Check, read_check
 from fastcontact.cases.input_files import files_named
@@ -17,9 +19,7 @@ from fastcontact.cases.shipped import case_path, shipped_cases
 from fastcontact.errors import CaseError, in_file, unknown
 from fastcontact.linear.choice import check_tolerance
 from fastcontact.mesh import generate
-from fastcontact.mesh.files import toml_text
 from fastcontact.mesh.files.mesh_files import read_mesh
-from fastcontact.mesh.files.paths import existing_file, is_stream
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, linear_ramp
@@ -75,10 +75,10 @@ class Case:
     mesh: Mesh
     model: Model
     ramp: Ramp
-    criteria: Criteria
-    linear_solver: str
-    linear_tolerance: float
-    probes: dict[str, int]
+    criteria: Criteria = field(default_factory=Criteria)
+    linear_solver: str = "auto"
+    linear_tolerance: float = 1e-10
+    probes: dict[str, int] = field(default_factory=dict)
     theories: dict[str, dict[str, Any]] = field(default_factory=dict)
     checks: list[Check] = field(default_factory=list)
     units: dict[str, str] = field(default_factory=dict)
@@ -129,9 +129,6 @@ def _case_of_deck(path: Path) -> Case:
         model=deck.model,
         ramp=deck.ramp,
         criteria=deck.criteria,
-        linear_solver="auto",
-        linear_tolerance=1e-10,
-        probes={},
         units=known_units({}),
         folder=path.parent.resolve(),
         modes=deck.modes,
@@ -307,11 +304,11 @@ def _ramp(data: dict[str, Any]) -> Ramp:
 
 def _probes(mesh: Mesh, data: dict[str, Any]) -> dict[str, int]:
     check_keys("probes", data, dict.fromkeys(data, str))
-    found = {}
+    points_of_probes = {}
     for name, group in data.items():
         with at(f"probes.{name}"):
-            found[name] = mesh.point(group)
-    return found
+            points_of_probes[name] = mesh.point(group)
+    return points_of_probes
 
 
 def _theories(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any
@@ -12,7 +12,7 @@ import numpy as np
 
 from fastcontact.analysis.contact_resultants import contact_moment
 from fastcontact.cases.keys import NUMBER
-from fastcontact.errors import CaseError, unknown
+from fastcontact.errors import CaseError, check_known, unknown
 from fastcontact.results.step import ContactResult, StepResult
 
 STRESS = {"xx": 0, "yy": 1, "zz": 2, "xy": 3, "yz": 4, "xz": 5}
@@ -22,13 +22,6 @@ CHECK: dict[str, Any] = {
     **dict.fromkeys(("name", "quantity", "theory", "of", "source"), str),
     **dict.fromkeys(("value", "factor", "tolerance"), NUMBER),
 }
-# Quantities of a contact pair, and of a probe.
-LENGTHS = ("radius", "stick_radius", "displacement", "wear_max")
-MOMENTS = ("moment", "torque")
-OF_PAIRS = (
-    *("force", "pressure_max", "radius", "stick_radius", "torque", "wear_max", "heat"),
-    *(f"{kind}.{axis}" for kind in ("force", "moment") for axis in _AXES),
-)
 ONLY_IN_SPACE = ("stress.yz", "stress.xz", "displacement.z", "force.z", "moment.x", "moment.y")
 # Quantities of a pair that has an option, and what to do without.
 NEEDED = {
@@ -36,14 +29,57 @@ NEEDED = {
     "heat": ("conductance", "only a contact with the option 'conductance' passes any"),
     "wear_max": ("wear", "only a contact with the option 'wear' has one"),
 }
-OF_PROBES = (
-    "pressure",
-    "shear",
-    "von_mises",
-    "temperature",
-    *(f"stress.{c}" for c in STRESS),
-    *(f"displacement.{a}" for a in _AXES),
-)
+
+
+def at_point(step: StepResult, point: int) -> tuple[ContactResult, int] | None:
+    """Return the contact whose secondary side has a point, the last one of several, and its row there."""
+    contact_row = None
+    for contact in step.contact.values():
+        rows = np.flatnonzero(contact.points == point)
+        if len(rows):
+            contact_row = contact, int(rows[0])
+    return contact_row
+
+
+def _middle(bracket: tuple[float, float]) -> float:
+    """Return the middle of a bracket of a radius, or its lower end where the other is not known."""
+    inside, outside = bracket
+    return 0.5 * (inside + outside) if math.isfinite(outside) else inside
+
+
+def _at_surface(field: str) -> Callable[[StepResult, int], float]:
+    """Return what gives the size of a field of the contact surface at a point; NaN elsewhere."""
+
+    def value(step: StepResult, point: int) -> float:
+        contact, row = at_point(step, point) or (None, 0)
+        return math.nan if contact is None else float(np.linalg.norm(getattr(contact, field)[row]))
+
+    return value
+
+
+# Quantities of a contact pair: the kind of their unit, and what gives them at a step, from the pair; None for none.
+OF_PAIRS: dict[str, tuple[str, Callable[[ContactResult], Any]]] = {
+    "force": ("force", lambda contact: np.linalg.norm(contact.force)),
+    "pressure_max": ("pressure", lambda contact: contact.pressure_max),
+    "radius": ("length", lambda contact: _middle(contact.radius)),
+    "stick_radius": ("length", lambda contact: _middle(contact.stick_radius)),
+    "torque": ("moment", lambda contact: contact.torque),
+    "wear_max": ("length", lambda contact: None if contact.wear is None else contact.wear.max(initial=0.0)),
+    "heat": ("power", lambda contact: None),  # which the step has
+    **{f"force.{a}": ("force", lambda contact, i=i: contact.force[i]) for a, i in _AXES.items()},
+    **{f"moment.{a}": ("moment", lambda contact, i=i: contact_moment(contact)[i * (len(contact.force) == 3)])
+       for a, i in _AXES.items()},
+}  # fmt: skip
+# The same of a probe, from the step and the point.
+OF_PROBES: dict[str, tuple[str, Callable[[StepResult, int], Any]]] = {
+    "pressure": ("pressure", _at_surface("pressure")),
+    "shear": ("pressure", _at_surface("shear")),
+    "von_mises": ("pressure", lambda step, point: step.von_mises[point]),
+    "temperature": (
+        "temperature", lambda step, point: None if step.temperature is None else step.temperature[point]),
+    **{f"stress.{c}": ("pressure", lambda step, point, i=i: step.stress[point][i]) for c, i in STRESS.items()},
+    **{f"displacement.{a}": ("length", lambda step, point, i=i: step.displacement[point][i]) for a, i in _AXES.items()},
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -84,11 +120,8 @@ class Check:
 
     @property
     def unit(self) -> str:
-        """Kind of the number: ``"pressure"``, ``"force"``, ``"moment"`` or ``"length"``."""
-        field = self.quantity.split(".")[1]
-        if field in MOMENTS:
-            return "moment"
-        return "force" if field == "force" else "length" if field in LENGTHS else "pressure"
+        """Kind of the number: ``"pressure"``, ``"force"``, ``"moment"``, ``"length"``, ``"power"`` or ``"temperature"``."""
+        return {**OF_PROBES, **OF_PAIRS}[self.quantity.partition(".")[2]][0]
 
     def target(self, theory: Any) -> float:
         """Return the number to compare with; `theory` is that of the pair, or None for a documented value."""
@@ -120,8 +153,7 @@ def read_check(
     if ("theory" in entry) == ("value" in entry):
         raise CaseError(f"{where} needs either 'theory', the contact pair whose theory it is, or 'value'")
     owner, _, field = entry["quantity"].partition(".")
-    if owner not in {**probes, **pairs}:
-        raise CaseError(unknown(f"contact pair or probe in {where}.quantity", owner, [*probes, *pairs]))
+    check_known(f"contact pair or probe in {where}.quantity", owner, [*probes, *pairs], CaseError)
     _check_quantity(where, field, OF_PROBES if owner in probes else OF_PAIRS, kinematics)
     if owner in pairs and field in NEEDED and NEEDED[field][0] not in pairs[owner]:
         raise CaseError(f"{where}: '{owner}' has no {field}: {NEEDED[field][1]}")
@@ -147,20 +179,18 @@ def read_check(
     if check.value == 0.0:
         raise CaseError(f"{where}: the value is 0, so no relative deviation can be told; check another quantity")
     if check.theory:
-        if check.theory not in theories:
-            raise CaseError(unknown(f"theory in {where}", check.theory, theories))
+        check_known(f"theory in {where}", check.theory, theories, CaseError)
         check_target(where, check, theories[check.theory]["theory"])
     return check
 
 
-def _check_quantity(where: str, field: str, allowed: Sequence[str], kinematics: str) -> None:
+def _check_quantity(where: str, field: str, allowed: Collection[str], kinematics: str) -> None:
     """Raise CaseError for a quantity that is not there: in the plane along z, but stresses and moments; of circles."""
     if kinematics != "3d":
         allowed = [name for name in allowed if name not in ONLY_IN_SPACE]
     if kinematics == "axisymmetric":  # over the circle no moment is left, and no force along the radius
         allowed = [name for name in allowed if name not in ("moment.z", "force.x")]
-    if field not in allowed:
-        raise CaseError(unknown(f"quantity in {where}", field, allowed))
+    check_known(f"quantity in {where}", field, allowed, CaseError)
 
 
 def _whole(field: str, theory: Mapping[str, Any]) -> float:
@@ -188,53 +218,12 @@ def measured(check: Check, step: StepResult, probes: Mapping[str, int]) -> float
     """Return the number of a step that a check is about; NaN where there is none, such as the radius of no contact."""
     owner, _, field = check.quantity.partition(".")
     if owner in probes:
-        return check.factor * _of_probe(step, probes[owner], field)
-    if field == "heat":
-        return check.factor * float(step.heat.get("contacts", {}).get(owner, math.nan))
-    return check.factor * _of_pair(step.contact[owner], field)
-
-
-def _of_pair(contact: ContactResult, field: str) -> float:
-    kind, _, axis = field.partition(".")
-    if kind == "force":
-        return float(contact.force[_AXES[axis]] if axis else np.linalg.norm(contact.force))
-    if kind == "moment":
-        return float(contact_moment(contact)[_AXES[axis] if len(contact.force) == 3 else 0])
-    if kind == "pressure_max":
-        return contact.pressure_max
-    if kind == "torque":
-        return math.nan if contact.torque is None else contact.torque
-    if kind == "wear_max":
-        return math.nan if contact.wear is None else float(contact.wear.max(initial=0.0))
-    inside, outside = contact.radius if kind == "radius" else contact.stick_radius
-    return 0.5 * (inside + outside) if math.isfinite(outside) else inside
-
-
-def _of_probe(step: StepResult, point: int, field: str) -> float:
-    kind, _, component = field.partition(".")
-    if kind == "stress":
-        return float(step.stress[point][STRESS[component]])
-    if kind == "displacement":
-        return float(step.displacement[point][_AXES[component]])
-    if kind == "von_mises":
-        return float(step.von_mises[point])
-    if kind == "temperature":
-        return math.nan if step.temperature is None else float(step.temperature[point])
-    at_surface = at_point(step, point)
-    if at_surface is None:
-        return float("nan")
-    contact, row = at_surface
-    return float(contact.pressure[row]) if kind == "pressure" else float(np.linalg.norm(contact.shear[row]))
-
-
-def at_point(step: StepResult, point: int) -> tuple[ContactResult, int] | None:
-    """Return the contact whose secondary side has a point, the last one of several, and its row there."""
-    contact_row = None
-    for contact in step.contact.values():
-        rows = np.flatnonzero(contact.points == point)
-        if len(rows):
-            contact_row = contact, int(rows[0])
-    return contact_row
+        value = OF_PROBES[field][1](step, probes[owner])
+    elif field == "heat":
+        value = step.heat.get("contacts", {}).get(owner)
+    else:
+        value = OF_PAIRS[field][1](step.contact[owner])
+    return math.nan if value is None else check.factor * float(value)
 
 
 def evaluated(check: Check, step: StepResult, probes: Mapping[str, int], theories: Mapping[str, Any]) -> dict[str, Any]:

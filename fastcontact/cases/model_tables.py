@@ -12,6 +12,7 @@ from pathlib import Path
 from reprlib import repr
 from typing import Any
 
+from fastcontact._tools.argument_types import types_of
 from fastcontact.cases.keys import AXES, FIELD, NUMBER, ROTATION, SURFACE, at, called, check_keys, tables
 from fastcontact.contact.obstacles import SHAPES, MeshedSurface, Obstacle
 from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
@@ -21,7 +22,6 @@ from fastcontact.elasticity.materials import CONSTANTS, LinearElastic, Material,
 from fastcontact.elasticity.nonlinear_materials import ElasticPlastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
 from fastcontact.elasticity.varying_constants import Tabulated
 from fastcontact.errors import CaseError, unknown
-from fastcontact.mesh.argument_types import types_of
 from fastcontact.mesh.companion_groups import OPPOSITE
 from fastcontact.mesh.files.mesh_fields import read_field
 from fastcontact.mesh.files.mesh_files import read_mesh
@@ -83,6 +83,11 @@ def _material_law(entry: dict[str, Any]) -> type[Material]:
     )
 
 
+def _without_default(function: Callable[..., Any]) -> list[str]:
+    """Return the arguments that a function needs."""
+    return [key for key, given in inspect.signature(function).parameters.items() if given.default is given.empty]
+
+
 def _check_material(where: str, entry: dict[str, Any]) -> None:
     """Raise CaseError for a key that the law of a material does not take."""
     law = _material_law(entry)
@@ -99,23 +104,25 @@ NONLINEAR: dict[str, type[Material]] = {
     "yeoh": Yeoh,
     "ogden": Ogden,
 }
-# What each law is called, and the keys of a case file that it needs.
+# What each law is called.
 _LAWS: dict[type[Material], str] = {
     LinearElastic: "isotropic",
     Orthotropic: "orthotropic (E, nu and G are lists of three)",
     Anisotropic: "anisotropic (D is a matrix)",
     **{law: f"{name} (its law)" for name, law in NONLINEAR.items()},
 }
-_NEEDED: dict[type[Material], tuple[str, ...]] = {
-    LinearElastic: ("E", "nu"),
-    Orthotropic: ("E", "nu", "G"),
-    Anisotropic: ("D",),
-    ElasticPlastic: ("E", "nu", "yield_stress"),
-    NeoHookean: ("E", "nu"),
-    MooneyRivlin: ("C10", "C01", "bulk"),
-    Yeoh: ("C10", "C20", "C30", "bulk"),
-    Ogden: ("mu", "alpha", "bulk"),
-}
+# Types of values as messages list them.
+_ORDER = (*NUMBER, list, dict)
+
+
+def _constants() -> dict[str, tuple[type, ...]]:
+    """Return the types of values by the keys of all laws of materials, as their fields are annotated."""
+    known: dict[str, set[type]] = {}
+    for law in _LAWS:
+        for key, annotation in {k: v for base in reversed(law.__mro__) for k, v in types_of(base).items()}.items():
+            if key in inspect.signature(law).parameters:
+                known.setdefault(key, set()).update(_toml_types(annotation))
+    return {key: tuple(sorted(kinds, key=[*_ORDER, bool, str].index)) for key, kinds in known.items()}
 
 
 # By kind of table, in the order in which they are added to the model.
@@ -196,12 +203,8 @@ LISTS: dict[str, tuple[dict[str, Any], Sequence[str]]] = {
     "support": _keys(Model.prescribe, rotation=dict),
     "material": (
         {
-            **dict.fromkeys(("E", "nu", "expansion", "conductivity"), (*NUMBER, list, dict)),
-            **dict.fromkeys(("G", "D"), list),
-            **{"groups": (list, str), "axes": (list, dict), "density": (*NUMBER, dict)},
-            **{"volumetric": str, "incompatible_modes": bool, "law": str},
-            **dict.fromkeys(("yield_stress", "kinematic", "C10", "C01", "C20", "C30", "bulk"), NUMBER),
-            **{"hardening": list, **dict.fromkeys(("mu", "alpha"), (*NUMBER, list))},
+            **{**_constants(), "groups": (list, str), "law": str},
+            **{"D": list, "hardening": list, **dict.fromkeys(("mu", "alpha"), (*NUMBER, list))},
         },
         (),
     ),
@@ -238,7 +241,7 @@ def _add_lists(model: Model, data: dict[str, Any], folder: Path, adding: Mapping
             check_keys(where, entry, known)
             if kind == "material":
                 _check_material(where, entry)
-            for key in _NEEDED[_material_law(entry)] if kind == "material" else needed:
+            for key in _without_default(_material_law(entry)) if kind == "material" else needed:
                 if key not in entry:
                     raise CaseError(f"{where} needs '{key}'")
             with at(where):

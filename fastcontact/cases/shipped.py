@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fastcontact.errors import CaseError, unknown
+from fastcontact.errors import CaseError, check_known
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 # The folder in an installed package, and the folder in a checkout.
@@ -20,8 +20,7 @@ def shipped_cases() -> dict[str, Path]:
 def shipped_case(name: str) -> Path:
     """Return the case file of a ready case; raises CaseError if there is none, with the nearest names."""
     cases = shipped_cases()
-    if name not in cases:
-        raise CaseError(unknown("ready case", name, cases))
+    check_known("ready case", name, cases, CaseError)
     return cases[name]
 
 

@@ -20,6 +20,8 @@ from fastcontact.results.units import units_of_results, valued, with_unit
 if TYPE_CHECKING:
     from fastcontact.analysis.modal.shapes import Modes
 
+# Of contact resultants, those that a summary has.
+RESULTANTS = ("normal_force", "moment", "area", "centre", "mean_gap", "pressure_mean")
 # Numbers that a theory must have to be compared as a whole.
 COMPARED = ("force", "pressure_max", "radius")
 
@@ -125,7 +127,7 @@ def _contact(contact: ContactResult, penalty: float | None) -> dict[str, Any]:
         "formulation": contact.formulation,
         "force": float(np.linalg.norm(contact.force)),
         "force_vector": contact.force.tolist(),
-        "radius": [_finite(value) for value in contact.radius],
+        "radius": _plain(contact.radius),
         "pressure_max": contact.pressure_max,
         "middle": contact.middle.tolist(),
         "closed_nodes": int(contact.active.sum()),
@@ -141,17 +143,18 @@ def _resultants(case: Case, last: StepResult, name: str, steps: Sequence[Mapping
     """Return what `contact_resultants` tell of the last step, with the work of friction of all `steps`."""
     (resultants,) = contact_resultants(case.model, [last], name)
     return {
-        "normal_force": resultants.normal_force,
-        "moment": resultants.moment.tolist(),
-        "area": resultants.area,
-        "centre": [_finite(value) for value in resultants.centre],
-        "mean_gap": _finite(resultants.mean_gap),
-        "pressure_mean": resultants.pressure_mean,
+        **{name: _plain(getattr(resultants, name)) for name in RESULTANTS},
         "friction_work": sum(step.get("dissipation", {}).get(name, 0.0) for step in steps),
     }
 
 
-def _finite(value: float) -> float | None:
+def _plain(value: Any) -> Any:
+    """Return a number, or an array of them, for JSON."""
+    return [finite(member) for member in value] if np.ndim(value) else finite(value)
+
+
+def finite(value: float) -> float | None:
+    """Return a number that JSON can hold: None for NaN and infinity."""
     return float(value) if np.isfinite(value) else None
 
 
@@ -198,7 +201,7 @@ def _against_theory(
 def _deviations(computed: Mapping[str, float], theory: Any) -> dict[str, Any]:
     """Return the theory's numbers, and the relative deviations of the computed ones from them."""
     exact = {name: getattr(theory, name) for name in COMPARED}
-    return {**exact, "deviation": {name: _finite(computed[name] / exact[name] - 1.0) for name in COMPARED}}
+    return {**exact, "deviation": {name: finite(computed[name] / exact[name] - 1.0) for name in COMPARED}}
 
 
 def lines(summary: Mapping[str, Any]) -> list[str]:
@@ -238,8 +241,8 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
         rows.append(_regularised_line(summary["regularised"], unit))
     for name, theory in summary["theory"].items():
         rows += _theory_lines(name, theory)
-    for found_here in summary["sensitivities"]:
-        rows += _sensitivity_lines(found_here)
+    for entry in summary["sensitivities"]:
+        rows += _sensitivity_lines(entry)
     if "modes" in summary:
         rows += _mode_lines(summary["modes"])
     for check in summary["checks"]:
@@ -254,14 +257,14 @@ def _mode_lines(table: Mapping[str, Any]) -> list[str]:
         table.get("nodal_diameters", [None] * len(frequencies)),
         table.get("twins", range(len(frequencies))),
     )
-    found = []
+    rows = []
     for d in dict.fromkeys(diameters):
-        own = [k for k, other in enumerate(diameters) if other == d and k <= twins[k]]
-        shown = ", ".join(f"{frequencies[k]:.6g}" for k in own)
-        pairs = ", each of two modes" if any(twins[k] > k for k in own) else ""
+        modes = [k for k, other in enumerate(diameters) if other == d and k <= twins[k]]
+        shown = ", ".join(f"{frequencies[k]:.6g}" for k in modes)
+        pairs = ", each of two modes" if any(twins[k] > k for k in modes) else ""
         where = "" if d is None else f", {count(d, 'nodal diameter')}{pairs}"
-        found.append(f"  frequencies about the last step{where}: {shown}")
-    return found
+        rows.append(f"  frequencies about the last step{where}: {shown}")
+    return rows
 
 
 def count(number: int, noun: str) -> str:

@@ -30,7 +30,7 @@ def check_outputs(
     Raises FileError if a folder is missing or write-protected, a path is a folder, the file to read or that of another
     output, or a picture of no known format; FastcontactError if there is no matplotlib.
     """
-    from fastcontact.mesh.files.paths import checked_target, is_stream
+    from fastcontact._tools.paths import checked_target, is_stream
 
     drawn = [str(path) for path in pictures if path]
     sources = {_identity(Path(os.path.realpath(path))) for path in read if path}
@@ -72,10 +72,16 @@ def _check_formats(paths: list[str]) -> None:
 
 def write_text(path: str, content: str) -> None:
     """Write a text file, whole or not at all, or to a stream; raises FileError if it cannot be written."""
-    from fastcontact.mesh.files.paths import replacing
+    from fastcontact._tools.paths import replacing
 
     with replacing(path) as target:
         target.write_text(content, encoding="utf-8")
+
+
+def say_written(options: Any, *paths: object) -> None:
+    """Print which files were written, unless the options ask for quiet; None means no file."""
+    if not options.quiet:
+        say(f"wrote {', '.join(str(path) for path in paths if path)}")
 
 
 def write_json(path: str, numbers: Any, indent: int = 2) -> None:
@@ -88,7 +94,7 @@ def save(axes: Any, path: str) -> None:
 
     What Matplotlib warns of, such as characters that its font lacks, is told in one line each.
     """
-    from fastcontact.mesh.files.paths import replacing
+    from fastcontact._tools.paths import replacing
 
     try:
         with warnings.catch_warnings(record=True) as caught, replacing(path) as target:

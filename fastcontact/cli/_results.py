@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools import toml_text
 from fastcontact.analytic.pressure_curve import PressureCurve, pressure_curve
-from fastcontact.errors import CaseError, unknown
-from fastcontact.mesh.files import toml_text
+from fastcontact.cli._terminal import say
+from fastcontact.errors import CaseError, check_known
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -31,21 +32,21 @@ def chosen_step(results: Any, number: int) -> Any:
     return results[number - 1]
 
 
-def chosen_contact(step: Any, name: str | None) -> str:
-    """Return the name of a contact pair of a step; raises CaseError if there is none, or none of that name."""
+def chosen_contact(options: argparse.Namespace, step: Any) -> str:
+    """Return the name of the contact pair that the options ask for; without one the first, with a hint at the others.
+
+    Raises CaseError if there is none, or none of that name.
+    """
     if not step.contact:
         raise CaseError("this result holds no contact pair")
-    if name is not None and name not in step.contact:
-        raise CaseError(unknown("contact pair", name, step.contact))
-    return name or next(iter(step.contact))
-
-
-def other_contacts(step: Any, name: str, asked: str | None) -> str:
-    """Return a hint at the other contact pairs of a step where none was asked for; empty without others."""
-    others = [f"'{other}'" for other in step.contact if other != name]
-    if asked is not None or not others:
-        return ""
-    return f"contact '{name}', the first of {len(step.contact)}; also there: {', '.join(others)} (--contact NAME)"
+    if options.contact is not None:
+        check_known("contact pair", options.contact, step.contact, CaseError)
+        return str(options.contact)
+    name, *others = step.contact
+    if others and not options.quiet:
+        listed = ", ".join(f"'{other}'" for other in others)
+        say(f"contact '{name}', the first of {len(step.contact)}; also there: {listed} (--contact NAME)", error=True)
+    return str(name)
 
 
 def case_data(results: Any) -> dict[str, Any]:
@@ -87,14 +88,9 @@ def pressure_curves(
     curve = pressure_curve(theory)
     if curve is None:
         return {}
-    curves: dict[str, Any] = {}
     if approach is None and not hasattr(theory, "at_force"):
-        curves[curve.name] = theory
-    elif approach is not None and load == 1.0:
-        curves[f"{curve.name}, equal approach"] = theory
-    elif approach is not None and load > 0 and hasattr(theory, "at_approach"):
-        curves[f"{curve.name}, equal approach"] = theory.at_approach(approach * load)
-    return {**curves, **at_equal_force(f"{curve.name}, equal force", theory, contact, theories["share"])}
+        return {curve.name: theory}
+    return compared(curve.name, theory, contact, theories["share"], approach=approach, load=load)
 
 
 def drawn(theory: Any) -> PressureCurve:
@@ -104,10 +100,21 @@ def drawn(theory: Any) -> PressureCurve:
     return curve
 
 
-def at_equal_force(legend: str, theory: Any, contact: Any, share: float) -> dict[str, Any]:
-    """Return a theory by its legend at the force of a contact, of which the model holds a `share` [-]; empty without."""
-    force = float(np.linalg.norm(contact.force)) / share
-    return {legend: theory.at_force(force)} if force > 0 and hasattr(theory, "at_force") else {}
+def compared(
+    name: str, theory: Any, contact: Any, share: float, *, approach: float | None, load: float
+) -> dict[str, Any]:
+    """Return a theory by its legend at the approach and at the force of a contact, where these are known.
+
+    The model holds a `share` of the contact [-]; `approach` is that at a multiplier `load` of 1.
+    """
+    curves, force = {}, float(np.linalg.norm(contact.force)) / share
+    if approach is not None and load == 1.0:
+        curves[f"{name}, equal approach"] = theory
+    elif approach is not None and load > 0 and hasattr(theory, "at_approach"):
+        curves[f"{name}, equal approach"] = theory.at_approach(approach * load)
+    if force > 0 and hasattr(theory, "at_force"):
+        curves[f"{name}, equal force"] = theory.at_force(force)
+    return curves
 
 
 def law(theories: Mapping[str, Any]) -> Any:

@@ -7,6 +7,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+from fastcontact.cli._outputs import say_written
 from fastcontact.cli._terminal import say
 from fastcontact.errors import FastcontactError, FileError
 
@@ -30,8 +31,7 @@ def run(options: argparse.Namespace) -> int:
         raise FastcontactError("-o says where to copy to: give --copy NAME with it")
     if options.copy:
         written = copied(shipped_case(options.copy), Path(options.output or f"{options.copy}.toml"))
-        if not options.quiet:
-            say(f"wrote {', '.join(map(str, written))}")
+        say_written(options, *written)
     elif options.name:
         say(shipped_case(options.name).read_text(encoding="utf-8").rstrip("\n"))
     elif not options.quiet:
@@ -57,7 +57,7 @@ def _lines(path: Path) -> list[str]:
 
 def copied(case: Path, target: Path) -> list[Path]:
     """Copy a case file, and beside it the mesh file it reads, if any; refuse to overwrite."""
-    from fastcontact.mesh.files.paths import replacing
+    from fastcontact._tools.paths import replacing
 
     text = case.read_text(encoding="utf-8")
     mesh: dict[str, Any] = tomllib.loads(text).get("mesh", {})

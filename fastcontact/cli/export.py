@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from fastcontact.cli._outputs import check_outputs
-from fastcontact.cli._terminal import say
+from fastcontact.cli._outputs import check_outputs, say_written
 from fastcontact.errors import CaseError
 
 HELP = "export a result file: MED with fields (Salome, ParaVis) or an XDMF sidecar (old ParaView)"
@@ -33,6 +32,5 @@ def run(options: argparse.Namespace) -> int:
         from fastcontact.results.xdmf import write_xdmf
 
         write_xdmf(options.file, options.xdmf)
-    if not options.quiet:
-        say(f"wrote {', '.join(path for path in (options.med, options.xdmf) if path)}")
+    say_written(options, options.med, options.xdmf)
     return 0

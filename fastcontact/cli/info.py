@@ -91,7 +91,7 @@ def _mesh_of(file: str) -> Any:
 
 def _is_deck(path: Path) -> bool:
     """Whether an Abaqus file holds more than a mesh: steps, parts, or other files."""
-    from fastcontact.mesh.files.paths import existing_file
+    from fastcontact._tools.paths import existing_file
 
     words = ("*STEP", "*PART", "*INCLUDE")
     with open(existing_file(path), encoding="utf-8", errors="replace") as file:

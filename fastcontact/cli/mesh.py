@@ -8,7 +8,7 @@ import typing
 from collections.abc import Callable
 from typing import Any
 
-from fastcontact.cli._outputs import check_outputs
+from fastcontact.cli._outputs import check_outputs, say_written
 from fastcontact.cli._terminal import add_loudness, say
 
 HELP = "make a mesh with named groups and report its quality"
@@ -65,5 +65,5 @@ def run(options: argparse.Namespace) -> int:
     if not options.quiet:
         say(quality(mesh))
         say(f"groups: {', '.join(mesh.group_names)}")
-        say(f"wrote {options.output}")
+    say_written(options, options.output)
     return 0

@@ -6,8 +6,7 @@ import argparse
 from typing import Any
 
 from fastcontact.cli import _results
-from fastcontact.cli._outputs import check_outputs, save
-from fastcontact.cli._terminal import say
+from fastcontact.cli._outputs import check_outputs, save, say_written
 from fastcontact.errors import CaseError
 
 HELP = "plot the deformed mesh with a field, a section, the contact, or what happens over the load"
@@ -71,8 +70,7 @@ def run(options: argparse.Namespace) -> int:
             save(_of_contact(options, results, step, case), options.png)
         else:
             save(_of_bodies(options, results, step, case, plane), options.png)
-    if not options.quiet:
-        say(f"wrote {options.animate or options.png}")
+    say_written(options, options.animate or options.png)
     return 0
 
 
@@ -117,10 +115,7 @@ def _of_contact(options: argparse.Namespace, results: Any, step: Any, case: dict
     from fastcontact.results import plot
 
     labels = {"title": case["title"]}
-    name = _results.chosen_contact(step, options.contact)
-    hint = _results.other_contacts(step, name, options.contact)
-    if hint and not options.quiet:
-        say(hint, error=True)
+    name = _results.chosen_contact(options, step)
     theories = case["theories"].get(name, {})
     if options.map:
         labels["title"] = f"{case['title']}\ncontact '{name}', load factor {step.load_factor:g}".strip()
@@ -141,8 +136,5 @@ def _axis_curves(theories: dict[str, Any], step: Any, name: str, case: dict[str,
     theory = getattr(theory, "hertz", theory)
     if theory is None or not hasattr(theory, "stress_on_axis"):
         return {}
-    same = _results.at_equal_force("theory, equal force", theory, step.contact[name], theories["share"])
-    approach, load = case["approach"].get(name), _results.load_multiplier(case["ramp"], step)
-    if approach is not None and load > 0 and hasattr(theory, "at_approach"):
-        return {"theory, equal approach": theory.at_approach(approach * load) if load != 1.0 else theory, **same}
-    return same or {"theory": theory}
+    given = {"approach": case["approach"].get(name), "load": _results.load_multiplier(case["ramp"], step)}
+    return _results.compared("theory", theory, step.contact[name], theories["share"], **given) or {"theory": theory}

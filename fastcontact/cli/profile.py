@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact.cli import _results
-from fastcontact.cli._outputs import check_outputs, draw_profile
+from fastcontact.cli._outputs import check_outputs, draw_profile, say_written
 from fastcontact.cli._results import drawn, load_multiplier, pressure_curves
 from fastcontact.cli._terminal import say
 
@@ -31,11 +31,8 @@ def run(options: argparse.Namespace) -> int:
     check_outputs([options.file], [options.csv, options.agr], [options.png])
     with open_results(options.file) as results:
         step = _results.chosen_step(results, options.step)
-        name = _results.chosen_contact(step, options.contact)
+        name = _results.chosen_contact(options, step)
         case = _results.case_data(results)
-    hint = _results.other_contacts(step, name, options.contact)
-    if hint and not options.quiet:
-        say(hint, error=True)
     contact = step.contact[name]
     table = contact_table(contact, step)
     load = load_multiplier(case["ramp"], step)
@@ -49,11 +46,10 @@ def run(options: argparse.Namespace) -> int:
         _write_agr(options.agr, case, contact, step, theories)
     if options.png:
         draw_profile(contact, step, theories, options.png, case["title"] or name)
-    written = [path for path in (options.csv, options.agr, options.png) if path]
-    if not written:
+    if options.csv or options.agr or options.png:
+        say_written(options, options.csv, options.agr, options.png)
+    else:
         _print(table)
-    elif not options.quiet:
-        say(f"wrote {', '.join(written)}")
     return 0
 
 

@@ -165,7 +165,7 @@ def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[_Don
         _check_same(case, writer.done, output)
         last, done = writer.done[-1] if writer.done else None, _done(writer.done)
         steps = list(done.summaries)
-        _tell_other_steps(case, [own["load_factor"] for own in steps], output)
+        _tell_other_steps(case, [summary["load_factor"] for summary in steps], output)
         total = len(steps) + len(remaining(case.ramp, last))
         progress = Progress(total, show=somebody_watches() and not options.quiet, done=len(steps))
         try:
@@ -215,7 +215,7 @@ def _check_same(case: Any, done: Sequence[Any], output: Path) -> None:
 def _tell_other_steps(case: Case, done: Sequence[float], output: Path) -> None:
     """Warn where load factors of steps that were there before are none of the case now."""
     known = case.ramp.instants
-    others = [factor for factor in done if not any(math.isclose(factor, own, rel_tol=1e-9) for own in known)]
+    others = [factor for factor in done if not any(math.isclose(factor, instant, rel_tol=1e-9) for instant in known)]
     if others:
         warn(
             f"'{output}' holds {len(done)} steps, the case now has {len(known)}: those in the file stay, also at load factor "

@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from fastcontact._tools.argument_types import typed
+from fastcontact._tools.html_table import html_table
 from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.contact.facing_facets import Facing, OuterFacets, facing
 from fastcontact.errors import ContactError, FileError
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.companion_groups import OPPOSITE
-from fastcontact.mesh.html_table import html_table
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import bodies
 

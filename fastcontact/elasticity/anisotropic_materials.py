@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.argument_types import check_type
 from fastcontact.arrays import Array
 from fastcontact.elasticity.loads import LARGEST
 from fastcontact.elasticity.material_axes import Axes, checked_axes, frames
@@ -23,7 +24,6 @@ from fastcontact.elasticity.materials import (
 )
 from fastcontact.elasticity.varying_constants import CellAxes, Varying, wrapped
 from fastcontact.errors import ModelError
-from fastcontact.mesh.argument_types import check_type
 
 NAMES = ("12", "13", "23")
 # Of the stiffness to be symmetric, relative to its largest entry.

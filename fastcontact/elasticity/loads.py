@@ -18,11 +18,11 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
+from fastcontact._tools.argument_types import values_at
 from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.elasticity.symmetry_axis import axis_nodes
 from fastcontact.errors import ModelError, unknown
 from fastcontact.mesh import elements, quadrature
-from fastcontact.mesh.argument_types import values_at
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.argument_types import check_type, values_at
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
-from fastcontact.mesh.argument_types import check_type, values_at
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 Axes = Sequence[Sequence[float]] | Callable[[Array], Array] | None

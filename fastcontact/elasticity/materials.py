@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.loads import LARGEST, Value
 from fastcontact.elasticity.material_axes import PAIRS, Axes, frames, rotations
 from fastcontact.elasticity.varying_constants import Cells, Varying, mapped, varying, wrapped
 from fastcontact.errors import ModelError, unknown
-from fastcontact.mesh.argument_types import typed
 from fastcontact.round_off import ROUND_OFF
 
 AnyMaterial = TypeVar("AnyMaterial", bound="Material")

@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array
 from fastcontact.elasticity.constitutive_kernels import INVARIANTS, OGDEN, PLASTIC
 from fastcontact.elasticity.materials import NEARLY_INCOMPRESSIBLE, LinearElastic, check_positive
 from fastcontact.errors import ModelError
-from fastcontact.mesh.argument_types import typed
 
 STRAINS = ("small", "finite")
 

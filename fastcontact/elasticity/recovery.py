@@ -7,6 +7,7 @@ import itertools
 import numpy as np
 
 from fastcontact._jit import parallel
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Numbers
 from fastcontact.elasticity import dilatation, element_2d_kernels, element_kernels
 from fastcontact.elasticity.cell_stress import CellStress
@@ -14,7 +15,6 @@ from fastcontact.elasticity.initial_states import StressOffset
 from fastcontact.elasticity.material_sides import MaterialSides
 from fastcontact.errors import ModelError
 from fastcontact.mesh import elements
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
 
 Materials = dict[str, Numbers]

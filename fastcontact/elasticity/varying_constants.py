@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.elasticity.loads import check_number, evaluated
 from fastcontact.errors import ModelError
 from fastcontact.mesh import elements
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
 
 Rows = Mapping[str, Indices]

@@ -27,17 +27,17 @@ def facets_with_nodes(
     own : mapping of str to ndarray of bool (n_cells,), optional
         The cells that the facets must belong to, by default all.
     """
-    found: dict[str, list[Numbers]] = {}
+    candidates: dict[str, list[Numbers]] = {}
     owned: dict[str, list[Mask]] = {}
     for name, block in solids.items():
         element = elements.get(name)
         for facet, kind in zip(element.facets, element.facet_elements, strict=True):
             nodes = block[:, list(facet)]
             inside = chosen[nodes].all(axis=1)
-            found.setdefault(kind, []).append(nodes[inside])
+            candidates.setdefault(kind, []).append(nodes[inside])
             owned.setdefault(kind, []).append(np.ones(int(inside.sum()), bool) if own is None else own[name][inside])
     kept, wanted = {}, 2 if between else 1
-    for kind, blocks in found.items():
+    for kind, blocks in candidates.items():
         facets, ours = np.concatenate(blocks), np.concatenate(owned[kind])
         _, first, group, count = np.unique(
             np.sort(facets, axis=1), axis=0, return_index=True, return_inverse=True, return_counts=True

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sized
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fastcontact._tools.argument_types import typed
+from fastcontact._tools.html_table import html_table
 from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.errors import MeshError, unknown
 from fastcontact.mesh import elements
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.facet_search import added, facets_with_nodes
-from fastcontact.mesh.html_table import html_table
 
 
 def _read_only(values: ArrayLike, dtype: Any) -> AnyArray:
@@ -35,6 +35,11 @@ def _numbers(name: str, values: ArrayLike) -> AnyArray:
     if array.min() < -(2**31) or array.max() >= 2**31:
         raise MeshError(f"{name} name the number {array.max()}, beyond the 2147483647 that a mesh can count to")
     return array
+
+
+def starts_of(blocks: Mapping[str, Sized]) -> dict[str, int]:
+    """Return where each block begins in the sequence of all, by name."""
+    return dict(zip(blocks, np.cumsum([0, *map(len, blocks.values())]).tolist(), strict=False))
 
 
 @typed(MeshError)
@@ -144,11 +149,7 @@ class Mesh:
     @property
     def offsets(self) -> dict[str, int]:
         """Number of the first cell of each element."""
-        starts, total = {}, 0
-        for name, block in self.cells.items():
-            starts[name] = total
-            total += len(block)
-        return starts
+        return starts_of(self.cells)
 
     @property
     def solids(self) -> dict[str, AnyArray]:
@@ -310,7 +311,7 @@ class Mesh:
             for kind, block in facets.items():
                 block = np.asarray(block, np.int32)
                 cells[kind], rows[name][kind] = added(cells.get(kind, block[:0]), block)
-        starts = dict(zip(cells, np.cumsum([0, *map(len, cells.values())]).tolist(), strict=False))
+        starts = starts_of(cells)
 
         def numbers(of: Mapping[str, AnyArray]) -> AnyArray:
             return np.concatenate([starts[kind] + place for kind, place in of.items()] or [np.empty(0, np.intp)])

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Mask
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements, quality_kernels
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
 
 # A Jacobian below this fraction of the squared (cubed) longest edge is rounding, not area.
@@ -124,23 +124,17 @@ def poorest_cell(mesh: Mesh) -> str:
     """
     for name in mesh.solids:
         measure, low, high, longest = _extremes(mesh, name)
-        ratio = low / high
-        row = int(np.argmin(ratio))
-        if ratio[row] < EVEN:
-            cell = _described(mesh, name, row, measure[row])
-            return f"{cell} is poor: its smallest Jacobian is {ratio[row]:.2g} of its largest; move its nodes or remesh"
+        even, flat = low / high, measure / longest**3
+        faults = [(even, even, EVEN, "its smallest Jacobian is {:.2g} of its largest; move its nodes or remesh")]
         if mesh.dim == 2:
             angle = np.degrees(_angles(_corners(mesh, name)).max(axis=1))
-            row = int(np.argmax(angle))
-            if angle[row] > WIDE:
-                cell = _described(mesh, name, row, measure[row])
-                return f"{cell} is poor: it has an angle of {angle[row]:.1f} degrees; move its nodes or remesh"
-            continue
-        flatness = measure / longest**3
-        row = int(np.argmin(flatness))
-        if flatness[row] < THICK:
-            cell = _described(mesh, name, row, measure[row])
-            return f"{cell} is poor: its volume is only {flatness[row]:.1e} of its longest edge cubed; remesh there"
+            faults.append((-angle, angle, -WIDE, "it has an angle of {:.1f} degrees; move its nodes or remesh"))
+        else:
+            faults.append((flat, flat, THICK, "its volume is only {:.1e} of its longest edge cubed; remesh there"))
+        for figure, shown, limit, text in faults:
+            row = int(np.argmin(figure))
+            if figure[row] < limit:
+                return f"{_described(mesh, name, row, measure[row])} is poor: {text.format(shown[row])}"
     return ""
 
 
@@ -151,10 +145,9 @@ def _check_nodes(mesh: Mesh, name: str) -> None:
     bad = np.flatnonzero(twice.any(axis=1))
     if len(bad):
         node = int(nodes[bad[0], :-1][twice[bad[0]]][0])
-        centre = ", ".join(f"{x:.6g}" for x in mesh.points[nodes[bad[0]]].mean(axis=0))
         raise MeshError(
-            f"cell {mesh.offsets[name] + int(bad[0])} ({name} at ({centre})) has point {node} twice, one of {len(bad)} such "
-            "cells: write it as the element that it collapses to, a triangle, wedge, pyramid or tetrahedron"
+            f"{_described(mesh, name, int(bad[0]))} has point {node} twice, one of {len(bad)} such cells: write it as the "
+            "element that it collapses to, a triangle, wedge, pyramid or tetrahedron"
         )
 
 
@@ -169,18 +162,17 @@ def _check_twice(mesh: Mesh, name: str) -> None:
     _, first, count = np.unique(np.sort(nodes[rows], axis=1), axis=0, return_index=True, return_counts=True)
     if (count > 1).any():
         row = int(rows[first[count > 1].min()])
-        centre = ", ".join(f"{x:.6g}" for x in mesh.points[nodes[row]].mean(axis=0))
         raise MeshError(
-            f"cell {mesh.offsets[name] + row} ({name} at ({centre})) stands in the mesh {int(count.max())} times, one of "
+            f"{_described(mesh, name, row)} stands in the mesh {int(count.max())} times, one of "
             f"{int((count > 1).sum())} such cells: remove the copies"
         )
 
 
-def _described(mesh: Mesh, name: str, row: int, measure: float) -> str:
-    """Return the number, element, place and size of a cell for messages."""
+def _described(mesh: Mesh, name: str, row: int, measure: float | None = None) -> str:
+    """Return the number, element, place and, where it is given, size of a cell for messages."""
     centre = ", ".join(f"{x:.6g}" for x in _corners(mesh, name)[row].mean(axis=0))
-    kind = "area" if mesh.dim == 2 else "volume"
-    return f"cell {mesh.offsets[name] + row} ({name} at ({centre}), {kind} {measure:.3g})"
+    size = "" if measure is None else f", {'area' if mesh.dim == 2 else 'volume'} {measure:.3g}"
+    return f"cell {mesh.offsets[name] + row} ({name} at ({centre}){size})"
 
 
 def _corners(mesh: Mesh, name: str) -> Array:

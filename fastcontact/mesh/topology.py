@@ -12,12 +12,12 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse.csgraph import breadth_first_order, connected_components
 
-from fastcontact.arrays import Array, Indices, Numbers
+from fastcontact._tools.argument_types import typed
+from fastcontact.arrays import Array, Numbers
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements, topology_kernels
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
 
 Found = TypeVar("Found")
@@ -243,24 +243,10 @@ def ordered_line(mesh: Mesh, group: str, start: str | int | None = None) -> Orde
                 f"point {number} is not an end of '{group}': its ends are {nodes[ends[0]]}, {nodes[ends[1]]}"
             )
         first = matches[0]
-    order = _walk(local, len(nodes), int(first))
+    graph = coo_array((np.ones(len(local), np.int8), tuple(local.T)), shape=(len(nodes), len(nodes)))
+    order = breadth_first_order(graph, int(first), directed=False, return_predecessors=False)
     if len(order) != len(nodes):
         raise MeshError(f"group '{group}' is in pieces: only {len(order)} of its {len(nodes)} nodes are connected")
     points = nodes[order].astype(np.int32)
     lengths = np.linalg.norm(np.diff(mesh.points[points], axis=0), axis=1)
     return OrderedLine(points, np.concatenate([[0.0], np.cumsum(lengths)]))
-
-
-def _walk(segments: Indices, n_nodes: int, first: int) -> list[int]:
-    """Follow the segments from `first`, each node at most once."""
-    neighbours: list[list[int]] = [[] for _ in range(n_nodes)]
-    for a, b in segments.tolist():
-        neighbours[a].append(b)
-        neighbours[b].append(a)
-    order, previous, here = [first], -1, first
-    while True:
-        ahead = [n for n in neighbours[here] if n != previous]
-        if not ahead:
-            return order
-        previous, here = here, ahead[0]
-        order.append(here)

@@ -10,6 +10,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
+from fastcontact._tools.html_table import html_table
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.elasticity.constrained_system import ConstrainedMotion
@@ -18,8 +20,6 @@ from fastcontact.elasticity.loads import Load
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, TemporaryConstraint
 from fastcontact.elasticity.temperature import Temperature
 from fastcontact.errors import ModelError
-from fastcontact.mesh.argument_types import typed
-from fastcontact.mesh.html_table import html_table
 from fastcontact.model.checks import check_motions, check_overlap, check_penetration, check_ramps, check_supports
 from fastcontact.model.description import sentences
 from fastcontact.model.obstacle_rotation import check_turns

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array
 from fastcontact.elasticity.loads import LARGEST
 from fastcontact.errors import ModelError
-from fastcontact.mesh.argument_types import typed
 
 # Points (instant, multiplier of the loads) of a piecewise linear function.
 Table = tuple[tuple[float, float], ...]

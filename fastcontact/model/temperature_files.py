@@ -7,10 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fastcontact._tools.paths import PathLike
 from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ModelError
-from fastcontact.mesh.files.paths import PathLike
-from fastcontact.mesh.files.point_fields import at_points_of, read_point_field
+from fastcontact.mesh.files.file_fields import read_file_field
+from fastcontact.mesh.files.mesh_fields import at_points_of
 from fastcontact.mesh.mesh import Mesh
 
 # How far a time of a file may lie from the one that is wanted, relative to the latest.
@@ -34,7 +35,7 @@ def read_temperatures(
         raise ModelError("no file is given for the temperature")
     parts, times = [], []
     for path in files:
-        field_of_file = read_point_field(path, field)
+        field_of_file = read_file_field(path, field, "points")
         values = at_points_of(field_of_file, mesh, wanted, f"field '{field}' of '{path}'")
         if len(files) > 1 and len(values) > 1:
             raise ModelError(

@@ -26,7 +26,7 @@ from types import FrameType
 
 import numpy as np
 
-from fastcontact.mesh.files.hdf5_driver import DriverFile
+from fastcontact._tools.hdf5_driver import DriverFile
 from fastcontact.results import journal
 
 # Where HDF5 begins its superblock, the nodes of its indices and its tables of names.

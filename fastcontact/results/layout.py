@@ -36,7 +36,7 @@ from fastcontact.arrays import AnyArray, Array, Numbers
 from fastcontact.elasticity.recovery import von_mises
 from fastcontact.errors import FileError
 from fastcontact.mesh import elements, topology
-from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.mesh import Mesh, starts_of
 from fastcontact.results.separated import mean_in_cells
 from fastcontact.results.step import ContactResult, StepResult
 
@@ -223,16 +223,13 @@ def point_flags(mesh: Mesh) -> dict[str, Flags]:
 def cell_fields(mesh: Mesh) -> dict[str, AnyArray]:
     """Return the body of each solid cell, and 1 inside and 0 outside for each group of solids."""
     first = np.concatenate([np.empty(0, np.int32), *(block[:, 0] for block in mesh.solids.values())])
-    starts, total = {}, 0
-    for name, block in mesh.solids.items():
-        starts[name] = total
-        total += len(block)
+    starts = starts_of(mesh.solids)
     members = {}
     for group, numbers in mesh.cell_groups.items():
         rows = [starts[name] + rows for name, rows in mesh.split(numbers).items() if name in starts]
         if rows:
             members[group] = np.concatenate(rows)
-    return {"body": topology.bodies(mesh)[1][first], **_flags(members, total)}
+    return {"body": topology.bodies(mesh)[1][first], **_flags(members, len(first))}
 
 
 def _plain(name: str) -> str:
@@ -262,17 +259,17 @@ def check_step(mesh: Mesh, step: StepResult, cell_fields: Iterable[str]) -> None
             continue
         if np.ma.isMaskedArray(field):
             raise FileError(f"step {step.index}: {name} is a masked array, and files keep no masks: fill it first")
-        found = np.shape(field)
-        if found != shape:
-            raise FileError(f"step {step.index}: {name} has shape {found}, but the mesh of the file needs {shape}")
+        given = np.shape(field)
+        if given != shape:
+            raise FileError(f"step {step.index}: {name} has shape {given}, but the mesh of the file needs {shape}")
     for name, contact in step.contact.items():
         check_contact(f"step {step.index}, contact '{name}'", contact, mesh)
     count = sum(map(len, mesh.solids.values()))
     for name in cell_fields:
-        found = np.shape(step.cell_fields.get(name, ()))
-        if found != (count,):
+        given = np.shape(step.cell_fields.get(name, ()))
+        if given != (count,):
             raise FileError(
-                f"step {step.index}: the cell field '{name}' that was announced has shape {found}, but ({count},) is "
+                f"step {step.index}: the cell field '{name}' that was announced has shape {given}, but ({count},) is "
                 "needed, a number for each solid cell"
             )
 

@@ -6,11 +6,11 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
+from fastcontact._tools.paths import PathLike
 from fastcontact.arrays import Array
 from fastcontact.errors import FileError, MeshError
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.files.med import AXES, add_field, add_mesh, new_file
-from fastcontact.mesh.files.paths import PathLike
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.layout import contact_pressure
 from fastcontact.results.step import StepResult

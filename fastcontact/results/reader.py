@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
+from fastcontact._tools import toml_text
+from fastcontact._tools.argument_types import typed
+from fastcontact._tools.hdf5 import check_contents
+from fastcontact._tools.html_table import html_table
+from fastcontact._tools.packing import unpacked
+from fastcontact._tools.paths import PathLike, existing_file
 from fastcontact.arrays import Array, Numbers
 from fastcontact.errors import FileError
-from fastcontact.mesh.argument_types import typed
-from fastcontact.mesh.files import toml_text
-from fastcontact.mesh.files.hdf5 import check_contents
-from fastcontact.mesh.files.packing import unpacked
-from fastcontact.mesh.files.paths import PathLike, existing_file
-from fastcontact.mesh.html_table import html_table
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results import conversions, journal, layout
 from fastcontact.results.file_lock import is_being_written
@@ -329,12 +329,11 @@ class Results(Sequence[StepResult]):
         group = self._file["fastcontact"]
         if "materials" not in group:
             return None
-        steps = group["materials/steps"][number : number + 1]
+        steps, cells = group["materials/steps"][number : number + 1], group["materials/cells"][()]
         if not len(steps) or not steps["count"][0]:
             return None
-        first, count = int(steps["first"][0]), int(steps["count"][0])
-        rows, cells = group["materials/rows"][first : first + count], group["materials/cells"][()]
-        if len(rows) != count or first < 0 or len(cells) != len(self._file["VTKHDF/Types"]):
+        rows = _rows(group["materials/rows"], steps[0], "", "the table of stresses by material")
+        if len(cells) != len(self._file["VTKHDF/Types"]):
             raise ValueError("the table of stresses by material is cut off")
         if rows["points"].min() < 0 or rows["points"].max() >= self.mesh.n_points:
             raise ValueError("the table of stresses by material names points that are not there")
@@ -372,12 +371,12 @@ class Results(Sequence[StepResult]):
         if not formulations:
             return {}
         pairs = {_read_json(pair["name"], self._raw): pair for pair in self._file["fastcontact/contact"].values()}
-        found = {name: _read_contact(pairs[name], number, name, kind) for name, kind in formulations.items()}
-        for name, contact in found.items():
+        contacts = {name: _read_contact(pairs[name], number, name, kind) for name, kind in formulations.items()}
+        for name, contact in contacts.items():
             if contact.force.shape != (self.mesh.dim,) or contact.points.dtype.kind not in "iu":
                 raise ValueError(f"the contact table of '{name}' is of another kind")
             layout.check_contact(f"step {number}, contact '{name}'", contact, self.mesh)
-        return found
+        return contacts
 
     @contextlib.contextmanager
     def _explained(self) -> Iterator[None]:
@@ -421,12 +420,18 @@ def _read_groups(group: Any, raw: Any) -> dict[str, Numbers]:
     return dict(zip(names, members))
 
 
+def _rows(table: Any, step: Any, prefix: str, name: str) -> Any:
+    """Return the rows of a table that a row of steps counts by ``first`` and ``count``; ValueError if some are missing."""
+    first, count = int(step[f"{prefix}first"]), int(step[f"{prefix}count"])
+    rows = table[first : first + count]
+    if len(rows) != count or first < 0:
+        raise ValueError(f"{name} is cut off")
+    return rows
+
+
 def _read_contact(pair: Any, number: int, name: str, formulation: str) -> ContactResult:
     step = pair["steps"][number]
-    first, count = int(step["first"]), int(step["count"])
-    rows = pair["rows"][first : first + count]
-    if len(rows) != count or first < 0:
-        raise ValueError(f"the contact table of '{name}' is cut off")
+    rows = _rows(pair["rows"], step, "", f"the contact table of '{name}'")
     columns = {column: np.ascontiguousarray(rows[column]) for column in rows.dtype.names}
     for mask in {"active", "sticking"} & set(columns):
         columns[mask] = columns[mask].astype(bool)
@@ -436,10 +441,7 @@ def _read_contact(pair: Any, number: int, name: str, formulation: str) -> Contac
     moved = step["obstacle_displacement"].copy() if "obstacle_displacement" in known else np.array([np.nan])
     faced = {}
     if "primary_first" in known:  # earlier files of schema 2 have no forces on the primary side
-        first, count = int(step["primary_first"]), int(step["primary_count"])
-        table = pair["primary"][first : first + count]
-        if len(table) != count or first < 0:
-            raise ValueError(f"the table of primary forces of '{name}' is cut off")
+        table = _rows(pair["primary"], step, "primary_", f"the table of primary forces of '{name}'")
         faced = {f"primary_{column}": np.ascontiguousarray(table[column]) for column in ("points", "force_vectors")}
     turned = [float(step[n]) if n in known and np.isfinite(step[n]) else None for n in ("obstacle_angle", "torque")]
     return ContactResult(

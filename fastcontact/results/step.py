@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.html_table import html_table
 from fastcontact.arrays import Array, Mask, Numbers
 from fastcontact.errors import unknown
-from fastcontact.mesh.html_table import html_table
 from fastcontact.results.material_stress import MaterialStress
 from fastcontact.results.units import with_unit
 
@@ -169,21 +169,19 @@ class ContactResult:
     units: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if self.middle is None:
-            object.__setattr__(self, "middle", np.zeros(self.coordinates.shape[1]))
-        if self.place is None:  # of a file from before places were measured from the middle
-            flat = self.coordinates.shape[1] == 2
-            object.__setattr__(self, "place", np.abs(self.coordinates[:, 0]) if flat else np.array(self.abscissa))
-        if self.primary_points is None:
-            object.__setattr__(self, "primary_points", np.empty(0, np.int32))
-            object.__setattr__(self, "primary_force_vectors", np.empty((0, self.coordinates.shape[1])))
-        if self.shear is None:
-            object.__setattr__(self, "shear", np.zeros_like(self.coordinates))
-        if self.sticking is None:
-            object.__setattr__(self, "sticking", self.active.copy())
-        for name in ("slip", "slip_total"):
+        dim = self.coordinates.shape[1]
+        defaults = {  # places are those of a file from before they were measured from the middle
+            "middle": np.zeros(dim),
+            "place": np.abs(self.coordinates[:, 0]) if dim == 2 else np.array(self.abscissa),
+            "primary_points": np.empty(0, np.int32),
+            "primary_force_vectors": np.empty((0, dim)),
+            "shear": np.zeros_like(self.coordinates),
+            "sticking": np.array(self.active),
+            **dict.fromkeys(("slip", "slip_total"), np.full_like(self.coordinates, np.nan)),
+        }
+        for name, value in defaults.items():
             if getattr(self, name) is None:
-                object.__setattr__(self, name, np.full_like(self.coordinates, np.nan))
+                object.__setattr__(self, name, value)
 
     @property
     def shown(self) -> dict[str, str]:
@@ -345,7 +343,7 @@ class StepResult:
     @property
     def shown(self) -> dict[str, str]:
         """What reprs and tables tell, as texts: load factor, largest displacement and stress, iterations."""
-        moved, stressed = (float(np.abs(own).max(initial=0.0)) for own in (self.displacement, self.von_mises))
+        moved, stressed = (float(np.abs(field).max(initial=0.0)) for field in (self.displacement, self.von_mises))
         shown = {
             "load factor": f"{self.load_factor:.6g}",
             "largest displacement": with_unit(f"{moved:.6g}", self.units, "length"),

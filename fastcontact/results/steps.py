@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import SupportsIndex, overload
 
-from fastcontact.mesh.html_table import html_table
+from fastcontact._tools.html_table import html_table
 from fastcontact.results.step import StepResult
 
 # Longest list whose steps are all shown.

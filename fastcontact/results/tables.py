@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
+from fastcontact._tools.paths import PathLike, replacing
 from fastcontact.arrays import AnyArray, Array
-from fastcontact.errors import CaseError, unknown
-from fastcontact.mesh.argument_types import typed
-from fastcontact.mesh.files.paths import PathLike, replacing
+from fastcontact.errors import CaseError, check_known
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import ordered_line
 from fastcontact.results.step import ContactResult, StepResult
@@ -76,7 +76,7 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Any
         fields = _fields(step, contact.points)
         before = {name: values for name, values in fields.items() if name not in ("von_mises", "von_mises_signed")}
         columns |= before | {"normal_stress": normal_stress(contact, step)} | fields
-    table = _table(columns)
+    table = structured(columns)
     if contact.abscissa.any() or contact.coordinates.shape[1] == 3:
         return table
     return table[np.argsort(contact.place, kind="stable")]  # a closed line has no first node
@@ -151,12 +151,12 @@ def line_table(mesh: Mesh, step: StepResult, group: str, start: str | int | None
     places = mesh.points[line.points]
     radius = np.abs(places[:, 0]) if mesh.dim == 2 else np.hypot(places[:, 0], places[:, 2])
     columns = {**_places(line.points, places, line.abscissa), "radius": radius}
-    return _table(columns | _fields(step, line.points))
+    return structured(columns | _fields(step, line.points))
 
 
 def with_column(table: AnyArray, name: str, values: AnyArray) -> AnyArray:
     """Return a table (m,) with one column more, `values` (m,) under `name`."""
-    return _table({**_columns(table), name: values})
+    return structured({**_columns(table), name: values})
 
 
 @typed(CaseError)
@@ -195,8 +195,7 @@ def write_csv(path: PathLike, table: AnyArray, units: Mapping[str, str] | None =
     """
     columns, units = _columns(table), dict(units or {})
     for name in units:
-        if name not in columns:
-            raise CaseError(unknown("column", name, columns))
+        check_known("column", name, columns, CaseError)
     header = [f"{name} [{units[name]}]" if name in units else name for name in columns]
     texts = [[_text(value) for value in column.tolist()] for column in columns.values()]
     with replacing(path) as temporary, open(temporary, "w", encoding="utf-8", newline="") as file:
@@ -214,11 +213,12 @@ def _text(value: Any) -> str:
     return str(value)
 
 
-def _table(columns: Mapping[str, AnyArray]) -> AnyArray:
-    """Return columns of equal length as one structured array."""
-    table = np.empty(len(next(iter(columns.values()))), dtype=[(name, c.dtype) for name, c in columns.items()])
-    for name, column in columns.items():
-        table[name] = column
+def structured(columns: Mapping[str, AnyArray | Sequence[Any]]) -> AnyArray:
+    """Return columns (m,) of equal length by name, in their units, as one structured array (m,)."""
+    arrays = {name: np.asarray(column) for name, column in columns.items()}
+    table = np.empty(len(next(iter(arrays.values()))), dtype=[(name, array.dtype) for name, array in arrays.items()])
+    for name, array in arrays.items():
+        table[name] = array
     return table
 
 

@@ -37,19 +37,14 @@ def units_of_results(units: Mapping[str, str], kinematics: str) -> dict[str, str
     >>> units_of_results({"length": "m", "force": "N"}, "3d")
     {'length': 'm', 'force': 'N', 'pressure': '', 'penalty': '', 'moment': 'N m', 'stiffness': 'N/m'}
     """
-    units_known = known_units(units)
-    length, force, pressure = units_known["length"], units_known["force"], units_known["pressure"]
-    units_known["penalty"] = f"{pressure}/{length}" if pressure and length else ""
+    length, force, pressure = (known := known_units(units)).values()
+    known["penalty"] = f"{pressure}/{length}" if pressure and length else ""
     if not (length and force):
-        return {**units_known, "moment": "", "stiffness": ""}
+        return {**known, "moment": "", "stiffness": ""}
     if kinematics not in ("plane_strain", "plane_stress") or "/" in force:
-        return {**units_known, "moment": f"{force} {length}", "stiffness": f"{force}/{length}"}
-    return {
-        **units_known,
-        "force": f"{force}/{length}",
-        "moment": f"{force} {length}/{length}",
-        "stiffness": f"{force}/{length}^2",
-    }
+        return {**known, "moment": f"{force} {length}", "stiffness": f"{force}/{length}"}
+    per_thickness = {"moment": f"{force} {length}/{length}", "stiffness": f"{force}/{length}^2"}
+    return {**known, "force": f"{force}/{length}", **per_thickness}
 
 
 def column_units(columns: Iterable[str], units: Mapping[str, str]) -> dict[str, str]:

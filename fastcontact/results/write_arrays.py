@@ -182,22 +182,13 @@ def _plain(value: Any) -> Any:
 
 def append_fields(file: Any, mesh: Mesh, number: int, step: StepResult, cell_fields: Sequence[str]) -> None:
     """Write point and cell fields as those of step `number`, over what a dead writer may have left of it."""
-    first = number * mesh.n_points
-    data = file["VTKHDF/PointData"]
-    for name, values in layout.point_fields(mesh, step).items():
-        if name not in data:  # of a file that an earlier version began
-            continue
-        data[name].resize(first + len(values), axis=0)
-        data[name][first:] = values
-    for name in cell_fields:
-        field, values = file["VTKHDF/CellData"][name], step.cell_fields[name]
-        field.resize((number + 1) * len(values), axis=0)
-        field[number * len(values) :] = values
-    if layout.CELL_STRESS in file["VTKHDF/CellData"]:
-        for name, values in layout.material_fields(mesh, step).items():
-            field = file["VTKHDF/CellData"][name]
-            field.resize((number + 1) * len(values), axis=0)
-            field[number * len(values) :] = values
+    points, cells = file["VTKHDF/PointData"], file["VTKHDF/CellData"]
+    by_cell = {name: step.cell_fields[name] for name in cell_fields}
+    by_cell |= layout.material_fields(mesh, step) if layout.CELL_STRESS in cells else {}
+    for group, fields in ((points, layout.point_fields(mesh, step)), (cells, by_cell)):
+        for name, values in fields.items():
+            if name in group:  # earlier versions began files with fewer
+                _extend(group[name], values, number * len(values))
 
 
 def append_tables(
@@ -308,15 +299,15 @@ def _append_contact(pair: Any, number: int, contact: ContactResult | None) -> No
     _set_row(pair["steps"], number, row)
 
 
-def _append_sides(own: Any, mesh: Mesh, number: int, sides: MaterialStress) -> None:
+def _append_sides(parent: Any, mesh: Mesh, number: int, sides: MaterialStress) -> None:
     """Append the stress of each side where materials meet; the tables are made with the first one."""
-    if "materials" not in own:
-        group = own.create_group(None)  # without a name until it is whole: the program may be interrupted
+    if "materials" not in parent:
+        group = parent.create_group(None)  # without a name until it is whole: the program may be interrupted
         _packed(group, "cells", np.asarray(sides.cells, np.int32))
         growing_table(group, "rows", layout.material_row(mesh.dim))
         growing_table(group, "steps", layout.SIDES_STEP)
-        own["materials"] = group
-    group = own["materials"]
+        parent["materials"] = group
+    group = parent["materials"]
     table = np.zeros(len(sides.points), group["rows"].dtype)
     for name in ("points", "material", "stress"):
         table[name] = getattr(sides, name)
@@ -324,8 +315,9 @@ def _append_sides(own: Any, mesh: Mesh, number: int, sides: MaterialStress) -> N
     _extend(group["rows"], table)
 
 
-def _extend(table: Any, values: AnyArray) -> None:
-    first = len(table)
+def _extend(table: Any, values: AnyArray, first: int | None = None) -> None:
+    """Write values from a row on, by default behind all rows."""
+    first = len(table) if first is None else first
     table.resize(first + len(values), axis=0)
     table[first:] = values
 

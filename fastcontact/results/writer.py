@@ -21,12 +21,12 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
+from fastcontact._tools.hdf5_driver import new_hdf5
+from fastcontact._tools.packing import packed
+from fastcontact._tools.paths import PathLike, checked_target, replacing
 from fastcontact.elasticity.material_sides import material_sides
 from fastcontact.errors import ConvergenceError, FastcontactError, FileError, ModelError
-from fastcontact.mesh.argument_types import typed
-from fastcontact.mesh.files.hdf5_driver import new_hdf5
-from fastcontact.mesh.files.packing import packed
-from fastcontact.mesh.files.paths import PathLike, checked_target, replacing
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results import layout, write_arrays
 from fastcontact.results.background import Background

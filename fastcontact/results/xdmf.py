@@ -6,8 +6,8 @@ import os
 from typing import Any
 from xml.etree import ElementTree
 
+from fastcontact._tools.paths import PathLike, checked_target, replacing
 from fastcontact.errors import FileError
-from fastcontact.mesh.files.paths import PathLike, checked_target, replacing
 from fastcontact.results import layout
 from fastcontact.results.reader import open_results
 from fastcontact.results.tables import STRESS_COMPONENTS

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fastcontact._tools.argument_types import typed
+from fastcontact._tools.paths import PathLike, replacing
 from fastcontact.arrays import Array
-from fastcontact.errors import CaseError, FileError, unknown
-from fastcontact.mesh.argument_types import typed
-from fastcontact.mesh.files.paths import PathLike, replacing
+from fastcontact.errors import CaseError, FileError, check_known
 
 STYLES = ("line", "symbols", "line+symbols")
 
@@ -55,8 +55,7 @@ class Curve:
         x, y = (np.asarray(values, np.float64) for values in (self.x, self.y))
         if x.ndim != 1 or x.shape != y.shape:
             raise CaseError(f"curve '{self.legend}': x has shape {x.shape} and y {y.shape}, not both (n,)")
-        if self.style not in STYLES:
-            raise CaseError(unknown("curve style", self.style, STYLES))
+        check_known("curve style", self.style, STYLES, CaseError)
         finite = np.isfinite(x) & np.isfinite(y)
         object.__setattr__(self, "x", x[finite])
         object.__setattr__(self, "y", y[finite])

@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.analysis.progress import StatusLine
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.cases.case import Case, build_case, read_case
-from fastcontact.errors import CaseError, FastcontactWarning, unknown
+from fastcontact.errors import CaseError, FastcontactWarning, check_known
 from fastcontact.mesh import elements
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.generate import Forest, circles, linearised, to_quadratic
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.step import StepResult
@@ -92,7 +92,10 @@ def adaptive_study(
     rounds: list[Round] = []
     with _telling(on_round, progress) as tell:
         while True:
-            leaf, solved, last, error, this = _round(forest, curves, case, chosen, member, quantity, rounds)
+            started = time.perf_counter()
+            linear, leaf = forest.mesh()
+            solved = _case_on(linear, curves, case, chosen, member)
+            last, error, this = _solved(solved, quantity, chosen.pair, rounds, started)
             rounds.append(this)
             tell(this)
             reached = this.estimate <= tolerance
@@ -115,17 +118,6 @@ def _telling(on_round: Callable[[Round], None] | None, progress: bool) -> Iterat
             line.draw(f"{this.n_dofs} degrees of freedom, estimated error {this.estimate:.1e}")
 
         yield tell
-
-
-def _round(
-    forest: Forest, curves: Sequence[Any], case: Case, chosen: Settings, member: Combination, quantity: str,
-    before: Sequence[Round],
-) -> tuple[Any, Case, StepResult, ErrorEstimate, Round]:  # fmt: skip
-    """Return the leaves of the forest that are cells, the case on that mesh, and what `_solved` returns for it."""
-    started = time.perf_counter()
-    linear, leaf = forest.mesh()
-    solved = _case_on(linear, curves, case, chosen, member)
-    return leaf, solved, *_solved(solved, quantity, chosen.pair, before, started)
 
 
 def _checked(case: Case | str | Path, tolerance: float) -> Case:
@@ -164,8 +156,7 @@ def _solved(
         last = last_step(case)
     error = estimate_error(case.model, last)
     values = quantities.measure(case, last, pair)
-    if quantity not in values:
-        raise CaseError(unknown("quantity", quantity, values))
+    check_known("quantity", quantity, values, CaseError)
     exact = quantities.by_theory(case, pair, 0.0)
     n_cells = sum(map(len, case.mesh.solids.values()))
     estimate = _estimate([*(round_before.values[quantity] for round_before in before), values[quantity]])

@@ -10,13 +10,15 @@ import numpy as np
 
 from fastcontact.arrays import AnyArray
 from fastcontact.cases.case import Case
+from fastcontact.cases.summary import finite
 from fastcontact.results.plot.patches import outlines
 from fastcontact.results.step import StepResult
+from fastcontact.results.tables import structured
 from fastcontact.results.units import labelled
 from fastcontact.studies.error_estimate import ErrorEstimate
 from fastcontact.studies.quantities import column, title, unit
 from fastcontact.studies.render.figure import frame, panels
-from fastcontact.studies.render.table import Rows, finite, number, structured
+from fastcontact.studies.render.table import Rows, number
 from fastcontact.studies.report import Report
 
 

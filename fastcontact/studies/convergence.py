@@ -10,17 +10,16 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.cases.case import Case, read_case
-from fastcontact.errors import CaseError, unknown, warn
-from fastcontact.mesh.argument_types import typed
+from fastcontact.errors import CaseError, check_known, warn
 from fastcontact.studies import function_runs as functions
 from fastcontact.studies.affordable import check_levels, check_runs
 from fastcontact.studies.convergence_report import Study
-from fastcontact.studies.execute import Progress, Result, raise_first, run_all
+from fastcontact.studies.execute import Progress, Result, run_study
 from fastcontact.studies.fit import Limit, fit_limit
 from fastcontact.studies.function_runs import Function, FunctionRun, Quantities
 from fastcontact.studies.job import Job, fields_of, job_of
-from fastcontact.studies.progress import told
 from fastcontact.studies.quantities import EXACT_THEORIES, LABELS, check_names, of_theory
 from fastcontact.studies.report import of_case
 from fastcontact.studies.series import Level, Series
@@ -100,10 +99,16 @@ def convergence_study(
     >>> study = fc.convergence_study(squeezed, [0.5, 0.25, 0.125], quantities=bulge)  # doctest: +SKIP
     >>> study.best.limits["bulge"].value, study.best.limits["bulge"].uncertainty  # doctest: +SKIP
     """
+    options = {
+        "executor": executor,
+        "workers": workers,
+        "store": store,
+        "on_progress": on_progress,
+        "progress": progress,
+    }
     if callable(case):
         functions.refuse({"elements": elements, "formulations": formulations})
-        options = {"executor": executor, "workers": workers, "store": store, "on_progress": on_progress}
-        return _of_function(case, levels, quantities, {**options, "progress": progress})
+        return _of_function(case, levels, quantities, options)
     if not isinstance(levels, int | np.integer) or isinstance(quantities, Mapping):
         raise CaseError(
             "mesh sizes and functions as quantities are for Python models: give a case its number of levels"
@@ -117,8 +122,7 @@ def convergence_study(
     check_runs(levels * len(members))
     check_levels(case, chosen, members, levels)
     jobs = [level_job(case, chosen, member, level) for level in range(levels) for member in members]
-    with told(on_progress, progress) as told_to:
-        results = run_all(jobs, executor=executor, workers=workers, store=store, on_progress=told_to)
+    results = run_study(jobs, "no level could be solved", **options)
     return gathered(case, jobs, results, [*chosen.quantities, *quantities])
 
 
@@ -168,14 +172,13 @@ def level_job(case: Case, chosen: Settings, member: Combination, level: int) -> 
 
 def gathered(case: Case, jobs: Sequence[Job], results: Sequence[Result], wanted: Sequence[str]) -> Study:
     """Return the study of finished runs; `wanted` are quantities to fit besides the standard ones and those of checks."""
-    raise_first("no level could be solved", jobs, results)
     by_combination: dict[Combination, list[tuple[int, Result]]] = {}
     for job, result in zip(jobs, results, strict=True):
         member = Combination(job.marks["element"], job.marks["formulation"])
         by_combination.setdefault(member, []).append((job.marks["level"], result))
     checked = [check.quantity for check in case.checks]
-    own = case.theories.get(settings(case).pair or "", {})
-    theory, share = own.get("theory"), own.get("share", 1.0)
+    theories = case.theories.get(settings(case).pair or "", {})
+    theory, share = theories.get("theory"), theories.get("share", 1.0)
     compared = "at equal approach" if settings(case).pair in case.approach else "under the given load"
     series, failed = [], {}
     for member, runs in by_combination.items():
@@ -202,8 +205,7 @@ def _series(
     levels = [Level(number=number, **fields_of(Level, result)) for number, result in solved]
     known = levels[-1].values
     for name in wanted:
-        if name not in known:
-            raise CaseError(unknown("quantity", name, known))
+        check_known("quantity", name, known, CaseError)
     names = tuple(dict.fromkeys(name for name in (*LABELS, *checked, *wanted) if name in known))
     limits = {name: limit for name in names if (limit := _limit(levels, name)) is not None}
     failed = {number: str(result["error"]) for number, result in results if "error" in result}

@@ -102,10 +102,10 @@ def draw_pressure(ax: Any, series: Series, theory: Any, units: Mapping[str, str]
 
 def _draw_theory(ax: Any, theory: Any, series: Series, x: Array) -> None:
     """Draw the pressure of a theory, where it has one, at equal approach and at equal force."""
-    own = pressure_curve(theory)
-    if own is None:
+    given = pressure_curve(theory)
+    if given is None:
         return
-    curves = [("theory" if series.exact_theory else f"theory {series.compared}", "k-", own)]
+    curves = [("theory" if series.exact_theory else f"theory {series.compared}", "k-", given)]
     force = series.limits.get("force")
     if force is not None and force.value > 0 and hasattr(theory, "at_force"):
         same = pressure_curve(theory.at_force(force.value / series.share))

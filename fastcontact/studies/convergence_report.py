@@ -8,11 +8,12 @@ from itertools import zip_longest
 from typing import Any
 
 from fastcontact.arrays import AnyArray
+from fastcontact.results.tables import structured
 from fastcontact.studies import convergence_tables as tables
 from fastcontact.studies.convergence_figures import draw_differences, draw_errors, draw_pressure
 from fastcontact.studies.fit import CONFIDENCE
 from fastcontact.studies.render.figure import message, panels
-from fastcontact.studies.render.table import Rows, structured
+from fastcontact.studies.render.table import Rows
 from fastcontact.studies.report import Report
 from fastcontact.studies.sentences import sentences
 from fastcontact.studies.series import Series
@@ -85,15 +86,15 @@ class Study(Report):
 
     def tables(self) -> list[tuple[str, Rows]]:
         """See `Report`: of every combination its levels and its limits, and all combinations beside each other."""
-        found = []
+        captioned = []
         for series in self.series:
-            found.append((str(series.combination), tables.level_rows(series, self.units)))
+            captioned.append((str(series.combination), tables.level_rows(series, self.units)))
             if series.limits:
-                found.append((f"{series.combination}: limits", tables.limit_rows(series, self.units)))
+                captioned.append((f"{series.combination}: limits", tables.limit_rows(series, self.units)))
         if len(self.series) > 1:
             rows = tables.comparison_rows(self.series, self.best.shown(COMPARED), self.units)
-            found.append((f"all combinations: limits and model errors {self.best.compared}", rows))
-        return found
+            captioned.append((f"all combinations: limits and model errors {self.best.compared}", rows))
+        return captioned
 
     def sentences(self) -> list[str]:
         """See `Report`."""

@@ -7,9 +7,10 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from fastcontact.cases.summary import finite
 from fastcontact.results.units import labelled
 from fastcontact.studies.quantities import column, title
-from fastcontact.studies.render.table import Rows, finite, number, percent
+from fastcontact.studies.render.table import Rows, number, percent
 from fastcontact.studies.sentences import sentences
 from fastcontact.studies.series import Series
 
@@ -38,7 +39,7 @@ def level_rows(series: Series, units: Mapping[str, str], quantities: Sequence[st
 def limit_rows(series: Series, units: Mapping[str, str]) -> Rows:
     """Return header and rows: limit, order, theory and errors of every quantity with a limit."""
     cells = [[column(title(name), name, units), *_cells(series, name, OF_LIMITS)] for name in series.limits]
-    told = [any(row[place] != "-" for row in cells) for place in range(len(OF_LIMITS) + 1)]
+    told = [any(row[index] != "-" for row in cells) for index in range(len(OF_LIMITS) + 1)]
     return [list(itertools.compress(row, told)) for row in (["quantity", *OF_LIMITS], *cells)]
 
 
@@ -86,7 +87,7 @@ def csv_columns(all_series: Sequence[Series]) -> dict[str, list[Any]]:
     columns: dict[str, list[Any]] = {}
     for series in all_series:
         count = len(series.levels)
-        found: dict[str, list[Any]] = {
+        of_series: dict[str, list[Any]] = {
             "element": [series.combination.element or ""] * count,
             "formulation": [series.combination.formulation or ""] * count,
             "level": [level.number for level in series.levels],
@@ -95,13 +96,13 @@ def csv_columns(all_series: Sequence[Series]) -> dict[str, list[Any]]:
             "seconds": [level.seconds for level in series.levels],
         }
         for name in quantities:
-            found |= {
+            of_series |= {
                 name: series.values(name),
                 f"{name}_error": series.errors(name),
                 f"{name}_order": series.orders(name),
                 f"{name}_from_theory": series.from_theory(name),
             }
-        for name, values in found.items():
+        for name, values in of_series.items():
             columns.setdefault(name, []).extend(values)
     return {name: values for name, values in columns.items() if not all(value != value for value in values)}
 

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
+from fastcontact._tools.html_table import fields_table
 from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.contact.integration import facet_measure, fine_rule
 from fastcontact.contact.surface import surface
@@ -20,8 +22,6 @@ from fastcontact.elasticity.initial_states import StressOffset
 from fastcontact.elasticity.smoothed_stress import smoothed_stress
 from fastcontact.errors import ModelError
 from fastcontact.mesh import elements
-from fastcontact.mesh.argument_types import typed
-from fastcontact.mesh.html_table import fields_table
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.studies.error_norms import stress_in_cells

@@ -14,15 +14,15 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fastcontact._tools.argument_types import typed
+from fastcontact._tools.html_table import fields_table
 from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.cell_stress import CellStress, beside
 from fastcontact.elasticity.energy import cell_volumes, elastic_energy, integration_rule
 from fastcontact.elasticity.initial_states import StressOffset
 from fastcontact.errors import ModelError
 from fastcontact.mesh import elements
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.elements import Element
-from fastcontact.mesh.html_table import fields_table
 from fastcontact.model.model import Model
 
 # Quadrature points worked on at a time, so that theories with large intermediate arrays fit the memory.

@@ -20,10 +20,11 @@ from pathlib import Path
 from typing import Any
 
 from fastcontact import errors
+from fastcontact._tools.paths import replacing
 from fastcontact.errors import CaseError, FastcontactError, FileError
-from fastcontact.mesh.files.paths import replacing
 from fastcontact.results.committed_file import uninterrupted
 from fastcontact.studies.job import Run, run
+from fastcontact.studies.progress import told
 
 Result = dict[str, Any]
 # NumPy and Numba read these when they are imported, so they are set before a worker process starts.
@@ -72,7 +73,7 @@ def run_all(
     Raises CaseError if the number of workers is wrong, FastcontactError if no worker process can start.
     """
     kept = None if store is None else Store(store)
-    results = {i: found for i, job in enumerate(jobs) if kept and (found := kept.get(job)) is not None}
+    results = {i: stored_result for i, job in enumerate(jobs) if kept and (stored_result := kept.get(job)) is not None}
     waiting = {index: job.label for index, job in enumerate(jobs)}
 
     def ended(index: int, stored: bool = False) -> None:
@@ -90,6 +91,18 @@ def run_all(
         results[index] = result
         ended(index)
     return [results[index] for index in range(len(jobs))]
+
+
+def run_study(
+    jobs: Sequence[Run], name: str, *, on_progress: Callable[[Progress], None] | None, progress: bool, **options: Any
+) -> list[Result]:
+    """Return the results of `run_all`, told on a line if `progress`; the first error if all fail, begun by `name`."""
+    with told(on_progress, progress) as told_to:
+        results = run_all(jobs, on_progress=told_to, **options)
+    if all("error" in result for result in results):
+        kind = getattr(errors, str(results[0].get("kind")), CaseError)
+        raise kind(f"{name}; {jobs[0].label}: {results[0]['error']}")
+    return results
 
 
 class Store:
@@ -122,13 +135,6 @@ class Store:
             temporary.write_text(text + "\n", encoding="utf-8")
 
 
-def raise_first(name: str, jobs: Sequence[Run], results: Sequence[Result]) -> None:
-    """Raise the error of the first run if all runs failed; `name` begins the message."""
-    if all("error" in result for result in results):
-        kind = getattr(errors, str(results[0].get("kind")), CaseError)
-        raise kind(f"{name}; {jobs[0].label}: {results[0]['error']}")
-
-
 def _run_rest(
     jobs: Sequence[Run], rest: list[int], executor: Executor | None, workers: int | None
 ) -> Iterator[tuple[int, Result]]:
@@ -150,20 +156,14 @@ def on_processes(count: int, jobs: Sequence[Run], rest: list[int]) -> Iterator[t
         # The script calls the study outside of "if __name__ == '__main__'": the process that waits for this one says so.
         raise SystemExit(1)
     left = list(rest)
-    pool = started_pool(count)
     try:
-        for index, result in on_executor(pool, jobs, rest):
-            left.remove(index)
-            yield index, result
-        pool.shutdown()  # they have nothing left to do, and end in their own way
+        with started_pool(count) as pool:
+            for index, result in on_executor(pool, jobs, rest):
+                left.remove(index)
+                yield index, result
     except BrokenProcessPool:
         for index in left:
             yield index, _alone(jobs[index])
-    except BaseException:
-        pool.end()
-        raise
-    finally:
-        pool.shutdown(wait=False, cancel_futures=True)
 
 
 class Worker(SpawnProcess):
@@ -204,18 +204,31 @@ class Workers(ProcessPoolExecutor):
                 process.terminate()
 
 
-def started_pool(count: int) -> Workers:
-    """Return a pool of processes of which one has answered; raises FastcontactError if none can start."""
+@contextlib.contextmanager
+def started_pool(count: int) -> Iterator[Workers]:
+    """Give a pool of processes of which one has answered; an error in the block ends them in the middle of their work.
+
+    Raises FastcontactError if none can start.
+    """
     pool = Workers(count)
     try:
-        with _worker_settings():
-            pool.submit(os.getpid).result()
+        try:
+            with _worker_settings():
+                pool.submit(os.getpid).result()
+        except BrokenProcessPool:
+            raise FastcontactError(
+                "no worker process could start: in a script, put what calls the study under if __name__ == '__main__':, "
+                "or use workers=1"
+            ) from None
+        yield pool
+        pool.shutdown()  # they have nothing left to do, and end in their own way
     except BrokenProcessPool:
-        raise FastcontactError(
-            "no worker process could start: in a script, put what calls the study under if __name__ == '__main__':, "
-            "or use workers=1"
-        ) from None
-    return pool
+        raise
+    except BaseException:
+        pool.end()
+        raise
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
 
 
 def _imports_its_script() -> bool:
@@ -225,19 +238,12 @@ def _imports_its_script() -> bool:
 
 
 def _alone(job: Run) -> Result:
-    pool = started_pool(1)
     try:
-        result = pool.submit(run, job, 1).result()
-        pool.shutdown()
-        return result
+        with started_pool(1) as pool:
+            return pool.submit(run, job, 1).result()
     except BrokenProcessPool:
         text = "its worker process was killed, as the system does when the memory is full: use coarser meshes"
         return {"error": text, "kind": "BrokenProcessPool"}
-    except BaseException:
-        pool.end()
-        raise
-    finally:
-        pool.shutdown(wait=False, cancel_futures=True)
 
 
 def _processors() -> int:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 import sys
-import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
@@ -12,9 +11,6 @@ from dataclasses import dataclass
 from multiprocessing.reduction import ForkingPickler
 from typing import Any
 
-import numpy as np
-
-from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.run import solve
 from fastcontact.cases.case import Case
 from fastcontact.errors import CaseError, FastcontactError, unknown
@@ -23,9 +19,8 @@ from fastcontact.model.ramp import linear_ramp
 from fastcontact.results.step import StepResult
 from fastcontact.results.units import known_units
 from fastcontact.studies import quantities
-from fastcontact.studies.execute import Progress, raise_first, run_all
-from fastcontact.studies.job import Run, profile, recorded
-from fastcontact.studies.progress import told
+from fastcontact.studies.execute import run_study
+from fastcontact.studies.job import Run
 
 # Of the last step; with an argument of the name `STEPS`, of the list of all steps.
 Measure = Callable[..., float]
@@ -44,27 +39,13 @@ class FunctionRun(Run):
     named: Mapping[str, Any]
     measures: Mapping[str, Measure]  # further quantities
 
-    def measured(self) -> dict[str, Any]:
+    def solved(self) -> tuple[Case | None, Sequence[StepResult]]:
         """See `Run`."""
-        started = time.perf_counter()
-        with recorded() as texts:
-            case, steps = _solved(self._made(), self.name)
-        last = steps[-1]
-        pair = next(iter(last.contact), None)
-        values = quantities.measure(case, last, pair) if case else quantities.of_contacts(last)
-        values = {name: value for name, value in values.items() if np.isfinite(value)}
-        return {
-            "h": quantities.mesh_size(case, pair) if case else float("nan"),
-            "n_dofs": last.displacement.size,
-            "values": values | {name: _number(name, measure, steps) for name, measure in self.measures.items()},
-            "theory": {},
-            "reference": {},
-            "equal_force": {},
-            "profile": profile(last, pair),
-            "seconds": time.perf_counter() - started,
-            "warnings": texts,
-            "units": dict(last.units),
-        }
+        return _solved(self._made(), self.name)
+
+    def further(self, steps: Sequence[StepResult]) -> dict[str, float]:
+        """See `Run`."""
+        return {name: _number(name, measure, steps) for name, measure in self.measures.items()}
 
     def _made(self) -> Any:
         """Return what the function returns; CaseError with the line of it that failed."""
@@ -81,10 +62,7 @@ class FunctionRun(Run):
 def _solved(made: Any, name: str) -> tuple[Case | None, Sequence[StepResult]]:
     """Return the steps of what a function has made; of a model, solved here, also the case that it is."""
     if isinstance(made, Model):
-        case = Case(
-            name=name, title=name, text="", mesh=made.mesh, model=made, ramp=linear_ramp(), criteria=Criteria(),
-            linear_solver="auto", linear_tolerance=1e-10, probes={}, units=known_units(made.units),
-        )  # fmt: skip
+        case = Case(name, name, "", made.mesh, made, linear_ramp(), units=known_units(made.units))
         return case, solve(made, case.ramp)
     if isinstance(made, StepResult):
         return None, [made]
@@ -157,22 +135,12 @@ def refuse(of_cases: Mapping[str, Any]) -> None:
 
 
 def run_functions(
-    runs: Sequence[FunctionRun],
-    name: str,
-    *,
-    executor: Executor | None,
-    workers: int | None,
-    store: Any,
-    on_progress: Callable[[Progress], None] | None,
-    progress: bool,
+    runs: Sequence[FunctionRun], name: str, *, executor: Executor | None, workers: int | None, **options: Any
 ) -> list[dict[str, Any]]:
-    """Return the results of the runs, by default one after the other in this process; `name` begins the error if all fail."""
+    """Return the results of `run_study`, by default one run after the other in this process."""
     if (executor is not None or (workers or 1) > 1) and not isinstance(executor, ThreadPoolExecutor):
         _check_sendable(runs[0])
-    with told(on_progress, progress) as told_to:
-        results = run_all(runs, executor=executor, workers=workers or 1, store=store, on_progress=told_to)
-    raise_first(name, runs, results)
-    return results
+    return run_study(runs, name, executor=executor, workers=workers or 1, **options)
 
 
 def _check_sendable(run: FunctionRun) -> None:

@@ -7,11 +7,12 @@ import copy
 import dataclasses
 import hashlib
 import json
+import math
 import time
 import traceback
 import warnings
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -51,9 +52,38 @@ class Run:
     marks: dict[str, Any]  # distinguish this run from the others of its study, e.g. its level
     size: float = 0.0  # amount of work, in any unit that the runs of a study share
 
+    def solved(self) -> tuple[Case | None, Sequence[StepResult]]:
+        """Return the case of this run, where it is known, and its steps, or the last of them alone."""
+        raise NotImplementedError
+
     def measured(self) -> dict[str, Any]:
         """Return the result of `run`; raises where the mesh, the model or the solution fails."""
-        raise NotImplementedError
+        started = time.perf_counter()
+        with recorded() as texts:
+            case, steps = self.solved()
+        last = steps[-1]
+        pair = self.pair_of(last)
+        values = quantities.of_contacts(last) if case is None else quantities.measure(case, last, pair)
+        values = {name: value for name, value in values.items() if np.isfinite(value)} | self.further(steps)
+        return {
+            "h": math.nan if case is None else quantities.mesh_size(case, pair),
+            "n_dofs": last.displacement.size,
+            "values": values,
+            **quantities.by_theory(case, pair, values.get("force", 0.0)),
+            "profile": profile(last, pair),
+            "iterations": {k: int(v) for k, v in last.iterations.items() if isinstance(v, int)},
+            "seconds": time.perf_counter() - started,
+            "warnings": texts,
+            "units": dict(last.units),
+        }
+
+    def pair_of(self, last: StepResult) -> str | None:
+        """Return the contact pair to measure, by default the first one."""
+        return next(iter(last.contact), None)
+
+    def further(self, steps: Sequence[StepResult]) -> dict[str, float]:
+        """Return further quantities of the steps."""
+        return {}
 
     @property
     def key(self) -> str:
@@ -79,28 +109,19 @@ class Job(Run):
         data = {key: value for key, value in self.data.items() if key not in ("title", "units", "check")}
         whole = {"version": __version__, "schema": SCHEMA, "data": data, "pair": self.pair, "recipe": self.recipe}
         whole["files"] = digest(files_named({key: data[key] for key in data if key != "mesh"}, self.folder))
-        found = hashlib.sha256(json.dumps(whole, sort_keys=True, default=str).encode())
+        hashed = hashlib.sha256(json.dumps(whole, sort_keys=True, default=str).encode())
         if self.base is not None:
-            found.update(_fingerprint(self.base))
-        return found.hexdigest()[:32]
+            hashed.update(_fingerprint(self.base))
+        return hashed.hexdigest()[:32]
 
-    def measured(self) -> dict[str, Any]:
+    def solved(self) -> tuple[Case, list[StepResult]]:
         """See `Run`."""
-        started = time.perf_counter()
-        with recorded() as texts:
-            case = build_case(self.data, name=self.name, folder=self.folder, mesh=make_mesh(self.recipe, self.base))
-            last = last_step(case)
-        values = quantities.measure(case, last, self.pair)
-        return {
-            "h": quantities.mesh_size(case, self.pair),
-            "n_dofs": case.model.n_dofs,
-            "values": {name: value for name, value in values.items() if np.isfinite(value)},
-            **quantities.by_theory(case, self.pair, values.get("force", 0.0)),
-            "profile": profile(last, self.pair),
-            "iterations": {k: int(v) for k, v in last.iterations.items() if isinstance(v, int)},
-            "seconds": time.perf_counter() - started,
-            "warnings": texts,
-        }
+        case = build_case(self.data, name=self.name, folder=self.folder, mesh=make_mesh(self.recipe, self.base))
+        return case, [last_step(case)]
+
+    def pair_of(self, last: StepResult) -> str | None:
+        """See `Run`."""
+        return self.pair
 
 
 @contextlib.contextmanager

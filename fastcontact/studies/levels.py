@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from fastcontact.errors import CaseError, FastcontactError, unknown
+from fastcontact.errors import CaseError, FastcontactError, check_known
 from fastcontact.mesh import elements, generate
 from fastcontact.mesh.generate import Circle, circles, linearised, refined, to_quadratic
 from fastcontact.mesh.mesh import Mesh
@@ -102,12 +102,12 @@ def _default_element(generator: str) -> Any:
 
 
 def _not_makeable(settings: Settings, element: str) -> str:
-    own = settings.own.element or "mixed cells"
+    present = settings.own.element or "mixed cells"
     if settings.by_shape:
         shape = shape_of(element) or "triangles"
         return f"there are no meshes of {element} in this study: give the arguments of level 0 in [study.{shape}]"
     return (
-        f"meshes of {element} cannot be made from the case's {own}: give a generator and its arguments of level 0 in "
+        f"meshes of {element} cannot be made from the case's {present}: give a generator and its arguments of level 0 in "
         "[study], or choose an element on the same corners"
     )
 
@@ -115,12 +115,10 @@ def _not_makeable(settings: Settings, element: str) -> str:
 def _finer(settings: Settings, element: str, given: Mapping[str, Any], level: int) -> Arguments:
     """Return a generator's arguments with sizes halved and counts doubled `level` times."""
     name = str(settings.generator)
-    if name not in generate.GENERATORS:
-        raise CaseError(unknown("study.generator", name, generate.GENERATORS))
+    check_known("study.generator", name, generate.GENERATORS, CaseError)
     signature = inspect.signature(generate.GENERATORS[name]).parameters
     for key in given:
-        if key not in signature:
-            raise CaseError(unknown(f"argument of the generator {name} in [study]", key, signature))
+        check_known(f"argument of the generator {name} in [study]", key, signature, CaseError)
     rule = RULES[name](element, given) if name in RULES else Rule()
     own_rule = bool(settings.halve or settings.double)  # then the rule's ratios may not suit
     halve, double = settings.halve or rule.halve, settings.double or rule.double

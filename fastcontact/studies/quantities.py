@@ -12,10 +12,10 @@ from fastcontact.analytic.manufactured import HertzBox
 from fastcontact.analytic.pressure_curve import pressure_curve
 from fastcontact.arrays import Array, Numbers
 from fastcontact.cases.case import Case
-from fastcontact.cases.checks import OF_PROBES, ONLY_IN_SPACE, STRESS, at_point
+from fastcontact.cases.checks import OF_PROBES, ONLY_IN_SPACE
 from fastcontact.contact.integration import facet_measure
 from fastcontact.contact.surface import Surface, surface
-from fastcontact.errors import CaseError, unknown
+from fastcontact.errors import CaseError, check_known
 from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import quality
@@ -44,18 +44,22 @@ def measure(case: Case, last: StepResult, pair: str | None) -> dict[str, float]:
     values_measured["von_mises_max"], where = peak(case.mesh, last.von_mises, case.model.kinematics == "axisymmetric")
     if pair is not None:
         values_measured["von_mises_depth"] = _depth(case, pair, where)
-    for name, point in case.probes.items():
-        values_measured |= _of_probe(name, point, last)
+    for probe, point in case.probes.items():
+        of_probe = {f"{probe}.{kind}": OF_PROBES[kind][1](last, point) for kind in _kinds(case)}
+        values_measured |= {k: float(v) for k, v in of_probe.items() if v is not None and np.isfinite(v)}
     return values_measured
 
 
 def check_names(case: Case, names: Iterable[str]) -> None:
     """Raise CaseError for the name of a quantity that no run of the case can have, see `measure`."""
-    kinds = [kind for kind in OF_PROBES if kind != "shear" and (case.mesh.dim == 3 or kind not in ONLY_IN_SPACE)]
-    of_probes = [f"{probe}.{kind}" for probe in case.probes for kind in kinds]
+    of_probes = [f"{probe}.{kind}" for probe in case.probes for kind in _kinds(case)]
     for name in names:
-        if name not in (*LABELS, *of_probes):
-            raise CaseError(unknown("quantity", name, [*LABELS, *of_probes]))
+        check_known("quantity", name, [*LABELS, *of_probes], CaseError)
+
+
+def _kinds(case: Case) -> list[str]:
+    """Return the quantities that every probe of a case has."""
+    return [kind for kind in OF_PROBES if kind != "shear" and (case.mesh.dim == 3 or kind not in ONLY_IN_SPACE)]
 
 
 def of_contacts(last: StepResult) -> dict[str, float]:
@@ -210,18 +214,6 @@ def _depth(case: Case, pair: str, where: Array) -> float:
     return float(np.linalg.norm(nodes - where, axis=1).min())
 
 
-def _of_probe(name: str, point: int, last: StepResult) -> dict[str, float]:
-    quantities = {f"{name}.von_mises": float(last.von_mises[point])}
-    for component, value in zip(STRESS, last.stress[point], strict=False):
-        quantities[f"{name}.stress.{component}"] = float(value)
-    for axis, value in zip("xyz", last.displacement[point], strict=False):
-        quantities[f"{name}.displacement.{axis}"] = float(value)
-    if at := at_point(last, point):
-        contact, row = at
-        quantities[f"{name}.pressure"] = float(contact.pressure[row])
-    return quantities
-
-
 def mesh_size(case: Case, pair: str | None) -> float:
     """Return the length of the shortest facet of the secondary surface, or without contact of the shortest edge."""
     if pair is None:
@@ -250,12 +242,13 @@ def of_theory(theory: Any, share: float = 1.0) -> dict[str, float]:
     return {quantity: value for quantity, value in quantities.items() if np.isfinite(value) and value > 0}
 
 
-def by_theory(case: Case, pair: str | None, force: float) -> dict[str, dict[str, float]]:
+def by_theory(case: Case | None, pair: str | None, force: float) -> dict[str, dict[str, float]]:
     """Return the quantities of a pair by its theory at equal approach, its mesh-converged solution, and at equal force.
 
-    The keys are ``theory``, ``reference`` and ``equal_force``; `force` is that of the contact [force].
+    The keys are ``theory``, ``reference`` and ``equal_force``; `force` is that of the contact [force]. Nothing is known
+    without a case.
     """
-    theories = case.theories.get(pair or "", {})
+    theories = {} if case is None else case.theories.get(pair or "", {})
     theory: Any = theories.get("theory")
     share = theories.get("share", 1.0)
     same = theory.at_force(force / share) if force > 0 and hasattr(theory, "at_force") else None

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from fastcontact._tools.html_table import html_table
 from fastcontact.arrays import AnyArray
 from fastcontact.cases.case import Case
 from fastcontact.cases.summary import versions
-from fastcontact.mesh.html_table import html_table
 from fastcontact.results.conversions import data_frame
 from fastcontact.results.units import units_of_results
 from fastcontact.studies.quantities import unit

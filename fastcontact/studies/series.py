@@ -63,14 +63,12 @@ def split(finest: float, limit: Limit, theory: float) -> Split:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class Level:
-    """Results of one mesh.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Measured:
+    """Results of one run.
 
     Attributes
     ----------
-    number : int
-        0 is the coarsest.
     h : float
         Shortest facet of the secondary surface; without contact the shortest edge [length].
     n_dofs : int
@@ -83,13 +81,19 @@ class Level:
     warnings : tuple of str
     """
 
-    number: int
     h: float
     n_dofs: int
     values: dict[str, float]
     profile: dict[str, list[float]] = field(repr=False)
     seconds: float
     warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Level(Measured):
+    """Results of one mesh, see `Measured`; its `number` is 0 for the coarsest."""
+
+    number: int
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from typing import Any
 from fastcontact.cases.case import Case
 from fastcontact.cases.keys import check_keys
 from fastcontact.contact.formulations import FORMULATIONS
-from fastcontact.errors import CaseError, unknown
+from fastcontact.errors import CaseError, check_known
 from fastcontact.mesh import elements
 from fastcontact.mesh.generate import GENERATORS, Circle
 
@@ -90,20 +90,19 @@ def settings(case: Case, data: dict[str, Any] | None = None) -> Settings:
     """Return the settings of a case's studies, checked; `data` replaces the parsed case file, e.g. with other values."""
     data = data_of(case) if data is None else data
     study = data.get("study", {})
-    pair = study.get("contact") or next((own.name for own in case.model.contact), None)
+    pair = study.get("contact") or next((combination.name for combination in case.model.contact), None)
     formulations = {pair.name: pair.formulation for pair in case.model.contact}
-    if pair is not None and pair not in formulations:
-        raise CaseError(unknown("contact pair in study.contact", pair, formulations))
+    if pair is not None:
+        check_known("contact pair in study.contact", pair, formulations, CaseError)
     solids = list(case.mesh.solids)
-    own = Combination(solids[0] if len(solids) == 1 else None, formulations.get(pair or ""))
+    combination = Combination(solids[0] if len(solids) == 1 else None, formulations.get(pair or ""))
     generator, arguments = _generator(data, study)
     for name in study.get("options", {}):
-        if name not in FORMULATIONS:
-            raise CaseError(unknown("formulation in study.options", name, FORMULATIONS))
+        check_known("formulation in study.options", name, FORMULATIONS, CaseError)
     curves = tuple(_circle(i, entry) for i, entry in enumerate(study.get("curves", ())))
     return Settings(
         data=data,
-        own=own,
+        own=combination,
         pair=pair,
         formulations=formulations,
         generator=generator,
@@ -114,15 +113,15 @@ def settings(case: Case, data: dict[str, Any] | None = None) -> Settings:
         load_steps=study.get("load_steps"),
         options=study.get("options", {}),
         quantities=tuple(study.get("quantities", ())),
-        combinations=tuple(_combination(entry) for entry in study.get("combinations", ())) or (own,),
+        combinations=tuple(_combination(entry) for entry in study.get("combinations", ())) or (combination,),
     )
 
 
 def _generator(data: dict[str, Any], study: dict[str, Any]) -> tuple[str | None, dict[str, dict[str, Any]]]:
     by_shape = {shape: dict(study[shape]) for shape in SHAPES if shape in study}
     generator = study.get("generator", data["mesh"].get("generator"))
-    if generator is not None and generator not in GENERATORS:
-        raise CaseError(unknown("study.generator", generator, GENERATORS))
+    if generator is not None:
+        check_known("study.generator", generator, GENERATORS, CaseError)
     if by_shape and generator is None:
         raise CaseError(f"study.{next(iter(by_shape))} needs 'study.generator', the mesh maker it is meant for")
     if not by_shape and "generator" in study and study["generator"] != data["mesh"].get("generator"):
@@ -152,10 +151,10 @@ def _combination(entry: Any) -> Combination:
 
 
 def _checked(element: str | None, formulation: str | None) -> Combination:
-    if element is not None and element not in elements.ELEMENTS:
-        raise CaseError(unknown("element", element, elements.ELEMENTS))
-    if formulation is not None and formulation not in FORMULATIONS:
-        raise CaseError(unknown("contact formulation", formulation, FORMULATIONS))
+    if element is not None:
+        check_known("element", element, elements.ELEMENTS, CaseError)
+    if formulation is not None:
+        check_known("contact formulation", formulation, FORMULATIONS, CaseError)
     return Combination(element, formulation)
 
 
@@ -194,8 +193,8 @@ def makeable(settings: Settings, element: str) -> bool:
     """Whether meshes of this element can be made for the case."""
     if settings.by_shape:
         return shape_of(element) in settings.arguments
-    own = settings.own.element
-    return elements.get(own).linear == elements.get(element).linear if own else settings.generator is not None
+    present = settings.own.element
+    return elements.get(present).linear == elements.get(element).linear if present else settings.generator is not None
 
 
 def shape_of(element: str) -> str:

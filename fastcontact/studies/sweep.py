@@ -11,17 +11,16 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.cases.case import Case, build_case, described, read_case
 from fastcontact.errors import CaseError, FastcontactError
-from fastcontact.mesh.argument_types import typed
 from fastcontact.studies import function_runs as functions
 from fastcontact.studies.affordable import check_runs
 from fastcontact.studies.case_parameters import substituted
-from fastcontact.studies.execute import Progress, Result, raise_first, run_all
+from fastcontact.studies.execute import Progress, Result, run_study
 from fastcontact.studies.function_runs import Function, FunctionRun, Quantities
 from fastcontact.studies.job import Job, fields_of, job_of
 from fastcontact.studies.levels import make_mesh, recipe
-from fastcontact.studies.progress import told
 from fastcontact.studies.quantities import check_names, of_theory
 from fastcontact.studies.report import of_case
 from fastcontact.studies.settings import data_of, one_combination, settings
@@ -94,10 +93,16 @@ def parameter_sweep(
     >>> [round(point.values["force"], 6) for point in sweep.points]
     [1.0, 1.098901]
     """
+    options = {
+        "executor": executor,
+        "workers": workers,
+        "store": store,
+        "on_progress": on_progress,
+        "progress": progress,
+    }
     if callable(case):
         functions.refuse({"element": element, "formulation": formulation, "level": level})
-        options = {"executor": executor, "workers": workers, "store": store, "on_progress": on_progress}
-        return _of_function(case, parameters, quantities, {**options, "progress": progress})
+        return _of_function(case, parameters, quantities, options)
     if not isinstance(parameters, Mapping) or isinstance(quantities, Mapping):
         raise CaseError("values without a name and functions as quantities are for Python models; a case takes names")
     case = case if isinstance(case, Case) else read_case(case)
@@ -107,9 +112,7 @@ def parameter_sweep(
     jobs = [_job(case, choice, element, formulation, level) for choice in choices]
     # An unknown key would make every run fail.
     build_case(jobs[0].data, name=case.name, folder=case.folder, mesh=case.mesh)
-    with told(on_progress, progress) as told_to:
-        results = run_all(jobs, executor=executor, workers=workers, store=store, on_progress=told_to)
-    raise_first("no point of the sweep could be solved", jobs, results)
+    results = run_study(jobs, "no point of the sweep could be solved", **options)
     return Sweep(
         **of_case(case),
         **_points(parameters, choices, results),
@@ -179,7 +182,7 @@ def _theory_curves(case: Case, parameters: Mapping[str, Sequence[Value]], pair: 
     data = data_of(case)
     linked = data.get("study", {}).get("parameters", {})
     curves = []
-    for choice in itertools.product(*(own for _, own in others)):
+    for choice in itertools.product(*(values_of_other for _, values_of_other in others)):
         rest = dict(zip((name for name, _ in others), choice, strict=True))
         rows = [_theory_at(data, {first: float(value), **rest}, linked, pair) for value in x]
         known = [name for name in rows[0] if all(name in row for row in rows)]

@@ -138,11 +138,11 @@ class Drawing:
 
     def _curves(self) -> list[tuple[str, Sequence[Any], list[Point]]]:
         """Return label, values of the first parameter and points, for each choice of the other parameters."""
-        found: dict[str, list[Point]] = {}
+        by_label: dict[str, list[Point]] = {}
         for point in self.points:
-            found.setdefault(label_of(point.parameters, self.others), []).append(point)
+            by_label.setdefault(label_of(point.parameters, self.others), []).append(point)
         curves: list[tuple[str, Sequence[Any], list[Point]]] = []
-        for label, points in found.items():
+        for label, points in by_label.items():
             x = [point.parameters[self.first] for point in points]
             plain = all(isinstance(value, (int, float)) for value in x)
             curves.append((label, x if plain else list(map(str, x)), points))

@@ -3,45 +3,30 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from fastcontact.arrays import AnyArray
+from fastcontact.studies.series import Measured
 
 Value = float | int | str | bool
 
 
-@dataclass(frozen=True, eq=False)
-class Point:
-    """Results for one choice of the parameters.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Point(Measured):
+    """Results for one choice of the parameters, see `Measured`.
 
     Attributes
     ----------
     parameters : dict of str to value
-    h : float
-        Shortest facet of the secondary surface [length].
-    n_dofs : int
-    values : dict of str to float
-        Quantities of interest, in the case's units.
     theory, reference, equal_force : dict of str to float
         By quantity: the theory at equal approach, the mesh-converged solution if the case names one, and the theory at
         equal force.
-    profile : dict
-        ``r`` [length] and ``pressure`` [pressure], lists (n_nodes,) over the secondary nodes.
-    seconds : float
-        Time of the run [s].
-    warnings : tuple of str
     """
 
     parameters: dict[str, Value]
-    h: float
-    n_dofs: int
-    values: dict[str, float]
     theory: dict[str, float]
     reference: dict[str, float]
     equal_force: dict[str, float]
-    profile: dict[str, list[float]] = field(repr=False)
-    seconds: float
-    warnings: tuple[str, ...]
 
     def ratio(self, quantity: str, to: str = "theory") -> float:
         """Return value over ``"theory"``, ``"reference"`` or ``"equal_force"`` [-]; NaN where one is not known."""

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from fastcontact.arrays import AnyArray
+from fastcontact.cases.summary import finite
+from fastcontact.results.tables import structured
 from fastcontact.studies.quantities import column
 from fastcontact.studies.render.figure import panels
-from fastcontact.studies.render.table import Rows, finite, number, percent, structured
+from fastcontact.studies.render.table import Rows, number, percent
 from fastcontact.studies.report import Report
 from fastcontact.studies.sweep_figures import Drawing
 from fastcontact.studies.sweep_point import Point, TheoryCurve, Value

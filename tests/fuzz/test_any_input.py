@@ -11,7 +11,7 @@ from fuzz_readers import outcome
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fastcontact.mesh.files.packing import packed, unpacked
+from fastcontact._tools.packing import packed, unpacked
 
 GOOD = ("read", "refused")
 few = settings(

@@ -3,7 +3,7 @@
 import errno
 import os
 
-from fastcontact.mesh.files import paths
+from fastcontact._tools import paths
 from fastcontact.results import file_lock
 
 

@@ -14,10 +14,11 @@ import h5py
 import numpy as np
 
 import fastcontact as fc
+from fastcontact._tools import hdf5, packing, paths
 from fastcontact.cases import case as cases
 from fastcontact.cli import _outputs, _results
 from fastcontact.cli._outputs import write_json
-from fastcontact.mesh.files import abaqus, hdf5, packing, paths
+from fastcontact.mesh.files import abaqus
 from fastcontact.mesh.files.blocks import build_mesh
 from fastcontact.mesh.generate import block, block_on_block
 
@@ -177,7 +178,7 @@ CALLS = [
     ("a picture on a full disk", picture_on_a_full_disk, fc.errors.FileError, r"'a\.png' cannot be written \(No space left on device\)"),
     ("a picture without contact", lambda: _outputs.profile_picture(None, SimpleNamespace(contact={}), "a.png"), fc.errors.FastcontactError, r"there is no contact pair whose pressure could be plotted"),
     ("a step of no steps", no_step_yet, fc.errors.CaseError, r"a\.vtkhdf' holds no finished step yet"),
-    ("a pair of a result without contact", lambda: _results.chosen_contact(SimpleNamespace(contact={}), None), fc.errors.CaseError, r"this result holds no contact pair"),
+    ("a pair of a result without contact", lambda: _results.chosen_contact(SimpleNamespace(contact=None), SimpleNamespace(contact={})), fc.errors.CaseError, r"this result holds no contact pair"),
     ("figures of benchmarks on a full disk", lambda patch: full(patch, write_json), fc.errors.FileError, r"'a\.json' cannot be written \(No space left on device\)"),
     ("a summary on a full disk", lambda patch: full(patch, write_json), fc.errors.FileError, r"'a\.json' cannot be written \(No space left on device\)"),
     ("a mesh from a pipe", pipe, fc.errors.FileError, r"pipe\.med' is a device or a pipe: name a plain file"),

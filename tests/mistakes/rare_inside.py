@@ -17,6 +17,7 @@ from scipy.sparse import bsr_array, csr_array
 
 import fastcontact as fc
 from fastcontact import generate
+from fastcontact._tools import hdf5
 from fastcontact.analysis.floating_bodies import FloatingBodies
 from fastcontact.cases.case import read_case
 from fastcontact.cases.keys import called
@@ -29,11 +30,11 @@ from fastcontact.linear.elimination import pivot_order
 from fastcontact.linear.multigrid import solver
 from fastcontact.linear.solvers import amg
 from fastcontact.linear.solvers.direct import Direct
-from fastcontact.mesh.files import aster_mail, hdf5, med, meshio_content
-from fastcontact.mesh.generate import _check, _triangulate
+from fastcontact.mesh.files import aster_mail, med, meshio_content
+from fastcontact.mesh.generate import _triangulate
 from fastcontact.mesh.generate.transform import renamed
 from fastcontact.results import reader
-from fastcontact.studies import convergence, levels, sweep
+from fastcontact.studies import execute, levels
 from fastcontact.studies.convergence import convergence_study
 from fastcontact.studies.levels import recipe
 from fastcontact.studies.render import figure
@@ -105,7 +106,7 @@ def no_scheduler(patch):
 
 def drawn_on_a_full_disk(patch):
     patch.setattr(Path, "mkdir", refusing(errno.ENOSPC))
-    bench.draw("pictures", {"a": [{"n_dofs": 1}, {"n_dofs": 2}]})
+    bench.suite("command").draw("pictures", {"a": [{"n_dofs": 1}, {"n_dofs": 2}]})
 
 
 def copied_to_a_full_disk(patch, folder):
@@ -157,12 +158,12 @@ def failing(jobs, **_):
 
 
 def no_level(patch):
-    patch.setattr(convergence, "run_all", failing)
+    patch.setattr(execute, "run_all", failing)
     convergence_study("forma04a", 1, ["tri3"], ["node_to_segment"])
 
 
 def no_point(patch):
-    patch.setattr(sweep, "run_all", failing)
+    patch.setattr(execute, "run_all", failing)
     parameter_sweep("forma04a", {"approach": [1.0]})
 
 
@@ -235,8 +236,8 @@ CALLS = [
     ("a file name beyond all limits", name_too_long, fc.errors.FileError, r"cannot be written \(File name too long\): name another file"),
     ("a table that a function cannot take", lambda: called("mesh", pair_of, {"size": 3}), fc.errors.CaseError, r"'mesh': size = 3 are not of the kinds that it takes \(cannot unpack"),
     ("a table with a text for numbers", lambda: called("mesh", pair_of, {"size": "ab"}), fc.errors.CaseError, r"'mesh': size = 'ab' are not of the kinds that it takes \(could not convert"),
-    ("a size that is no number", lambda: _check.number("size", "x"), fc.MeshError, r"^size must be a number, not 'x'$"),
-    ("one size for two", lambda: _check.each(_check.number, "size", 1.0), fc.MeshError, r"^size must be two numbers, not 1\.0$"),
+    ("a size that is no number", lambda: fc.generate.quarter_disc(size="x"), fc.MeshError, r"^the argument size of quarter_disc must be a number or None, not the string 'x'$"),
+    ("one size for two", lambda: fc.generate.block(1.0), fc.MeshError, r"^the argument size of block must be two numbers, not the float 1\.0$"),
     ("arrays of meshio that do not fit together", arrays_apart, fc.MeshError, r"the arrays of meshio's mesh do not fit together: list index out of range"),
     ("a .mail file without cells", without_cells, fc.MeshError, r"a\.mail': the mesh has no cells: nothing can be computed on points alone"),
     ("a .mail file that is gone", lambda: aster_mail.read(Path("gone.mail")), fc.errors.FileError, r"cannot read 'gone\.mail': .*No such file"),

@@ -91,8 +91,14 @@ def no_worker_starts(patch):
         def submit(self, *_):
             raise BrokenProcessPool
 
+        def shutdown(self, **_):
+            pass
+
+        end = shutdown
+
     patch.setattr(execute, "Workers", Pool)
-    execute.started_pool(1)
+    with execute.started_pool(1):
+        pass
 
 
 def protected_text(patch):

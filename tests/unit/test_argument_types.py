@@ -8,7 +8,7 @@ from models import elastic_model
 from numpy.typing import ArrayLike, NDArray
 
 import fastcontact as fc
-from fastcontact.mesh.argument_types import check_type, fits, typed, words
+from fastcontact._tools.argument_types import check_type, fits, typed, words
 
 WRONG = (None, "5", "abc", 5, [1, 2], {"a": 1}, object(), b"x", [None], 1j, np.array([1.0, 2.0]))
 

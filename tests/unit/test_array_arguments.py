@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
+from fastcontact._tools import argument_types
+from fastcontact._tools.argument_types import fits, types_of
 from fastcontact.elasticity.material_axes import frames
-from fastcontact.mesh import argument_types
-from fastcontact.mesh.argument_types import fits, types_of
 from fastcontact.results.xmgrace import Curve
 
 SPACES = ("analytic", "generate", "obstacles", "plot", "recovery", "topology")

@@ -13,11 +13,11 @@ import pytest
 from models import elastic_model
 
 import fastcontact as fc
+from fastcontact._tools import paths
+from fastcontact._tools.argument_types import check_type, fits, words
 from fastcontact.analytic.pressure_curve import pressure_curve
 from fastcontact.cli import _outputs, main
 from fastcontact.cli._executor import _failing_threads_interrupt
-from fastcontact.mesh.argument_types import check_type, fits, words
-from fastcontact.mesh.files import paths
 from fastcontact.results import file_lock
 from fastcontact.studies import affordable, execute
 from fastcontact.studies.levels import _default_element
@@ -142,7 +142,7 @@ def test_an_interruption_of_a_run_alone_ends_its_process(monkeypatch):
         def shutdown(self, **options):
             ended.append(options)
 
-    monkeypatch.setattr(execute, "started_pool", lambda count: Pool())
+    monkeypatch.setattr(execute, "Workers", lambda count: Pool())
     with pytest.raises(KeyboardInterrupt):
         execute._alone(None)
     assert ended == [True, {"wait": False, "cancel_futures": True}]
@@ -286,7 +286,7 @@ def test_a_sweep_shows_itself(tmp_path):
 @pytest.mark.parametrize("first", ["truncate", "write"])
 def test_a_disk_that_fails_while_hdf5_writes_is_told_once(first, tmp_path):
     """The first error is kept, nothing is written after it, and HDF5 sees no exception."""
-    from fastcontact.mesh.files.hdf5_driver import DriverFile
+    from fastcontact._tools.hdf5_driver import DriverFile
 
     path = tmp_path / "a.med"
     path.write_bytes(b"before")

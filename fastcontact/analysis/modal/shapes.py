@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
+from fastcontact._tools.html_table import html_table
 from fastcontact.analysis.modal.cyclic import Sectors
 from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.material_axes import rotations
 from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.errors import ModelError
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.generate import union
-from fastcontact.mesh.html_table import html_table
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.model import Model
 from fastcontact.results.conversions import data_frame

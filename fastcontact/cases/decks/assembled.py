@@ -14,6 +14,7 @@ from fastcontact.arrays import Array, Mask
 from fastcontact.cases.decks.blocks import Location, folded
 from fastcontact.cases.decks.content import Cell, Content, Instance, Members, Part, Section, SurfaceDefinition
 from fastcontact.cases.decks.element_types import ElementType, element_type
+from fastcontact.cases.decks.refusals import defined
 from fastcontact.mesh import elements
 
 # Names of sets that a message lists, and characters that it shows of one.
@@ -85,7 +86,7 @@ class Assembled:
     @cached_property
     def of_solids(self) -> set[int]:
         """The points of all solids."""
-        return {point for own in self.solids for point in own.points}
+        return {point for solid in self.solids for point in solid.points}
 
     @cached_property
     def discrete(self) -> list[Element]:
@@ -132,16 +133,15 @@ class Assembled:
             if label in self.open:
                 raise location.refuse(f"set '{part.set_names[name]}' contains itself")
             self.open.append(label)
-            members = [own for entry in sets[name] for own in self._entry(kind, scope, entry)]
+            members = [member for entry in sets[name] for member in self._entry(kind, scope, entry)]
             self.open.pop()
             self.resolved[label] = list(dict.fromkeys(members)) if len(sets[name]) > 1 or len(members) > 1 else members
         return self.resolved[label]
 
     def _entry(self, kind: str, scope: str, entry: Members) -> Iterable[Any]:
         scope = entry.instance or scope
-        if scope and scope not in self.content.instances:
-            known = ", ".join(instance.name for instance in self.content.instances.values()) or "none"
-            raise entry.location.refuse(f"instance '{scope}' is not defined; instances: {known}")
+        if scope:
+            defined("instance", scope, self.content.instances, entry.location)
         if entry.name:
             return self._named(kind, scope, entry)
         numbers = entry.numbers
@@ -159,8 +159,8 @@ class Assembled:
     def _all_existing(self, kind: str, scope: str, entry: Members) -> Iterator[Any]:
         there = self._there(kind, scope)
         for number in entry.numbers:
-            found = there.get(number)
-            yield self._existing(kind, scope, number, entry.place_of(number)) if found is None else found
+            item = there.get(number)
+            yield self._existing(kind, scope, number, entry.place_of(number)) if item is None else item
 
     def _named(self, kind: str, scope: str, entry: Members) -> Iterable[Any]:
         if not scope and any(entry.name.upper().startswith(name) for name in self.content.instances):

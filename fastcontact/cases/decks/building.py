@@ -26,6 +26,7 @@ from fastcontact.cases.decks.local_axes import axes_by_cell, local_axes, orienta
 from fastcontact.cases.decks.meshing import DeckMesh, begun, group_of_surface, secondary_group
 from fastcontact.cases.decks.nonlinear import strain_of
 from fastcontact.cases.decks.pretension import add_sections, cut_sections
+from fastcontact.cases.decks.refusals import defined, refusing
 from fastcontact.cases.decks.relating import make_rotations, relations_of
 from fastcontact.cases.decks.stepping import MOST_PARTS
 from fastcontact.cases.decks.temperatures import add_temperatures, conductivity_of
@@ -35,7 +36,6 @@ from fastcontact.elasticity.material_axes import CylindricalAxes
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, TemporaryConstraint
 from fastcontact.elasticity.nonlinear_materials import NonlinearElastic
-from fastcontact.errors import ContactError, MeshError, ModelError
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, Table
 
@@ -95,8 +95,8 @@ class Building:
             add(self.model)
         self._contact()
         self.gap_ends: dict[str, dict[int, int]] = {}
-        for own in gaps:
-            self.gap_ends.update(add_gap(self.model, self.found, own, conditions))
+        for gap in gaps:
+            self.gap_ends.update(add_gap(self.model, self.found, gap, conditions))
         self.ramp = self._ramp(conditions)
 
     def _mechanics(self, conditions: Conditions, groups: list[tuple[str, Table]]) -> None:
@@ -171,10 +171,7 @@ class Building:
         return tuple(tuple(row) for row in local_axes(axes, np.zeros(3)).tolist())
 
     def _material(self, section: Section) -> Material:
-        material = self.content.materials.get(folded(section.material))
-        if material is None:
-            known = ", ".join(m.name for m in self.content.materials.values()) or "none"
-            raise section.location.refuse(f"material '{section.material}' is not defined; materials: {known}")
+        material: Material = defined("material", section.material, self.content.materials, section.location)
         if material.law is None and self.content.heat != "alone":
             raise material.location.refuse(f"material '{material.name}' has no *ELASTIC")
         return material
@@ -193,11 +190,8 @@ class Building:
         for pair in self.content.pairs:
             secondary_group(self.found, pair.secondary, pair.location)
             self.made.faces(pair.primary, pair.location)
-            if not pair.tied and folded(pair.interaction) not in self.content.interactions:
-                known = ", ".join(i.name for i in self.content.interactions.values()) or "none"
-                raise pair.location.refuse(
-                    f"surface interaction '{pair.interaction}' is not defined; interactions: {known}"
-                )
+            if not pair.tied:
+                defined("surface interaction", pair.interaction, self.content.interactions, pair.location)
             if folded(pair.name) in seen:
                 raise pair.location.refuse(f"the pair {pair.name} stands there twice")
             seen.add(folded(pair.name))
@@ -336,13 +330,11 @@ class Building:
     def _contact(self) -> None:
         for pair in self.content.pairs:
             secondary, primary = (group_of_surface(self.found, name) for name in (pair.secondary, pair.primary))
-            try:
+            with refusing(pair.location):
                 options = self._tied(pair) if pair.tied else self._options(pair)
                 if secondary in self.found.loose:
                     options.update(self._at_nodes(pair, secondary))
                 self.model.add_contact(f"{secondary}/{primary}", secondary=secondary, primary=primary, **options)
-            except (ModelError, MeshError, ContactError) as error:
-                raise pair.location.refuse(str(error)) from error
 
     def _at_nodes(self, pair: Pair, secondary: str) -> dict[str, Any]:
         """Return the options by which some nodes alone of the facets around them are in contact."""

@@ -7,8 +7,8 @@ import numpy as np
 from fastcontact.cases.decks.blocks import Block, folded, unquoted
 from fastcontact.cases.decks.content import Content, SectorEnds, Sectors
 from fastcontact.cases.decks.meshing import DeckMesh, group_of_surface
+from fastcontact.cases.decks.refusals import refusing
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
-from fastcontact.errors import ModelError
 from fastcontact.model.model import Model
 
 # Most sectors: beyond, one is a negligible part of the whole.
@@ -50,13 +50,11 @@ def add_sectors(model: Model, found: DeckMesh) -> list[MultiPointConstraint]:
         for name in ends.surfaces:
             found.made.faces(name, ends.location)
         groups = [group_of_surface(found, name) for name in ends.surfaces]
-        try:
+        with refusing(sectors.location):
             model.add_cyclic_symmetry(
                 groups[0], groups[1], sectors=sectors.count, origin=tuple(first[: model.mesh.dim].tolist()),
                 direction=tuple(direction.tolist()),
             )  # fmt: skip
-        except ModelError as error:
-            raise sectors.location.refuse(str(error)) from error
     for ends in content.sector_ends:
         if id(ends) not in used:
             raise ends.location.refuse(

@@ -9,6 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
+from fastcontact._tools.html_table import html_table
+from fastcontact._tools.paths import PathLike, existing_file
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.result_warnings import largest_rotation
 from fastcontact.analysis.run import solve_steps
@@ -21,9 +24,6 @@ from fastcontact.cases.decks.reading import read_content
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.multipoint_constraints import TemporaryConstraint
 from fastcontact.errors import ContactError, FileError, MeshError, ModelError, warn
-from fastcontact.mesh.argument_types import typed
-from fastcontact.mesh.files.paths import PathLike, existing_file
-from fastcontact.mesh.html_table import html_table
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, table_value
 from fastcontact.results.step import StepResult
@@ -86,12 +86,11 @@ class Deck:
         Errors and warnings are those of `fastcontact.solve`; where the deck asks for NLGEOM and small strains are solved, a
         FastcontactWarning tells the largest strain and rotation, which linear kinematics leave out the squares of.
         """
-        given = {"criteria": self.criteria, **options}
         steps: list[StepResult] = []
-        for step in solve_steps(self.model, self.ramp, **given):
+        for step in self.solve_steps(**options):
             if steps:
                 steps[-1] = replace(steps[-1], restart=None)
-            steps.append(self.finished(step))
+            steps.append(step)
         return steps
 
     def solve_steps(self, **options: Any) -> Iterator[StepResult]:

@@ -13,8 +13,8 @@ from fastcontact.cases.decks.assembled import Assembled, facet_points
 from fastcontact.cases.decks.blocks import Location
 from fastcontact.cases.decks.conditions import Conditions
 from fastcontact.cases.decks.meshing import DeckMesh
+from fastcontact.cases.decks.refusals import refusing
 from fastcontact.contact.obstacles.shapes import HalfSpace
-from fastcontact.errors import FastcontactError
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
 
@@ -51,7 +51,7 @@ class GapGroup:
 
 def check_discrete(made: Assembled, kind: str, given: Mapping[str, Any], needed: str) -> None:
     """Refuse springs and gap elements without properties."""
-    with_one = {own for name, entry in given.items() for own in made.elements_of(name, entry[0])}
+    with_one = {element for name, entry in given.items() for element in made.elements_of(name, entry[0])}
     for element in made.discrete:
         if element.cell.type == kind and element not in with_one:
             raise element.cell.location.refuse(f"element {element.number} of type {kind} has no {needed}")
@@ -62,11 +62,11 @@ def gap_groups(found: DeckMesh) -> list[GapGroup]:
     made, groups = found.made, []
     check_discrete(made, "GAPUNI", made.content.gaps, "*GAP")
     for name, (location, clearance, vector) in made.content.gaps.items():
-        own = made.elements_of(name, location)
-        if any(element.cell.type != "GAPUNI" for element in own):
+        gap_elements = made.elements_of(name, location)
+        if any(element.cell.type != "GAPUNI" for element in gap_elements):
             raise location.refuse("acts on elements of type GAPUNI only")
         shown = made.content.root.set_names.get(name, name)
-        ends = np.array([element.points for element in own], np.intp)
+        ends = np.array([element.points for element in gap_elements], np.intp)
         bodies = all(point in made.of_solids for point in ends[:, 1].tolist())
         groups.append(
             GapGroup(
@@ -106,13 +106,11 @@ def add_gap(model: Model, found: DeckMesh, gap: GapGroup, conditions: Conditions
             raise gap.location.refuse(
                 "gap elements between bodies are supported along their direction, in planes across it only"
             )
-        try:
+        with refusing(gap.location):
             model.add_contact(
                 gap.name, secondary=gap.facets, primary=gap.opposite, formulation="node_to_segment",
                 clearance=gap.clearance - float(along.mean()),
             )  # fmt: skip
-        except FastcontactError as error:
-            raise gap.location.refuse(str(error)) from error
         return {}
     history = _motion(gap, conditions)
     wall = HalfSpace(

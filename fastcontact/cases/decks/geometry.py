@@ -9,6 +9,7 @@ from itertools import groupby
 from fastcontact.cases.decks.blocks import Block, Row, folded, unquoted
 from fastcontact.cases.decks.content import Cell, Content, Face, Instance, Members, Part, SurfaceDefinition
 from fastcontact.cases.decks.element_types import described, element_type
+from fastcontact.cases.decks.refusals import check_new, defined
 from fastcontact.mesh import elements
 
 # Elements that are no solids and yet mean something here: numbers of their nodes.
@@ -96,31 +97,30 @@ def element_set(content: Content, part: Part, block: Block) -> None:
 def _members(block: Block) -> list[Members]:
     """Return the entries of a set."""
     instance = folded(block.get("INSTANCE"))
-    found = []
+    entries = []
     for row in block.each():
         if "GENERATE" in block.parameters:
             first, last, increment = row.whole(0), row.whole(1), row.whole(2, 1)
             if increment < 1 or last < first:
                 raise row.location.refuse(f"the range {first} to {last} by {increment} is empty: it must ascend")
-            found.append(Members(row.location, range(first, last + 1, increment), instance=instance))
+            entries.append(Members(row.location, range(first, last + 1, increment), instance=instance))
             continue
         for numbers, group in groupby(row.entries, lambda entry: entry.isdecimal() and len(entry) < 19):
             if numbers:
                 members = array("q", map(int, group))
-                if found and isinstance(found[-1].numbers, array) and len(found[-1].numbers):
-                    found[-1].add(members, row.location.line)  # one entry for the lines that follow each other
+                if entries and isinstance(entries[-1].numbers, array) and len(entries[-1].numbers):
+                    entries[-1].add(members, row.location.line)  # one entry for the lines that follow each other
                 else:
-                    found.append(Members(row.location, members, instance=instance))
+                    entries.append(Members(row.location, members, instance=instance))
             else:
-                found += [Members(row.location, name=entry, instance=instance) for entry in group if entry]
-    return found
+                entries += [Members(row.location, name=entry, instance=instance) for entry in group if entry]
+    return entries
 
 
 def surface(content: Content, part: Part, block: Block) -> None:
     """*SURFACE: faces of elements, or nodes."""
     name, kind = block.required("NAME"), block.choice("TYPE", ("ELEMENT", "NODE"))
-    if folded(name) in part.surfaces:
-        raise block.location.refuse(f"surface '{name}' is defined twice")
+    check_new("surface", name, part.surfaces, block.location)
     made = SurfaceDefinition(name, block.location, kind == "NODE")
     for row in block.each():
         label = row.text(1).upper()
@@ -133,12 +133,8 @@ def surface(content: Content, part: Part, block: Block) -> None:
 def instance(content: Content, block: Block) -> Instance:
     """*INSTANCE: a part with its place in the assembly."""
     name, of = block.required("NAME"), block.required("PART")
-    if folded(of) not in content.parts:
-        known = ", ".join(part.name for part in content.parts.values()) or "none"
-        raise block.location.refuse(f"part '{of}' is not defined; parts: {known}")
-    if folded(name) in content.instances:
-        raise block.location.refuse(f"instance '{name}' is defined twice")
-    made = Instance(name, content.parts[folded(of)])
+    made = Instance(name, defined("part", of, content.parts, block.location))
+    check_new("instance", name, content.instances, block.location)
     rows = block.rows
     if rows:
         made.translation = tuple(rows[0].number(i, 0.0) for i in range(3))
@@ -153,7 +149,6 @@ def instance(content: Content, block: Block) -> Instance:
 def new_part(content: Content, block: Block) -> Part:
     """*PART."""
     name = block.required("NAME")
-    if folded(name) in content.parts:
-        raise block.location.refuse(f"part '{name}' is defined twice")
+    check_new("part", name, content.parts, block.location)
     content.parts[folded(name)] = Part(unquoted(name))
     return content.parts[folded(name)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -15,9 +16,9 @@ from fastcontact.cases.decks.blocks import Block, Location, Row
 from fastcontact.cases.decks.content import Content, Given, Interaction, Material, Step
 from fastcontact.cases.decks.histories import ByShape, Histories
 from fastcontact.cases.decks.meshing import DeckMesh
+from fastcontact.cases.decks.refusals import refusing
 from fastcontact.contact.conductance import Conductance
 from fastcontact.elasticity.materials import LinearElastic
-from fastcontact.errors import ContactError
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
 
@@ -102,10 +103,8 @@ def conductance_of(content: Content, law: Interaction) -> dict[str, Any]:
         raise law.conductance[0].location.refuse("one conductance, and a table besides: give one of them")
     if given is None and not tables:
         return {}
-    try:
+    with refusing(law.conductance[0].location):
         Conductance(law.name, tables or given)
-    except ContactError as error:
-        raise law.conductance[0].location.refuse(str(error)) from None
     return {"conductance": tables or given}
 
 
@@ -235,27 +234,27 @@ class HeatConditions:
             if label != letter:
                 raise row.location.refuse(f"{label[:40]} on a surface is not supported, only {letter}")
             return [Exchange(keyword, face, (), coefficient) for face in self.made.faces(row.text(0), row.location)]
-        own = self.made.elements_of(row.text(0), row.location)
+        elements = self.made.elements_of(row.text(0), row.location)
         if label[:1] == letter and label[1:].isdigit():
-            faces = [(element, self.made.facet(element, int(label[1:]), row.location)) for element in own]
+            faces = [(element, self.made.facet(element, int(label[1:]), row.location)) for element in elements]
             return [Exchange(keyword, face, (), coefficient) for face in faces]
         if label == "BF" and keyword == "DFLUX":
-            return [Exchange(keyword, None, tuple(own))]
+            return [Exchange(keyword, None, tuple(elements))]
         known = f"{letter}1, {letter}2, ..." + (", BF" if keyword == "DFLUX" else "")
         raise row.location.refuse(f"{label[:40]} is not supported; known are {known}")
 
     def advance(self, number: int, step: Step) -> None:
         """Go on to the end of step `number`, from 1."""
-        for history, what in ((self.temperatures, "a temperature"), (self.films, "a film")):
+        for history, noun in ((self.temperatures, "a temperature"), (self.films, "a film")):
             given: Histories[Any] = history  # type: ignore[assignment]
             for name, (_, _, location) in given.changing.items():
                 if self.begun and name not in given.tracks:
                     raise location.refuse(
-                        f"{what} that comes in a later step is not supported: give it from the first one on"
+                        f"{noun} that comes in a later step is not supported: give it from the first one on"
                     )
             for name in given.dying:
                 raise step.location.refuse(
-                    f"{what} of line {given.tracks[name].location.line} that is let go is not supported"
+                    f"{noun} of line {given.tracks[name].location.line} that is let go is not supported"
                 )
         for other in self.histories:
             other.advance(number, step)
@@ -267,10 +266,11 @@ class HeatConditions:
         risen = [(self._risen(table), names) for table, names in self.temperatures.alike()]
         for _, points, value, table in ByShape.of(risen):
             group = found.add_points(f"temperature {len(made)}", points)
-            made.append(_prescribed(group, _above(value, self.reference), table))
+            made.append(partial(Model.fix_temperature, group=group, value=_above(value, self.reference), ramp=table))
         for _, points, value, table in ByShape.of(self.powers.alike()):
             group = found.add_points(f"heat {len(made)}", points)
-            made.append(_nodal(group, value, tuple((time, power / thickness) for time, power in table)))
+            powers = tuple((time, power / thickness) for time, power in table)
+            made.append(partial(Model.add_nodal_heat, group=group, value=value, ramp=powers))
         on_faces: dict[tuple[str, Table, float | None], list[Face]] = {}
         for history in (self.fluxes, self.films):
             for table, names in history.alike():
@@ -279,10 +279,11 @@ class HeatConditions:
                         on_faces.setdefault((name.keyword, table, name.coefficient), []).append(name.face)
                         continue
                     group = found.add_solids(f"heat source {len(made)}", name.elements)
-                    made.append(_source(group, table))
+                    made.append(partial(Model.add_heat_source, value=1.0, groups=group, ramp=table))
         for (keyword, table, coefficient), faces in on_faces.items():
             group = found.add_facets(f"{keyword.lower()} {len(made)}", faces)
-            made.append(_flux(group, table) if coefficient is None else self._film(group, coefficient, table))
+            flux = partial(Model.add_heat_flux, group=group, value=1.0, ramp=table)
+            made.append(flux if coefficient is None else self._film(group, coefficient, table))
         return made
 
     def _risen(self, table: Table) -> Table:
@@ -293,23 +294,8 @@ class HeatConditions:
         rise = self._risen(table)
         size = max((value for _, value in rise), key=abs)
         ramp = tuple((time, value / size) for time, value in rise) if size else None
-        return lambda model: model.add_film(group, coefficient, self.reference + size, ramp=ramp)
-
-
-def _prescribed(group: str, value: Any, table: Table) -> Callable[[Model], None]:
-    return lambda model: model.fix_temperature(group, value, ramp=table)
-
-
-def _nodal(group: str, value: Any, table: Table) -> Callable[[Model], None]:
-    return lambda model: model.add_nodal_heat(group, value, ramp=table)
-
-
-def _source(group: str, table: Table) -> Callable[[Model], None]:
-    return lambda model: model.add_heat_source(1.0, group, ramp=table)
-
-
-def _flux(group: str, table: Table) -> Callable[[Model], None]:
-    return lambda model: model.add_heat_flux(group, 1.0, ramp=table)
+        ambient = self.reference + size
+        return partial(Model.add_film, group=group, coefficient=coefficient, ambient=ambient, ramp=ramp)
 
 
 def _above(value: Any, reference: float) -> Any:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact.cases.decks.meshing import DeckMesh
+from fastcontact.mesh.mesh import starts_of
 from fastcontact.model.model import Model
 
 # Components in the order of a data line, by how many there are.
@@ -18,10 +19,8 @@ def add_initial_stresses(model: Model, found: DeckMesh) -> None:
     content, names = found.made.content, ORDER[found.dim]
     if not content.stresses:
         return
-    starts, total = {}, 0
-    for name, cells in model.mesh.solids.items():
-        starts[name], total = total, total + len(cells)
-    values = np.zeros((total, len(names)))
+    starts = starts_of(model.mesh.solids)
+    values = np.zeros((sum(map(len, model.mesh.solids.values())), len(names)))
     for block in content.stresses:
         for row in block.each():
             if len(row.entries) != 1 + len(names):

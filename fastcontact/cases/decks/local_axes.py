@@ -53,15 +53,15 @@ def axes_by_cell(made: Assembled, axes: Axes, members: Sequence[Element]) -> Arr
             for element in made.elements_of(f"{scope}.{row.text(0)}" if scope else row.text(0), row.location):
                 given[id(element)] = frame
     first = dict(zip(made.by_kind, np.cumsum([0, *map(len, made.by_kind.values())]).tolist()))
-    found = np.tile(np.eye(3), (len(made.solids), 1, 1))
+    frames = np.tile(np.eye(3), (len(made.solids), 1, 1))
     for element in members:
-        own = given.get(id(element), default)
-        if own is None:
+        axes_here = given.get(id(element), default)
+        if axes_here is None:
             raise block.location.refuse(
                 f"element {element.number} has no axes, and no line without an element gives those of others"
             )
-        found[first[element.solid.element] + element.row] = own
-    return found
+        frames[first[element.solid.element] + element.row] = axes_here
+    return frames
 
 
 def local_axes(axes: Axes, point: Array) -> Array:

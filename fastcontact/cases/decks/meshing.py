@@ -11,7 +11,7 @@ from fastcontact.cases.decks.assembled import Assembled, Element, Face, facet_po
 from fastcontact.cases.decks.blocks import Location, folded
 from fastcontact.cases.decks.content import SurfaceDefinition
 from fastcontact.mesh import topology
-from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.mesh import Mesh, starts_of
 
 FACETS = {2: {2: "line2", 3: "line3"}, 3: {3: "tri3", 4: "quad4", 6: "tri6", 8: "quad8"}}
 # How far points of a plane model may leave the plane, relative to its size.
@@ -93,9 +93,7 @@ class DeckMesh:
         solids = {name: [element.points for element in own] for name, own in self.made.by_kind.items()}
         cells = {name: np.array(block, np.int32) for name, block in {**solids, **self.facets}.items()}
         del solids
-        starts, total = {}, 0
-        for name, block in cells.items():
-            starts[name], total = total, total + len(block)
+        starts = starts_of(cells)
         groups = {
             group: np.concatenate([[], *(starts[name] + np.array(rows) for name, rows in members.items())]).astype(int)
             for group, members in self.groups.items()

@@ -6,9 +6,9 @@ from typing import Any
 
 from fastcontact.cases.decks.blocks import Block
 from fastcontact.cases.decks.content import Content, Material
+from fastcontact.cases.decks.refusals import refusing
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.elasticity.nonlinear_materials import ElasticPlastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
-from fastcontact.errors import ModelError
 
 # Poisson's ratio of hyperelastic materials whose compressibility is zero, as in CalculiX.
 UNGIVEN = 0.475
@@ -39,10 +39,8 @@ def plastic(content: Content, current: Material, block: Block) -> None:
             )
         kinematic = (table[1][1] - table[0][1]) / table[1][0] if len(table) == 2 else 0.0
         table = table[:1]
-    try:
+    with refusing(block.location, f"material '{current.name}': "):
         law = ElasticPlastic(E=elastic.E, nu=elastic.nu, yield_stress=table[0][1], hardening=table, kinematic=kinematic)
-    except ModelError as error:
-        raise block.location.refuse(f"material '{current.name}': {error}") from None
     current.law = lambda axes: law
 
 
@@ -65,10 +63,8 @@ def hyperelastic(content: Content, current: Material, block: Block) -> None:
     bulk = 2.0 / compressible[0] if compressible[0] else 2.0 * mu * (1.0 + UNGIVEN) / (3.0 * (1.0 - 2.0 * UNGIVEN))
     if not compressible[0]:
         content.note(block.location, f"D1 = 0: the bulk modulus is that of nu = {UNGIVEN}")
-    try:
+    with refusing(block.location, f"material '{current.name}': "):
         law = _law(kind, constants, mu, bulk)
-    except ModelError as error:
-        raise block.location.refuse(f"material '{current.name}': {error}") from None
     current.law = lambda axes: law
 
 

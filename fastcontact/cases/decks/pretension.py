@@ -9,8 +9,8 @@ from fastcontact.cases.decks.assembled import Assembled, facet_points
 from fastcontact.cases.decks.blocks import Block
 from fastcontact.cases.decks.content import Content, Given, PretensionSection
 from fastcontact.cases.decks.meshing import DeckMesh, group_of_surface
+from fastcontact.cases.decks.refusals import refusing
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
-from fastcontact.errors import MeshError
 from fastcontact.mesh.generate.cut import cut
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.model import Model
@@ -84,10 +84,8 @@ def cut_sections(found: DeckMesh, mesh: Mesh) -> Mesh:
             raise section.location.refuse(f"surface '{group}' has a pretension section already")
         sections.add(group)
         normal = None if section.normal is None else section.normal[: found.dim]
-        try:
+        with refusing(section.location):
             mesh = cut(mesh, group, normal)
-        except MeshError as error:
-            raise section.location.refuse(str(error)) from error
     return mesh
 
 

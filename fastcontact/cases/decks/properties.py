@@ -10,10 +10,11 @@ import numpy as np
 from fastcontact.arrays import Array
 from fastcontact.cases.decks.blocks import Block, Row, folded, unquoted
 from fastcontact.cases.decks.content import Amplitude, Axes, Content, Interaction, Material, Part, Section
+from fastcontact.cases.decks.refusals import check_new, defined, refusing
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
 from fastcontact.elasticity.materials import LinearElastic
-from fastcontact.errors import ContactError, ModelError
+from fastcontact.errors import ContactError
 
 # Points of the table that stands for an exponential law.
 EXPONENTIAL = 129
@@ -24,8 +25,7 @@ CONSTANTS = {"ISOTROPIC": 2, "ENGINEERING CONSTANTS": 9, "ORTHOTROPIC": 9, "ANIS
 def material(content: Content, block: Block) -> Material:
     """*MATERIAL: begins a material."""
     name = block.required("NAME")
-    if folded(name) in content.materials:
-        raise block.location.refuse(f"material '{name}' is defined twice")
+    check_new("material", name, content.materials, block.location)
     content.materials[folded(name)] = Material(name, block.location)
     return content.materials[folded(name)]
 
@@ -44,11 +44,8 @@ def elastic(content: Content, current: Material, block: Block) -> None:
     E, nu = row.number(0), row.number(1, 0.0)
     if row.text(2):
         content.note(row.location, "the temperature of the constants has no effect: there is one set of them")
-    try:
+    with refusing(row.location, f"material '{current.name}': "):
         law = LinearElastic(E=E, nu=nu)
-    except ModelError as error:
-        raise row.location.refuse(f"material '{current.name}': {error}") from None
-
     current.law = lambda axes: law
 
 
@@ -67,10 +64,8 @@ def _with_axes(current: Material, block: Block, kind: str) -> None:
             return Orthotropic(E=values[:3], nu=values[3:6], G=values[6:], axes=axes)
         return Anisotropic(_moduli(values), axes=axes)
 
-    try:
+    with refusing(block.location, f"material '{current.name}': "):
         law(None)
-    except ModelError as error:
-        raise block.location.refuse(f"material '{current.name}': {error}") from None
     current.law = law
 
 
@@ -99,8 +94,7 @@ def distribution(content: Content, part: Part, block: Block) -> None:
     """*DISTRIBUTION: two points for the axes of each cell, seen from 0, 0, 0, by default those of the line without a cell."""
     name = block.required("NAME")
     block.choice("LOCATION", ("ELEMENT",))
-    if folded(name) in content.distributions:
-        raise block.location.refuse(f"distribution '{name}' is defined twice")
+    check_new("distribution", name, content.distributions, block.location)
     content.distributions[folded(name)] = block
 
 
@@ -160,8 +154,7 @@ def section(content: Content, part: Part, block: Block) -> None:
 def interaction(content: Content, block: Block) -> Interaction:
     """*SURFACE INTERACTION: begins the properties of contact pairs."""
     name = block.required("NAME")
-    if folded(name) in content.interactions:
-        raise block.location.refuse(f"surface interaction '{name}' is defined twice")
+    check_new("surface interaction", name, content.interactions, block.location)
     content.interactions[folded(name)] = Interaction(name, block.location)
     if block.rows:
         block.rows[0].number(0, 1.0)
@@ -174,11 +167,9 @@ def interaction(content: Content, block: Block) -> Interaction:
 def changed_interaction(content: Content, block: Block) -> Interaction:
     """*CHANGE FRICTION: begins what holds from the current step on, by the *FRICTION below it."""
     name = block.required("INTERACTION")
-    if folded(name) not in content.interactions:
-        known = ", ".join(interaction.name for interaction in content.interactions.values()) or "none"
-        raise block.location.refuse(f"surface interaction '{name}' is not defined; interactions: {known}")
+    before = defined("surface interaction", name, content.interactions, block.location)
     changed = Interaction(name, block.location, friction=-1.0)  # which it has to say
-    content.interactions[folded(name)].changes.append((len(content.steps) - 1, changed))
+    before.changes.append((len(content.steps) - 1, changed))
     return changed
 
 

@@ -12,9 +12,9 @@ from fastcontact.cases.decks.content import Equation, Link, Pin
 from fastcontact.cases.decks.local_axes import local_axes, local_directions, orientation_of
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.cases.decks.multi_points import multi_point_rows
+from fastcontact.cases.decks.refusals import refusing
 from fastcontact.elasticity.loads import Traction
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
-from fastcontact.errors import ModelError
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.couplings import ReferencePoint, Term, distributing_rows, relation, rigid_rows
 
@@ -133,10 +133,8 @@ def _distributing(found: DeckMesh, mesh: Mesh, link: Link) -> list[list[Term]]:
     areas = Traction(_known(mesh, found, group), {0: 1.0}, None).vector(mesh, found.kinematics)[:, 0]
     points = np.array(_points(found, link), np.intp)
     weight = areas[points] / areas[points].sum()
-    try:
+    with refusing(link.location):
         rows = distributing_rows(_reference(found, link), points, made.points[points, : found.dim], weight)
-    except ModelError as error:
-        raise link.location.refuse(str(error)) from error
     turns = len(rows) - found.dim
     return rows[:turns] + _along(rows[turns:], _directions(found, link, made.node(link.reference, link.location)))
 

@@ -78,7 +78,7 @@ def end_step(content: Content, step: Step) -> None:
         raise step.location.refuse("*FREQUENCY needs a step with *STATIC before: modes are those about its end")
     if content.steps[-1].heat == "alone":
         raise step.location.refuse("*FREQUENCY behind *HEAT TRANSFER is not supported: bodies are at rest there")
-    stiffening = step.perturbation or any(own.nonlinear for own in content.steps)
+    stiffening = step.perturbation or any(earlier.nonlinear for earlier in content.steps)
     content.modes = {"n": step.modes, "stress_stiffening": stiffening}
     content.note(
         step.location,

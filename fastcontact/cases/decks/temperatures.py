@@ -45,10 +45,10 @@ def along_axes(current: Material, block: Block) -> float | tuple[float, ...]:
 
 def conductivity_of(material: Material, block: Block) -> float | tuple[float, ...]:
     """Return the conductivity of a material, one or three along its axes; CaseError if one is not positive."""
-    found = along_axes(material, block)
-    if not np.min(found) > 0.0:
-        raise block.location.refuse(f"material '{material.name}': the conductivity {np.min(found):g} must be positive")
-    return found
+    values = along_axes(material, block)
+    if not np.min(values) > 0.0:
+        raise block.location.refuse(f"material '{material.name}': the conductivity {np.min(values):g} must be positive")
+    return values
 
 
 def initial_conditions(content: Content, block: Block) -> None:

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.obstacles._facets import Block, SurfaceFacets, surface_facets
 from fastcontact.contact.search.closest import Closest, closest_of_kinds
 from fastcontact.errors import ContactError
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
 
 # Reference coordinates of a projection nearer than this to a side of its facet lie on it.

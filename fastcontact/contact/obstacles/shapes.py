@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array
 from fastcontact.errors import ContactError
-from fastcontact.mesh.argument_types import typed
 
 
 def _positive(**values: float) -> None:

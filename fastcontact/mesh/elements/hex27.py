@@ -2,27 +2,16 @@
 
 import numpy as np
 
-from fastcontact.mesh.elements import hex8, hex20, line3
-from fastcontact.mesh.elements._element import Array, Element, product_gradients, product_values
+from fastcontact.mesh.elements import hex8, hex20, line3, quad9
+from fastcontact.mesh.elements._element import Element, product_of_two
 from fastcontact.mesh.quadrature import gauss_cube
 
 FACES = np.array([[-1.0, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]])
 NODES = np.vstack([hex20.NODES, FACES, np.zeros(3)])
-# The line3 function of each node in each coordinate: 0 at -1, 1 at 1, 2 in the middle.
-LINE = np.select([NODES < 0, NODES > 0], [0, 1], 2)
-
-
-def shape(xi: Array) -> Array:
-    """Shape functions (m, 27) [-] at `xi` (m, 3) [-]."""
-    return product_values(np.stack([line3.shape(xi[:, [k]])[:, LINE[:, k]] for k in range(3)], axis=2))
-
-
-def gradient(xi: Array) -> Array:
-    """Derivatives (m, 27, 3) [-] at `xi` (m, 3) [-]."""
-    factors = np.stack([line3.shape(xi[:, [k]])[:, LINE[:, k]] for k in range(3)], axis=2)
-    slopes = np.stack([line3.gradient(xi[:, [k]])[:, LINE[:, k], 0] for k in range(3)], axis=2)
-    return product_gradients(factors, slopes)
-
+# Node i is the product of the quad9 function I[i] in x, y and the line3 function J[i] in z.
+I = np.abs(NODES[:, None, :2] - quad9.NODES).sum(axis=2).argmin(axis=1)  # noqa: E741
+J = np.abs(NODES[:, None, 2:] - line3.ELEMENT.nodes).sum(axis=2).argmin(axis=1)
+shape, gradient = product_of_two(quad9, line3, I, J)
 
 ELEMENT = Element(
     name="hex27", nodes=NODES, edges=hex8.EDGES,

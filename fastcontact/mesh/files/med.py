@@ -12,16 +12,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
+from fastcontact._tools.hdf5 import attribute, check_size, opened, values
+from fastcontact._tools.hdf5_driver import new_hdf5
+from fastcontact._tools.paths import PathLike, replacing
 from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.errors import FileError, MeshError, unknown
 from fastcontact.mesh import elements
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.files import med_families
 from fastcontact.mesh.files.blocks import VERTEX, Block, build_mesh, check_known
-from fastcontact.mesh.files.hdf5 import attribute, check_size, opened, values
-from fastcontact.mesh.files.hdf5_driver import new_hdf5
 from fastcontact.mesh.files.med_families import Families, checked_name, decoded
-from fastcontact.mesh.files.paths import PathLike, replacing
 from fastcontact.mesh.mesh import Mesh
 
 # Elements whose nodes MED numbers otherwise than we do: our node k is node NODE_ORDER[code][k] of MED. MED sees the
@@ -314,33 +314,36 @@ def read_med_field(path: PathLike, field: str) -> tuple[Array, Array]:
     >>> import fastcontact as fc
     >>> times, displacements = fc.read_med_field("blocks.med", "DEPL")  # doctest: +SKIP
     """
+    times, values, _ = read_point_field(path, field)
+    return times, values
+
+
+def read_point_field(path: PathLike, field: str) -> tuple[Array, Array, Array | None]:
+    """Return what `read_med_field` does, and the points (n_points, dim) [length]; None where they are in another file."""
     with opened(path) as file:
-        names = list(file["CHA"]) if "CHA" in file else []
-        if field not in names:
-            raise FileError(f"'{path}': {unknown('field', field, names)}")
-        group = file["CHA"][field]
+        group, _, mesh = _field_and_mesh(file, path, field)
         instants = [entry for entry in group.values() if "NOE" in entry and "PDT" in entry.attrs]
         if not instants:
             raise FileError(f"field '{field}' of '{path}' has no values at nodes in the layout of MED 3 or 4")
         instants.sort(key=_order)
-        times = np.array([attribute(entry, "PDT") for entry in instants], np.float64)
-        n_components = int(attribute(group, "NCO"))
-        n_points = _field_size(file, group, instants, n_components)
-        check_size(f"field '{field}' of '{path}'", (len(instants), n_points, n_components), file)
-        return times, np.stack([_read_instant(file, entry["NOE"], n_points, n_components) for entry in instants])
+        count, points = int(attribute(group, "NCO")), None if mesh is None else _read_points(_first_step(mesh), mesh)
+        profiles = [profile for entry in instants for profile in entry["NOE"].values()]
+        n_points = max(values(profile, "CO").size // count for profile in profiles) if points is None else len(points)
+        check_size(f"field '{field}' of '{path}'", (len(instants), n_points, count), file)
+        parts = [_read_instant(file, entry["NOE"], n_points, count) for entry in instants]
+        return np.array([attribute(entry, "PDT") for entry in instants], np.float64), np.stack(parts), points
 
 
-def read_field_points(path: PathLike, field: str) -> Array | None:
-    """Return the points (n_points, dim) of the mesh of a field [length]; None where the mesh is in another file."""
-    with opened(path) as file:
-        name = decoded(bytes(attribute(file["CHA"][field], "MAI")))
-        if f"ENS_MAA/{name}" not in file:
-            return None
-        mesh = file[f"ENS_MAA/{name}"]
-        return _read_points(_first_step(mesh), mesh)
+def _field_and_mesh(file: Any, path: PathLike, field: str) -> tuple[Any, str, Any]:
+    """Return the group of a field, the name of its mesh, and the group of this, None where it is in another file."""
+    names = list(file["CHA"]) if "CHA" in file else []
+    if field not in names:
+        raise FileError(f"'{path}': {unknown('field', field, names)}")
+    name = decoded(bytes(attribute(file["CHA"][field], "MAI")))
+    return file["CHA"][field], name, file.get(f"ENS_MAA/{name}")
 
 
-def read_med_cell_field(path: PathLike, field: str) -> tuple[Array, Array, Array]:
+def read_cell_field(path: PathLike, field: str) -> tuple[Array, Array, Array]:
     """Return a field of cells of a file of MED 3 or later: times, values and middles of its cells.
 
     Times are (n_instants,) in the order of the file [-], values (n_instants, n_cells, n_components), NaN where there are
@@ -349,15 +352,11 @@ def read_med_cell_field(path: PathLike, field: str) -> tuple[Array, Array, Array
     FileError if the file cannot be read, has no such field, or the field is not given once a cell.
     """
     with opened(path) as file:
-        names = list(file["CHA"]) if "CHA" in file else []
-        if field not in names:
-            raise FileError(f"'{path}': {unknown('field', field, names)}")
-        group = file["CHA"][field]
-        name = decoded(bytes(attribute(group, "MAI")))
-        if f"ENS_MAA/{name}" not in file:
+        group, name, mesh = _field_and_mesh(file, path, field)
+        if mesh is None:
             raise FileError(f"field '{field}' of '{path}' is on the mesh '{name}', which is in another file")
-        step = _first_step(file[f"ENS_MAA/{name}"])
-        points = _read_points(step, file[f"ENS_MAA/{name}"])
+        step = _first_step(mesh)
+        points = _read_points(step, mesh)
         instants = sorted((e for e in group.values() if "PDT" in e.attrs and _cell_supports(e)), key=_order)
         codes = sorted({code for entry in instants for code in _cell_supports(entry)})
         if not instants:
@@ -393,15 +392,6 @@ def _of_cells(file: Any, entry: Any, code: str, n_cells: int, n_components: int,
                 "one a cell is needed"
             )
     return _read_instant(file, support, n_cells, n_components)
-
-
-def _field_size(file: Any, group: Any, instants: list[Any], n_components: int) -> int:
-    """Return the number of points of the field's mesh, or of the field where the mesh is in another file."""
-    name = decoded(bytes(attribute(group, "MAI")))
-    if f"ENS_MAA/{name}" in file:
-        mesh = file[f"ENS_MAA/{name}"]
-        return len(_read_points(_first_step(mesh), mesh))
-    return max(values(profile, "CO").size // n_components for entry in instants for profile in entry["NOE"].values())
 
 
 def _read_instant(file: Any, support: Any, n_points: int, n_components: int) -> Array:

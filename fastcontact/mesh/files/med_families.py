@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.hdf5 import attribute, values
 from fastcontact.arrays import AnyArray, Indices, Numbers
 from fastcontact.errors import FileError, warn
-from fastcontact.mesh.files.hdf5 import attribute, values
 
 GROUP_NAME_SIZE = 80
 FAMILY_NAME_SIZE = 64

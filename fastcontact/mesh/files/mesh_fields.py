@@ -6,14 +6,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fastcontact.arrays import Array, Numbers
-from fastcontact.errors import FileError, MeshError, unknown
-from fastcontact.mesh.argument_types import typed
-from fastcontact.mesh.files.cell_fields import at_cells, read_cell_field
-from fastcontact.mesh.files.paths import PathLike
-from fastcontact.mesh.files.point_fields import at_points_of, read_point_field
+from fastcontact._tools.argument_types import typed
+from fastcontact._tools.paths import PathLike
+from fastcontact.arrays import Array, Indices, Numbers
+from fastcontact.errors import FileError, MeshError, check_known
+from fastcontact.mesh.files.file_fields import FileField, read_file_field
 from fastcontact.mesh.mesh import Mesh
 
+# How far points of a file may lie from those of a mesh, relative to its size, and count as the same.
+SAME_PLACE = 1e-6
 OVER = ("cells", "points")
 # How far a time of a file may lie from the one that is wanted, relative to the latest.
 SAME_TIME = 1e-9
@@ -67,15 +68,14 @@ def read_field(
     if over not in OVER:
         raise FileError(f"over must be {' or '.join(OVER)}, not '{over}'")
     name = f"field '{field}' of '{file}'"
-    cells = _cells(mesh, groups)
+    cells, of_file = _cells(mesh, groups), read_file_field(file, field, over)
+    row = _row(of_file, instant, name)
     if over == "cells":
-        by_cell = read_cell_field(file, field)
-        middles = np.concatenate([mesh.points[block].mean(axis=1) for block in cells])
-        size = float(np.ptp(mesh.points, axis=0).max())
-        return at_cells(by_cell, middles, size, name)[_row(by_cell.times, by_cell.values, instant, name)][:, None]
-    by_point = read_point_field(file, field)
+        return at_cells(of_file, np.concatenate([mesh.points[block].mean(axis=1) for block in cells]), mesh, name)[row][
+            :, None
+        ]
     wanted = np.unique(np.concatenate([block.ravel() for block in cells])).astype(np.intp)
-    values = at_points_of(by_point, mesh, wanted, name)[_row(by_point.times, by_point.values, instant, name)]
+    values = at_points_of(of_file, mesh, wanted, name)[row]
     return np.where(np.isfinite(values), values, values[wanted].mean())
 
 
@@ -85,8 +85,7 @@ def _cells(mesh: Mesh, groups: Sequence[str] | str | None) -> list[Numbers]:
         return list(mesh.solids.values())
     names = [groups] if isinstance(groups, str) else list(groups)
     for name in names:
-        if name not in mesh.cell_groups:
-            raise MeshError(unknown("group of cells", name, list(mesh.cell_groups)))
+        check_known("group of cells", name, list(mesh.cell_groups), MeshError)
     rows = mesh.split(np.unique(np.concatenate([mesh.cell_groups[name] for name in names])))
     blocks = [block[rows[name]] for name, block in mesh.solids.items() if name in rows]
     if not blocks:
@@ -94,15 +93,104 @@ def _cells(mesh: Mesh, groups: Sequence[str] | str | None) -> list[Numbers]:
     return blocks
 
 
-def _row(times: Array | None, values: Array, instant: float | None, name: str) -> int:
+def _row(field: FileField, instant: float | None, name: str) -> int:
     """Return which instant of a field is wanted."""
     if instant is None:
-        if len(values) != 1:
-            raise FileError(f"{name} has {len(values)} instants: say which with instant")
+        if len(field.values) != 1:
+            raise FileError(f"{name} has {len(field.values)} instants: say which with instant")
         return 0
-    if times is None:
+    if field.times is None:
         raise FileError(f"{name} has no times: leave out instant")
-    row = int(np.abs(times - instant).argmin())
-    if abs(times[row] - instant) > SAME_TIME * np.abs(times).max():
-        raise FileError(f"{name} has no instant {instant:g}, the next is {times[row]:g}")
+    row = int(np.abs(field.times - instant).argmin())
+    if abs(field.times[row] - instant) > SAME_TIME * np.abs(field.times).max():
+        raise FileError(f"{name} has no instant {instant:g}, the next is {field.times[row]:g}")
     return row
+
+
+def at_cells(field: FileField, middles: Array, mesh: Mesh, name: str) -> Array:
+    """Return the values (n_instants, n_cells) of a field at cells of a mesh, by their `middles` (n_cells, dim) [length].
+
+    MeshError if a cell has no value, or none is at its place; `name` names the field.
+    """
+    rows, _ = _nearest(field, middles, np.arange(len(middles)), mesh, ("cell", "cells"), name)
+    return _known(field.values[:, rows], middles, np.arange(len(middles)), "cell", name)
+
+
+def at_points_of(field: FileField, mesh: Mesh, wanted: Indices, name: str) -> Array:
+    """Return the values (n_instants, n_points) of a field at the `wanted` (k,) points of a mesh, elsewhere NaN.
+
+    A file with the points of the mesh, in its order, gives the value of each point itself, any other one that of the point
+    at the same place.
+
+    Raises
+    ------
+    MeshError
+        If a point has no value, or two of different size; `name` names the field.
+    """
+    rows = wanted
+    if field.places is None and field.values.shape[1] != mesh.n_points:
+        raise MeshError(f"{name} has {field.values.shape[1]} points and no coordinates, the mesh has {mesh.n_points}")
+    if field.places is not None and not _same_points(field.places, mesh):
+        rows, reach = _nearest(field, mesh.points[wanted], wanted, mesh, ("point", "nodes"), name)
+        _refuse_two(field, mesh.points[wanted], reach, name)
+    values = np.full((len(field.values), mesh.n_points), np.nan)
+    values[:, wanted] = _known(field.values[:, rows], mesh.points[wanted], wanted, "point", name)
+    return values
+
+
+def _in_space(places: Array) -> Array:
+    """Return places (n, 2) or (n, 3) with three coordinates."""
+    return np.pad(places, ((0, 0), (0, 3 - places.shape[1])))
+
+
+def _same_points(places: Array, mesh: Mesh) -> bool:
+    """Return whether the points of a file are those of a mesh, in its order."""
+    if len(places) != mesh.n_points:
+        return False
+    off = np.abs(_in_space(places) - _in_space(mesh.points)).max(initial=0.0)
+    return bool(off <= SAME_PLACE * np.ptp(mesh.points, axis=0).max())
+
+
+def _nearest(
+    field: FileField, places: Array, numbers: Indices, mesh: Mesh, nouns: tuple[str, str], name: str
+) -> tuple[Indices, float]:
+    """Return the rows (n,) of a field at places (n, dim) of a mesh, and how far they may be from there [length].
+
+    `numbers` (n,) are those of the points or cells at the places; what they are, and what the field is to be written on, say
+    the `nouns`.
+    """
+    from scipy.spatial import cKDTree
+
+    assert field.places is not None
+    reach = SAME_PLACE * float(np.ptp(mesh.points, axis=0).max())
+    distance, rows = cKDTree(_in_space(field.places)).query(_in_space(places))
+    off = np.flatnonzero(~(distance <= reach))
+    if len(off):
+        raise MeshError(
+            f"{name} has no {nouns[0]} where {len(off)} {nouns[0]}s of the mesh are (first: {nouns[0]} {numbers[off[0]]} "
+            f"{places[off[0]]}, {distance[off[0]]:.3g} from the next): write it on the {nouns[1]} of this mesh"
+        )
+    return np.asarray(rows, np.intp), reach
+
+
+def _known(values: Array, places: Array, numbers: Indices, noun: str, name: str) -> Array:
+    """Return values (n_instants, n) at some places (n, dim); MeshError where one is missing."""
+    missing = np.flatnonzero(~np.isfinite(values).all(axis=0))
+    if len(missing):
+        first = f"{noun} {numbers[missing[0]]} {places[missing[0]]}"
+        raise MeshError(f"{name} has no value at {len(missing)} {noun}s (first: {first})")
+    return values
+
+
+def _refuse_two(field: FileField, wanted: Array, reach: float, name: str) -> None:
+    """Raise MeshError where points of the file at one place have different values."""
+    from scipy.spatial import cKDTree
+
+    assert field.places is not None
+    near = cKDTree(_in_space(field.places)).query_ball_point(_in_space(wanted), reach)
+    for point, members in zip(wanted, near, strict=True):
+        if len(members) > 1 and np.ptp(field.values[:, members], axis=1).max() > 0.0:
+            raise MeshError(
+                f"{name} has {len(members)} different values at {_in_space(point[None])[0]}, where bodies touch: write it on "
+                "the nodes of this mesh, in their order"
+            )

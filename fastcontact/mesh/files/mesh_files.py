@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
+from fastcontact._tools.argument_types import typed
+from fastcontact._tools.paths import PathLike, checked_target, existing_file, replacing
 from fastcontact.errors import FileError
 from fastcontact.mesh import topology
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.files import aster_mail, med, meshio_files
-from fastcontact.mesh.files.paths import PathLike, checked_target, existing_file, replacing
 from fastcontact.mesh.mesh import Mesh
 
 logger = logging.getLogger("fastcontact")

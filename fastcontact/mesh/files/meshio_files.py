@@ -16,14 +16,15 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from fastcontact._tools import hdf5
+from fastcontact._tools.paths import existing_file
 from fastcontact.arrays import AnyArray, Numbers
 from fastcontact.errors import FileError, MeshError, unknown, warn
 from fastcontact.mesh import elements
-from fastcontact.mesh.files import abaqus, gmsh_versions, hdf5
+from fastcontact.mesh.files import abaqus, gmsh_versions
 from fastcontact.mesh.files.blocks import VERTEX
 from fastcontact.mesh.files.meshio_content import NODE_ORDER, UNFIT, Orders, mesh_of
 from fastcontact.mesh.files.meshio_process import CELL_PREFIX, POINT_PREFIX, library, read_in_process
-from fastcontact.mesh.files.paths import existing_file
 from fastcontact.mesh.mesh import Mesh
 
 logger = logging.getLogger("fastcontact")
@@ -92,13 +93,21 @@ def _format(path: Path, writing: bool) -> str:
     return "gmsh"
 
 
-def _read_with_field(path: Path, field: str) -> dict[str, Any]:
-    """Return what `meshio_process.read_in_process` finds of a mesh and a field of it."""
+def _read_with_field(path: Path, field: str, where: str, kind: str) -> dict[str, Any]:
+    """Return what `meshio_process.read_in_process` finds of a mesh and a field, which it lists `where` there."""
     file_format = _format(path, writing=False)
-    _check_before(path, file_format)
     if file_format == "gmsh":
         raise FileError(f"'{path}': fields of Gmsh files are not read: write the field to a .vtu or .med file")
-    content = read_in_process(path, file_format, field)
+    content = _content(path, path, file_format, field)
+    if field not in content[where]:
+        raise FileError(f"'{path}': {unknown(kind, field, content[where])}")
+    return content
+
+
+def _content(path: Path, readable: Path, file_format: str, field: str = "") -> dict[str, Any]:
+    """Return what is found in a file, or in a `readable` copy of it; FileError if meshio cannot read it."""
+    _check_before(path, file_format)
+    content = read_in_process(readable, file_format, field)
     if "error" in content:
         raise _refusal("read", path, content["error"])
     return content
@@ -109,9 +118,7 @@ def read_point_data(path: Path, field: str) -> tuple[AnyArray, AnyArray]:
 
     FileError if meshio cannot read the file, or it has no such field.
     """
-    content = _read_with_field(path, field)
-    if field not in content["fields"]:
-        raise FileError(f"'{path}': {unknown('field', field, content['fields'])}")
+    content = _read_with_field(path, field, "fields", "field")
     if content["field"] is None or content["points"] is None or len(content["field"]) != len(content["points"]):
         raise FileError(f"field '{field}' of '{path}' has no number for each point: write it anew")
     return content["field"], content["points"]
@@ -122,9 +129,7 @@ def read_cell_data(path: Path, field: str) -> tuple[AnyArray, AnyArray]:
 
     FileError if meshio cannot read the file, or it has no such field.
     """
-    content = _read_with_field(path, field)
-    if field not in content["cell_fields"]:
-        raise FileError(f"'{path}': {unknown('field of cells', field, content['cell_fields'])}")
+    content = _read_with_field(path, field, "cell_fields", "field of cells")
     values, points, blocks = content["cell_field"], content["points"], content["cells"]
     fits = [part is not None and nodes is not None and len(part) == len(nodes)
             for part, (_, _, nodes) in zip(values, blocks, strict=True)]  # fmt: skip
@@ -138,14 +143,11 @@ def read_cell_data(path: Path, field: str) -> tuple[AnyArray, AnyArray]:
 def read(path: Path) -> tuple[Mesh, str, dict[str, int]]:
     """Return a mesh with its groups, the format, and the numbers of cells left out as vertices and as duplicates."""
     file_format = _format(path, writing=False)
-    _check_before(path, file_format)
     if file_format == "gmsh":
         with tempfile.TemporaryDirectory() as folder:
-            content = read_in_process(gmsh_versions.readable(path, Path(folder)), file_format)
+            content = _content(path, gmsh_versions.readable(path, Path(folder)), file_format)
     else:
-        content = read_in_process(path, file_format)
-    if "error" in content:
-        raise _refusal("read", path, content["error"])
+        content = _content(path, path, file_format)
     _log("read", path, content["said"])
     try:
         mesh, dropped = mesh_of(content, file_format)

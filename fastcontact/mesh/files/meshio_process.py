@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.packing import packed, unpacked
 from fastcontact.arrays import AnyArray
-from fastcontact.mesh.files.packing import packed, unpacked
 
 # Limits of the child, each a constant and a part for every byte of the file. meshio 5.3.5 takes up to 0.15 s and 9 MB for a
 # megabyte (permas, vtu); the process itself takes 130 MB.

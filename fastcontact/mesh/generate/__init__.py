@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from fastcontact.errors import no_attribute
+from fastcontact.errors import names_of
 from fastcontact.mesh.generate.blocks import block, block_on_block, cylinder_on_block
 from fastcontact.mesh.generate.box import box
 from fastcontact.mesh.generate.cut import cut
@@ -48,10 +48,4 @@ __all__ = [
 
 
 if not TYPE_CHECKING:  # to whom all names are known
-
-    def __getattr__(name: str) -> object:
-        raise no_attribute("fastcontact.generate", name, __all__)
-
-
-def __dir__() -> list[str]:
-    return __all__
+    __getattr__, __dir__ = names_of("fastcontact.generate", __all__)

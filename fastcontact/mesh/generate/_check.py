@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from reprlib import repr
 from typing import Any, TypeVar
 
-from fastcontact.errors import MeshError, unknown
+from fastcontact.errors import MeshError, check_known
 
 TRIANGLES = ("tri3", "tri6")
 QUADRANGLES = ("quad4", "quad8", "quad9")
@@ -23,10 +23,7 @@ Number = TypeVar("Number", int, float)
 
 def number(name: str, value: Any) -> float:
     """Return `value` as a float; MeshError if it is not a finite number."""
-    try:
-        result = float(value)
-    except (TypeError, ValueError):
-        raise MeshError(f"{name} must be a number, not {repr(value)}") from None
+    result = float(value)
     if not math.isfinite(result):
         raise MeshError(f"{name} must be a finite number, not {repr(value)}")
     if abs(result) > LARGEST:
@@ -90,18 +87,15 @@ def affordable(n_cells: float) -> None:
         )
 
 
-def each(check: Callable[[str, Any], Number], name: str, value: Any, count: int = 2) -> list[Number]:
-    """Return the two (or three) members of `value`, checked one by one; MeshError if there are not so many."""
-    if isinstance(value, str) or not hasattr(value, "__len__") or len(value) != count:
-        raise MeshError(f"{name} must be {'two' if count == 2 else 'three'} numbers, not {repr(value)}")
+def each(check: Callable[[str, Any], Number], name: str, value: Sequence[Any]) -> list[Number]:
+    """Return the members of `value`, checked one by one."""
     return [check(f"{name}[{i}]", member) for i, member in enumerate(value)]
 
 
-def one_of(name: str, value: Any, known: Sequence[str]) -> str:
+def one_of(name: str, value: str, known: Sequence[str]) -> str:
     """Return `value`; MeshError that offers the near names unless it is one of `known`."""
-    if not isinstance(value, str) or value not in known:
-        raise MeshError(unknown(name, str(value)[:80], known))
-    return str(value)
+    check_known(name, value, known, MeshError)
+    return value
 
 
 def unused(element: str, **arguments: Any) -> None:

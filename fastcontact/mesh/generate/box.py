@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.elements import Element
 from fastcontact.mesh.generate._check import affordable, count, each, number, one_of, positive
 from fastcontact.mesh.generate.blocks import block as rectangle
@@ -67,16 +67,16 @@ def box(
     (12, 4, ['quad4', 'tri3', 'wedge6'])
     """
     solid = elements.get(one_of("element", element, SOLIDS))
-    lengths, corner = np.array(each(positive, "size", size, 3)), np.array(each(number, "origin", origin, 3))
-    shape = np.array(each(count, "divisions", divisions, 3))
+    lengths, corner = np.array(each(positive, "size", size)), np.array(each(number, "origin", origin))
+    shape = np.array(each(count, "divisions", divisions))
     block, lattice = _solids(solid, shape)
     facets, sides = _sides(solid, block, lattice, STEPS * shape)
     cells, groups, first = {element: block}, {name: np.arange(len(block))}, len(block)
-    for kind, found in facets.items():
-        cells[kind] = found
+    for kind, outer in facets.items():
+        cells[kind] = outer
         for side, rows in sides[kind].items():
             groups[side] = np.concatenate([groups.get(side, rows[:0]), first + rows])
-        first += len(found)
+        first += len(outer)
     return Mesh(corner + lattice / (STEPS * shape) * lengths, cells, groups)
 
 
@@ -105,12 +105,12 @@ def _sides(
         on = lattice[:, axis] == (last[axis] if end == "MAX" else 0)
         for local, kind in zip(solid.facets, solid.facet_elements, strict=True):
             nodes = block[:, local]
-            found = nodes[on[nodes].all(axis=1)]
-            if len(found):
+            on_side = nodes[on[nodes].all(axis=1)]
+            if len(on_side):
                 start = sum(map(len, facets.setdefault(kind, [])))
-                facets[kind].append(found)
+                facets[kind].append(on_side)
                 rows, side = sides.setdefault(kind, {}), f"{AXES[axis].upper()}{end}"
-                rows[side] = np.concatenate([rows.get(side, found[:0, 0]), start + np.arange(len(found))])
+                rows[side] = np.concatenate([rows.get(side, on_side[:0, 0]), start + np.arange(len(on_side))])
     return {kind: np.concatenate(parts) for kind, parts in facets.items()}, sides
 
 

@@ -8,12 +8,12 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.companion_groups import OPPOSITE
-from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.mesh import Mesh, starts_of
 
 Facet = frozenset[int]
 
@@ -66,8 +66,8 @@ def _direction(mesh: Mesh, group: str, points: Numbers, normal: Sequence[float] 
     """Return the unit vector (dim,) across a section."""
     if normal is None:
         places = mesh.points[points] - mesh.points[points].mean(axis=0)
-        found = np.linalg.svd(places, full_matrices=True)[2][-1]
-        return np.asarray(found * np.sign(found[np.argmax(np.abs(found))]))
+        across = np.linalg.svd(places, full_matrices=True)[2][-1]
+        return np.asarray(across * np.sign(across[np.argmax(np.abs(across))]))
     vector = np.asarray(normal, float)
     length = np.linalg.norm(vector)
     if vector.shape != (mesh.dim,) or not (np.isfinite(length) and length > 0):
@@ -122,8 +122,8 @@ def _sides_of_parts(
     side: dict[int, bool] = {}
     for facet, pair in between.items():
         here, there = sorted(pair, key=lambda cell: float(middle[cell] @ direction))
-        for own, beyond in ((int(component[here]), False), (int(component[there]), True)):
-            if side.setdefault(own, beyond) != beyond:
+        for number, beyond in ((int(component[here]), False), (int(component[there]), True)):
+            if side.setdefault(number, beyond) != beyond:
                 where = mesh.points[list(facet)].mean(axis=0)
                 raise MeshError(
                     f"the facets of '{group}' do not cut through: the cells on both sides are joined beside them (near "
@@ -143,13 +143,11 @@ def _opened(
         rows = np.flatnonzero((new[block] >= 0).any(axis=1))
         follow = [row for row in rows.tolist() if frozenset(block[row].tolist()) in outer]
         _with_nodes(cells, name, np.array(follow, int), new)
-    groups, starts, total = {}, {}, 0
-    for name, block in cells.items():
-        starts[name] = total
-        total += len(block) + len(facets.get(name, ()))
-    for own, members in mesh.cell_groups.items():
+    groups = {}
+    starts = starts_of({name: range(len(block) + len(facets.get(name, ()))) for name, block in cells.items()})
+    for named, members in mesh.cell_groups.items():
         parts = [starts[name] + rows for name, rows in mesh.split(members).items()]
-        groups[own] = np.concatenate(parts) if parts else members
+        groups[named] = np.concatenate(parts) if parts else members
     groups[group + OPPOSITE] = np.concatenate(
         [starts[name] + len(cells[name]) + np.arange(len(block)) for name, block in facets.items()]
     )

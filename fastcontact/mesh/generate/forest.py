@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import AnyArray, Mask
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.generate.quadratic import Curve, centres, edge_keys, edges_of, edges_on, ends_of
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.generate._check import FACES, QUADRANGLES, growth_of, one_of, positive, segments, unused
 from fastcontact.mesh.generate._spacing import Spacing, graded, growing
 from fastcontact.mesh.generate.box import SOLIDS, on_lines

@@ -7,9 +7,9 @@ from functools import partial
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array
 from fastcontact.errors import MeshError
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.generate._blocks import structured, transfinite
 from fastcontact.mesh.generate._check import FACES, TRIANGLES, count, each, one_of, positive, unused, within
 from fastcontact.mesh.generate._spacing import Spacing, arc, divided, geometric, straight

@@ -9,10 +9,10 @@ from typing import Protocol
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
 from fastcontact.mesh.topology import outer_facets

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.errors import MeshError
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.companion_groups import ROTATION
 from fastcontact.mesh.mesh import Mesh
 

@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import AnyArray, Array
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.generate.quadratic import ON_CURVE, Circle, Curve, all_on, facets_of
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
@@ -100,69 +101,63 @@ def refined(mesh: Mesh, curves: Iterable[Curve] = ()) -> Mesh:
     >>> generate.refined(generate.block(divisions=(2, 2))).cells["quad4"].shape
     (16, 4)
     """
-    curves = list(curves)
-    keys, where, numbers = _numbered(mesh)
-    points = np.concatenate([mesh.points, *(_places(mesh, name, rows) for name, rows in where.items())])
-    order = np.concatenate([np.arange(mesh.n_points), *(mesh.n_points + rows[:, 2] for rows in where.values())])
-    points[order] = points.copy()
+    new = _new_points(mesh)
+    points = np.concatenate([mesh.points, np.empty((len(new.keys), mesh.dim))])
+    for name, point, parents, rows in new.sources:
+        points[rows] = np.einsum("n,cnd->cd", _pattern(name).shape[point], mesh.points[mesh.cells[name][parents]])
     for curve in curves:
-        rows = _on_curve(mesh, curve, keys)
+        rows = _on_curve(mesh, curve, new.keys)
         points[rows] = curve.project(points[rows])
-    cells = {}
-    for name, block in mesh.cells.items():
-        cells[name] = numbers[name][:, _pattern(name).children].reshape(-1, block.shape[1])
-    result = Mesh(points, cells, _cell_groups(mesh), _point_groups(mesh, where))
+    blocks = {name: lattice[:, _pattern(name).children] for name, lattice in new.lattices.items()}
+    cells = {name: block.reshape(-1, block.shape[2]) for name, block in blocks.items()}
+    result = Mesh(points, cells, _cell_groups(mesh), _point_groups(mesh, new))
     check_cells(result)
     return result
 
 
-def _numbered(mesh: Mesh) -> tuple[AnyArray, dict[str, AnyArray], dict[str, AnyArray]]:
-    """Number the new points: first those on edges, once for all cells that share them, then those inside cells.
+class _NewPoints(NamedTuple):
+    """The points of a refined mesh that its parent has not, in the order of their keys: those on edges before others.
 
-    Return the sorted keys of the points on edges; by element the new points of its cells, (n, 3) rows of cell, lattice point
-    and place among the new points; by element the points of every cell's lattice.
+    `keys` (n,) are the same for all cells that share a point; `sources` are name of an element, number of a point of its
+    lattice, rows of cells, and the numbers of the points that they have there; `lattices` (n_cells, n_lattice) hold the
+    points of every cell by element.
     """
-    numbers, codes, sources = {}, [], []
+
+    keys: AnyArray
+    sources: list[tuple[str, int, AnyArray, AnyArray]]
+    lattices: dict[str, AnyArray]
+
+
+def _new_points(mesh: Mesh) -> _NewPoints:
+    codes, places, inside = [np.empty(0, np.int64)], [], 4 * mesh.n_points**2
+    lattices = {}
     for name, block in mesh.cells.items():
-        pattern = _pattern(name)
-        numbers[name] = np.empty((len(block), len(pattern.shape)), np.int64)
-        numbers[name][:, : block.shape[1]] = block
-        ends = block[:, elements.get(name).edges].astype(np.int64)
-        for point in np.flatnonzero(pattern.on_edge >= 0).tolist():
-            a, b = ends[:, pattern.on_edge[point]].T
-            codes.append(_keys(a, b, int(pattern.along[point]), mesh.n_points))
-            sources.append((name, point))
-    lengths = [len(code) for code in codes]
-    flat = np.concatenate(codes) if codes else np.empty(0, np.int64)
-    keys, first, rank = np.unique(flat, return_index=True, return_inverse=True)
-    where: dict[str, list[AnyArray]] = {name: [] for name in mesh.cells}
-    starts = np.concatenate([[0], np.cumsum(lengths)]).astype(int)
-    for (name, point), start, end in zip(sources, starts[:-1], starts[1:], strict=True):
-        numbers[name][:, point] = mesh.n_points + rank[start:end]
-        here = np.flatnonzero((first >= start) & (first < end))
-        where[name].append(np.column_stack([first[here] - start, np.full(len(here), point), here]))
-    count = len(keys)
-    for name, block in mesh.cells.items():
-        pattern = _pattern(name)
+        pattern, ends = _pattern(name), block[:, elements.get(name).edges].astype(np.int64)
+        lattices[name] = np.empty((len(block), len(pattern.shape)), np.int64)
+        lattices[name][:, : block.shape[1]] = block
         for point in range(block.shape[1], len(pattern.shape)):
-            if pattern.on_edge[point] < 0:
-                new = count + np.arange(len(block))
-                numbers[name][:, point] = mesh.n_points + new
-                where[name].append(np.column_stack([np.arange(len(block)), np.full(len(block), point), new]))
-                count += len(block)
-    return keys, {n: np.concatenate([np.empty((0, 3), np.int64), *rows]) for n, rows in where.items()}, numbers
+            edge = pattern.on_edge[point]
+            if edge >= 0:
+                codes.append(_keys(ends[:, edge, 0], ends[:, edge, 1], int(pattern.along[point]), mesh.n_points))
+            else:  # each cell has its own
+                codes.append(inside + np.arange(len(block)))
+                inside += len(block)
+            places.append((name, point))
+    keys, first, rank = np.unique(np.concatenate(codes), return_index=True, return_inverse=True)
+    sources, start = [], 0
+    for name, point in places:
+        numbers = mesh.n_points + rank[start : start + len(lattices[name])]
+        lattices[name][:, point] = numbers
+        cells = np.sort(first[(first >= start) & (first < start + len(numbers))]) - start
+        sources.append((name, point, cells, numbers[cells]))
+        start += len(numbers)
+    return _NewPoints(keys, sources, lattices)
 
 
 def _keys(a: AnyArray, b: AnyArray, quarters: int, n_points: int) -> AnyArray:
     """One number for a point on the edge from a to b, the same from either end."""
     from_least = np.where(a < b, quarters, 4 - quarters)
     return (np.minimum(a, b) * n_points + np.maximum(a, b)) * 4 + from_least
-
-
-def _places(mesh: Mesh, name: str, rows: AnyArray) -> Array:
-    """Coordinates (n, 2) of new points, by the shape functions of their parents."""
-    corners = mesh.points[mesh.cells[name][rows[:, 0]]]
-    return np.einsum("in,ind->id", _pattern(name).shape[rows[:, 1]], corners)
 
 
 def _edge_nodes(name: str) -> list[list[int]]:
@@ -202,19 +197,16 @@ def _cell_groups(mesh: Mesh) -> dict[str, AnyArray]:
     return groups
 
 
-def _point_groups(mesh: Mesh, where: dict[str, AnyArray]) -> dict[str, AnyArray]:
+def _point_groups(mesh: Mesh, new: _NewPoints) -> dict[str, AnyArray]:
     groups: dict[str, AnyArray] = {}
     for group, members in mesh.point_groups.items():
         inside = np.zeros(mesh.n_points, bool)
         inside[members] = True
         joining = [members]
-        for name, rows in where.items() if len(members) > 1 else ():
-            block, on_edge = mesh.cells[name], _pattern(name).on_edge
-            edges = _edge_nodes(name)
-            for point in np.unique(rows[:, 1]):
-                local = edges[on_edge[point]] if on_edge[point] >= 0 else list(range(block.shape[1]))
-                these = rows[rows[:, 1] == point]
-                joining.append(mesh.n_points + these[inside[block[these[:, 0]][:, local]].all(axis=1), 2])
+        for name, point, cells, rows in new.sources if len(members) > 1 else ():
+            edge, block = _pattern(name).on_edge[point], mesh.cells[name][cells]
+            nodes = block[:, _edge_nodes(name)[edge]] if edge >= 0 else block
+            joining.append(rows[inside[nodes].all(axis=1)])
         groups[group] = np.concatenate(joining)
     return groups
 

@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.errors import MeshError
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.generate._blocks import structured
 from fastcontact.mesh.generate._check import FACES, TRIANGLES, affordable, count, each, one_of, positive
 from fastcontact.mesh.generate.quadratic import Circle, in_element

@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array
 from fastcontact.errors import MeshError
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.generate._check import count, each, one_of, positive
 from fastcontact.mesh.generate._spacing import Spacing, graded, segments_for
 from fastcontact.mesh.generate.box import on_lines

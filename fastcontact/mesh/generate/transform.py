@@ -9,12 +9,12 @@ from numpy.typing import ArrayLike
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.generate._check import number, one_of
-from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.mesh import Mesh, starts_of
 
 Groups = dict[str, AnyArray]
 Names = Mapping[str, str | None] | Callable[[str], str | None]
@@ -143,7 +143,7 @@ def union(*meshes: Mesh) -> Mesh:
     shifts = np.cumsum([0] + [mesh.n_points for mesh in meshes])[:-1]
     both = list(zip(meshes, shifts, strict=True))
     cells = _joined({name: block + shift for name, block in mesh.cells.items()} for mesh, shift in both)
-    starts = _starts(cells)
+    starts = starts_of(cells)
     numbers = [(mesh, _renumbering(mesh, starts)) for mesh in meshes]
     return Mesh(
         np.concatenate([mesh.points for mesh in meshes]),
@@ -160,12 +160,6 @@ def _joined(parts: Iterable[Groups]) -> Groups:
         for name, values in groups_of_mesh.items():
             groups_of_all.setdefault(name, []).append(values)
     return {name: np.concatenate(arrays) for name, arrays in groups_of_all.items()}
-
-
-def _starts(cells: Mapping[str, AnyArray]) -> dict[str, int]:
-    """Number of the first cell of each element."""
-    lengths = [len(block) for block in cells.values()]
-    return dict(zip(cells, np.cumsum([0, *lengths[:-1]]).tolist(), strict=True))
 
 
 def _renumbering(mesh: Mesh, starts: dict[str, int]) -> AnyArray:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_array, vstack
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.contact.obstacles.rotation import Rotation
 from fastcontact.elasticity.initial_states import InitialState
@@ -20,7 +21,6 @@ from fastcontact.elasticity.temperature import Temperature
 from fastcontact.elasticity.varying_constants import Cells
 from fastcontact.errors import ModelError, unknown
 from fastcontact.heat.loads import Film, FixedTemperature, Heating
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
 from fastcontact.model.contact_pair import ContactPair

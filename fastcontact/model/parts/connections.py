@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_array, vstack
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.elasticity.loads import axes_of, check_number
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.elasticity.springs import grounded, joined
 from fastcontact.errors import ModelError
-from fastcontact.mesh.argument_types import typed
 from fastcontact.model.couplings import coupling
 from fastcontact.model.parts.initial_states import ModelInitialStates
 from fastcontact.model.periodicity import cyclic, periodic

@@ -13,6 +13,7 @@ from typing import Any, Unpack
 
 import numpy as np
 
+from fastcontact._tools.argument_types import check_fields, typed
 from fastcontact.arrays import Mask
 from fastcontact.contact.default_formulation import against_obstacle, default_formulation
 from fastcontact.contact.formulations import FORMULATIONS, Formulation
@@ -25,7 +26,6 @@ from fastcontact.contact.side_checks import check_obstacle, check_sides
 from fastcontact.contact.surface import Surface, surface
 from fastcontact.elasticity.loads import Value, axes_of, check_number
 from fastcontact.errors import ContactError, ModelError, unknown
-from fastcontact.mesh.argument_types import check_fields, typed
 from fastcontact.model.contact_options import ContactOptions
 from fastcontact.model.contact_pair import ContactPair, Driving, FluidPressure, method
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles

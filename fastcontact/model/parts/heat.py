@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.conductance import Conductance
 from fastcontact.elasticity.loads import Value, evaluated
@@ -16,7 +17,6 @@ from fastcontact.errors import ModelError
 from fastcontact.heat.conduction import Conduction
 from fastcontact.heat.loads import Film, FixedTemperature, HeatFlux, Heating, HeatSource, NodalHeat
 from fastcontact.heat.reached import not_reached
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.topology import bodies
 from fastcontact.model.parts.base import group_names
 from fastcontact.model.parts.materials import ModelMaterials

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
+from fastcontact._tools.paths import PathLike
 from fastcontact.arrays import Array
 from fastcontact.elasticity.initial_states import StressOffset, initial_state
 from fastcontact.elasticity.loads import Value
@@ -19,8 +21,6 @@ from fastcontact.elasticity.materials import Constant
 from fastcontact.elasticity.recovery import internal_force, stress_at_points
 from fastcontact.elasticity.temperature import Temperature, checked_value, histories
 from fastcontact.errors import ModelError
-from fastcontact.mesh.argument_types import typed
-from fastcontact.mesh.files.paths import PathLike
 from fastcontact.model.parts.base import group_names
 from fastcontact.model.parts.loads import ModelLoads
 from fastcontact.model.ramp import History, Table, table_of

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array
 from fastcontact.elasticity.following_pressure import FollowingPressure
 from fastcontact.elasticity.inertia_loads import Centrifugal, Densities, Gravity, InertiaLoad
@@ -23,7 +24,6 @@ from fastcontact.elasticity.loads import (
     check_number,
 )
 from fastcontact.errors import ModelError
-from fastcontact.mesh.argument_types import typed
 from fastcontact.model.checks import check_forces
 from fastcontact.model.couplings import Moment
 from fastcontact.model.parts.base import group_names

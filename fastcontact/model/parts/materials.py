@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Mask, Numbers
 from fastcontact.elasticity.material_field import MaterialField, material_field
 from fastcontact.elasticity.materials import Material
@@ -13,7 +14,6 @@ from fastcontact.elasticity.nonlinear_bodies import NonlinearBodies, check_law, 
 from fastcontact.elasticity.nonlinear_materials import NonlinearElastic
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.errors import ModelError
-from fastcontact.mesh.argument_types import typed
 from fastcontact.model.parts.base import ModelBase
 
 

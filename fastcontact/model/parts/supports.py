@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.obstacles.rotation import Rotation
 from fastcontact.elasticity.loads import Value, axes_of, check_value, evaluated
@@ -18,7 +19,6 @@ from fastcontact.elasticity.material_axes import Axes, checked_axes, frames
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.elasticity.symmetry_axis import ON_AXIS, axis_nodes
 from fastcontact.errors import ModelError
-from fastcontact.mesh.argument_types import typed
 from fastcontact.model.obstacle_rotation import rotation_of
 from fastcontact.model.parts.base import Support
 from fastcontact.model.parts.contact import ModelContact

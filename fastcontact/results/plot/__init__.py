@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from fastcontact.errors import no_attribute
+from fastcontact.errors import names_of
 from fastcontact.results.plot._axes import UNITS
 from fastcontact.results.plot.animation import animate
 from fastcontact.results.plot.axis import axis_stress
@@ -26,10 +26,4 @@ __all__ = [
 
 
 if not TYPE_CHECKING:  # to whom all names are known
-
-    def __getattr__(name: str) -> object:
-        raise no_attribute("fastcontact.plot", name, __all__)
-
-
-def __dir__() -> list[str]:
-    return __all__
+    __getattr__, __dir__ = names_of("fastcontact.plot", __all__)

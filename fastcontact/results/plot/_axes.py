@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fastcontact.arrays import Array
-from fastcontact.errors import FastcontactError, unknown
+from fastcontact.errors import FastcontactError, check_known
 from fastcontact.results.step import ContactResult, StepResult
 
 if TYPE_CHECKING:
@@ -39,9 +39,13 @@ def contacts_of(steps: Sequence[StepResult], pair: str) -> list[ContactResult]:
     if not len(steps):
         raise FastcontactError("there are no steps to draw")
     for step in steps:
-        if pair not in step.contact:
-            raise FastcontactError(unknown("contact pair", pair, step.contact))
+        check_known("contact pair", pair, step.contact, FastcontactError)
     return [step.contact[pair] for step in steps]
+
+
+def mark(axes: Any, at: Array, label: str) -> None:
+    """Mark a place (dim,) of a picture."""
+    axes.plot(*([x] for x in at), "o", mfc="none", mec="red", ms=9, mew=1.5, label=label, zorder=10)
 
 
 def png(figure: Any) -> bytes:
@@ -104,10 +108,10 @@ def new_panels(rows: int, columns: int, size: tuple[float, float], dpi: int = 15
     return panels
 
 
-def size_around(points: Array) -> tuple[float, float]:
+def size_around(points: Array, least: float = 3.2) -> tuple[float, float]:
     """Return width and height of a picture that the body fills, beside colours, labels and title [inches]."""
     width, height = np.ptp(points, axis=0) / np.ptp(points, axis=0).max()
-    return max(4.2 * float(width) + 1.9, 5.0), max(4.2 * float(height) + 2.0, 3.2)
+    return max(4.2 * float(width) + 1.9, 5.0), max(4.2 * float(height) + 2.0, least)
 
 
 def legend_below(points: Array) -> float:

@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
+from fastcontact._tools.paths import checked_target, replacing
 from fastcontact.arrays import Array
 from fastcontact.errors import FastcontactError
-from fastcontact.mesh.argument_types import typed
-from fastcontact.mesh.files.paths import checked_target, replacing
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.plot._axes import UNKNOWN, Units, new_axes, settled
+from fastcontact.results.plot._axes import UNKNOWN, Units, new_axes, settled, size_around
 from fastcontact.results.plot.fields import field_of
 from fastcontact.results.plot.shape import deformed_shape, scaled
 from fastcontact.results.plot.solid import show_box
@@ -109,13 +109,15 @@ def animate(
     if pictures_per_second < 1:
         raise FastcontactError(f"pictures_per_second = {pictures_per_second}: one or more a second can be shown")
     target = checked_target(path)
-    figure = new_axes(None, _size(mesh, mirrored), "3d" if mesh.dim == 3 else None).figure
+    doubled = [2.0 if mirrored else 1.0, 1.0]
+    size, projection = (size_around(mesh.points * doubled, 3.8), None) if mesh.dim == 2 else ((6.4, 6.0), "3d")
+    figure = new_axes(None, size, projection).figure
     writer = writer_of(target, pictures_per_second)
     colours, box = _over_all(mesh, steps, field, scale, mirrored)
     with _failure_of_ffmpeg(target), replacing(target) as temporary, writer.saving(figure, temporary, RESOLUTION):
         for step in steps:
             figure.clear()
-            axes = figure.add_subplot(projection="3d" if mesh.dim == 3 else None)
+            axes = figure.add_subplot(projection=projection)
             heading = f"{title}\nload factor {step.load_factor:.3g}, displacements x {scale:g}".strip()
             deformed_shape(
                 mesh, step, field=field, scale=scale, mirrored=mirrored, limits=colours, title=heading, units=units,
@@ -163,15 +165,6 @@ def _failure_of_ffmpeg(path: Path) -> Iterator[None]:
         raise FastcontactError(
             f"'{path}' was not written, ffmpeg ended with code {reason}: write a .gif instead"
         ) from error
-
-
-def _size(mesh: Mesh, mirrored: bool) -> tuple[float, float]:
-    """Return width and height of the pictures [inches]."""
-    if mesh.dim == 3:
-        return 6.4, 6.0
-    width, height = np.ptp(mesh.points, axis=0) * [2.0 if mirrored else 1.0, 1.0]
-    larger = max(width, height)
-    return max(4.2 * width / larger + 1.9, 5.0), max(4.2 * height / larger + 2.0, 3.8)
 
 
 def _over_all(

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import AnyArray, Array
 from fastcontact.elasticity.recovery import von_mises
 from fastcontact.errors import FastcontactError
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.plot._axes import UNKNOWN, Units, contacts_of, new_axes
 from fastcontact.results.step import StepResult
@@ -78,12 +78,14 @@ def axis_stress(
     axes, units = new_axes(ax, (6.4, 4.8)), units or step.units
     reach = DEEP * np.nan_to_num(contacts_of([step], pair)[0].radius[0]) or float(depth.max())
     shown = depth <= reach
-    values = {what: stress[:, component] for what, component in COMPONENTS.items()} | {"von Mises": von_mises(stress)}
+    values = {caption: stress[:, component] for caption, component in COMPONENTS.items()} | {
+        "von Mises": von_mises(stress)
+    }
     for number, name in enumerate(bodies):
         here = shown & (side == 1 - 2 * number)
-        for (what, value), colour, marker in zip(values.items(), COLOURS, "osD", strict=True):
+        for (caption, value), colour, marker in zip(values.items(), COLOURS, "osD", strict=True):
             if here.any():  # the second body is hollow, so that it hides nothing of the first
-                face, label = ("none" if number else colour), f"{what}, {name}"
+                face, label = ("none" if number else colour), f"{caption}, {name}"
                 axes.plot(depth[here], value[here], marker, color=colour, mfc=face, ms=3.5 * (1 + number), label=label)
     fine = np.linspace(0.0, reach, 400)
     for style, (label, theory) in zip(("-", "--", ":"), (theories or {}).items(), strict=False):

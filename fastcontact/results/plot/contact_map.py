@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.search.facet_tables import flat_triangles
-from fastcontact.errors import FastcontactError, unknown
-from fastcontact.mesh.argument_types import typed
+from fastcontact.errors import FastcontactError, check_known
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets
 from fastcontact.results.plot._axes import UNKNOWN, Panels, Units, new_panels
-from fastcontact.results.plot.hiding import across
+from fastcontact.results.plot.hiding import seen_along
 from fastcontact.results.plot.patches import fill
 from fastcontact.results.step import ContactResult
 from fastcontact.results.units import labelled, valued
@@ -86,8 +86,7 @@ def contact_map(
     if labels is None:
         flat -= contact.middle @ basis.T
         labels = ("across the contact", "up the contact")
-    if beside not in BESIDE:
-        raise FastcontactError(unknown("field beside the pressure", beside, BESIDE))
+    check_known("field beside the pressure", beside, BESIDE, FastcontactError)
     caption, quantity, vectors = *BESIDE[beside], getattr(contact, beside)
     size = np.linalg.norm(vectors, axis=1)
     both = bool(size.max(initial=0.0) > (1e-9 * contact.pressure_max if beside == "shear" else 0.0) >= 0.0)
@@ -149,12 +148,7 @@ def _seen_along(contact: ContactResult, blocks: dict[str, Indices]) -> tuple[Arr
         raise FastcontactError(
             f"the surface of contact '{contact.name}' goes around its body: draw a section, or look at it with view"
         )
-    direction = total / np.linalg.norm(total)
-    along = int(np.argmax(np.abs(direction)))
-    if abs(direction[along]) < 0.9:
-        return across(direction)[:2], None
-    first, second = [axis for axis in range(3) if axis != along]
-    return np.eye(3)[[first, second]], ("xyz"[first], "xyz"[second])
+    return seen_along(total / np.linalg.norm(total), 0.9)
 
 
 def _nodes(ax: Any, flat: Array, contact: ContactResult, both: bool) -> None:
@@ -176,10 +170,10 @@ def _arrows(ax: Any, flat: Array, vectors: Array, size: Array) -> None:
 
 def _carrying(contact: ContactResult, blocks: dict[str, Indices]) -> Mask:
     """Return which nodes (m,) are closed, or have a facet with pressure."""
-    found = contact.active.copy()
+    carrying = contact.active.copy()
     for facets in blocks.values():
-        found[facets[(contact.pressure[facets] != 0.0).any(axis=1)]] = True
-    return found
+        carrying[facets[(contact.pressure[facets] != 0.0).any(axis=1)]] = True
+    return carrying
 
 
 def _limit(ax: Any, flat: Array, closed: Mask) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,7 @@ from fastcontact.results.layout import contact_slip
 from fastcontact.results.separated import separated
 from fastcontact.results.step import StepResult
 from fastcontact.results.tables import AXES, STRESS_COMPONENTS
+from fastcontact.results.units import valued
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +61,11 @@ class Field:
         low, high = float(self.values.min()), float(self.values.max())
         return low < 0.0 < high and min(-low, high) > 0.1 * max(-low, high)
 
+    def told(self, value: float, units: Mapping[str, str], where: str = "") -> str:
+        """Return an extreme value as text."""
+        kind = "maximum" if value >= 0.0 else "minimum"
+        return f"{kind}{where} {valued(float(value), units, self.quantity, 5)}"
+
     @property
     def colours(self) -> str:
         """Name of the colours: blue to red over white in the middle for both signs."""
@@ -68,21 +74,22 @@ class Field:
 
 def field_of(mesh: Mesh, step: StepResult, name: str) -> Field:
     """Return a field of a step by its name, as `names` lists them; raises FastcontactError if there is no such field."""
+    everywhere = np.arange(mesh.n_points, dtype=np.int32)
     if name in DISPLACEMENTS:
-        kept = np.arange(mesh.n_points, dtype=np.int32)
         axis = AXES.index(name[-1]) if "." in name else None
         if axis is not None and axis >= mesh.dim:
             raise FastcontactError(unknown("field", name, names(mesh)))
         values = np.linalg.norm(step.displacement, axis=1) if axis is None else step.displacement[:, axis]
-        return Field(mesh, kept, values, "displacement" if axis is None else f"displacement along {name[-1]}", "length")
+        return Field(
+            mesh, everywhere, values, "displacement" if axis is None else f"displacement along {name[-1]}", "length"
+        )
     if name in SLIPS:
         slip = np.linalg.norm(contact_slip(mesh, step, name.removeprefix("contact_")), axis=1)
-        return Field(mesh, np.arange(mesh.n_points, dtype=np.int32), slip, SLIPS[name], "length")
+        return Field(mesh, everywhere, slip, SLIPS[name], "length")
     if name == "temperature" and step.temperature is not None:
-        return Field(mesh, np.arange(mesh.n_points, dtype=np.int32), step.temperature, name, "")
+        return Field(mesh, everywhere, step.temperature, name, "")
     if name in step.cell_fields:
-        kept, values = np.arange(mesh.n_points, dtype=np.int32), _of_cells(mesh, step.cell_fields[name])
-        return Field(mesh, kept, values, CELLS.get(name, name), "")
+        return Field(mesh, everywhere, _of_cells(mesh, step.cell_fields[name]), CELLS.get(name, name), "")
     apart, node, stress = separated(mesh, step)
     if name == "von_mises" and apart is mesh:
         return Field(mesh, node, step.von_mises, CAPTIONS[name], "pressure")

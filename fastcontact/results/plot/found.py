@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.contact.found_contacts import FoundContacts
 from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.errors import FastcontactError
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.topology import outer_facets
 from fastcontact.results.plot._axes import new_axes, settled, size_around
 from fastcontact.results.plot.patches import outlines

@@ -81,5 +81,17 @@ def across(eye: Array) -> Array:
     return np.stack([first, np.cross(eye, first), eye])
 
 
+def seen_along(direction: Array, aligned: float) -> tuple[Array, tuple[str, str] | None]:
+    """Return axes (2, 3) across a unit vector (3,): two of the coordinates, and their names, where it is nearly the third.
+
+    It is where its component there is `aligned` at least.
+    """
+    along = int(np.argmax(np.abs(direction)))
+    if abs(direction[along]) < aligned:
+        return across(direction)[:2], None
+    first, second = [axis for axis in range(3) if axis != along]
+    return np.eye(3)[[first, second]], ("xyz"[first], "xyz"[second])
+
+
 def _cross(a: Array, b: Array) -> Array:
     return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.analytic.pressure_curve import NAMES
 from fastcontact.arrays import Array
 from fastcontact.errors import FastcontactError
-from fastcontact.mesh.argument_types import typed
 from fastcontact.results.plot._axes import UNKNOWN, Panels, Units, contacts_of, new_axes, new_panels
 from fastcontact.results.step import StepResult
 from fastcontact.results.units import labelled, units_of_results

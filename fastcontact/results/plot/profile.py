@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.analytic.pressure_curve import PressureCurve, pressure_curve
 from fastcontact.arrays import Array
 from fastcontact.errors import FastcontactError
-from fastcontact.mesh.argument_types import typed
 from fastcontact.results.plot._axes import UNKNOWN, Units, new_axes
 from fastcontact.results.step import ContactResult, half_width
 from fastcontact.results.units import labelled, valued

@@ -7,28 +7,28 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array
 from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh import elements
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.plot._axes import (
     UNKNOWN,
     Units,
     bar_beside,
     legend_below,
+    mark,
     new_axes,
     part_shown,
     placed,
     size_around,
 )
 from fastcontact.results.plot.fields import Field, field_of
-from fastcontact.results.plot.hiding import across
-from fastcontact.results.plot.shape import scaled
+from fastcontact.results.plot.hiding import seen_along
+from fastcontact.results.plot.shape import framed, scaled
 from fastcontact.results.plot.solid import MOST_EDGES
 from fastcontact.results.step import StepResult
-from fastcontact.results.units import labelled, valued
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -91,7 +91,7 @@ def section(
     at, direction = _plane(mesh, point, normal)
     shown, units = field_of(mesh, step, field), units or step.units
     triangles, lines = _touching(shown, step, at, direction)
-    basis, labels = _plane_axes(direction)
+    basis, labels = seen_along(direction, 1.0 - 1e-12)
     corners = scaled(triangles[..., :3], scale, triangles[..., 3:6])
     flat, values = corners @ basis.T - (0.0 if labels else at @ basis.T), triangles[..., 6]
     best = np.unravel_index(int(np.argmax(np.abs(values))), values.shape)
@@ -108,9 +108,9 @@ def section(
         axes.set(xlim=points[:, 0], ylim=points[:, 1])
     plane = f"section through {placed(at, float(np.ptp(mesh.points, axis=0).max()))}, normal {placed(direction, 1.0)}"
     state = f"load factor {step.load_factor:g}, displacements x {scale:g}"
-    axes.set_title(title or f"{plane}\n{state}", fontsize="medium")
-    _frame(axes, drawn, shown, units, labels or ("along the section", "across it"), points if ax is None else None)
-    return axes
+    below, bar = (legend_below(points), bar_beside(points)) if ax is None else (-0.14, 0.8)
+    labels = labels or ("along the section", "across it")
+    return framed(axes, drawn, shown, title or f"{plane}\n{state}", units, below, bar, labels)
 
 
 def _plane(mesh: Mesh, point: Sequence[float], normal: Sequence[float]) -> tuple[Array, Array]:
@@ -124,26 +124,6 @@ def _plane(mesh: Mesh, point: Sequence[float], normal: Sequence[float]) -> tuple
             f"a section takes a point and a normal of 3 numbers, not {list(point)} and {list(normal)}"
         )
     return at, direction / np.linalg.norm(direction)
-
-
-def _frame(
-    axes: Any, drawn: Any, shown: Field, units: Units, labels: tuple[str, str], points: Array | None
-) -> None:  # fmt: skip
-    """Give axes their colour bar, labels and legend; in a figure of their own, which `points` (n, 2) fills, by its size."""
-    bar, below = (0.8, -0.14) if points is None else (bar_beside(points), legend_below(points))
-    axes.figure.colorbar(drawn, ax=axes, label=labelled(shown.caption, units, shown.quantity), shrink=bar)
-    axes.set_aspect("equal")
-    axes.set(xlabel=labelled(labels[0], units, "length"), ylabel=labelled(labels[1], units, "length"))
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, below))
-
-
-def _plane_axes(direction: Array) -> tuple[Array, tuple[str, str] | None]:
-    """Return axes (2, 3) of the section, and their names where they are those of the coordinates."""
-    along = int(np.argmax(np.abs(direction)))
-    if abs(direction[along]) < 1.0 - 1e-12:
-        return across(direction)[:2], None
-    first, second = [axis for axis in range(3) if axis != along]
-    return np.eye(3)[[first, second]], ("xyz"[first], "xyz"[second])
 
 
 def _touching(shown: Field, step: StepResult, at: Array, direction: Array) -> tuple[Array, Array]:
@@ -238,8 +218,4 @@ def _stroke(axes: Any, strokes: Array) -> None:
 def _mark(axes: Any, at: Array, value: float, before: Array, points: Array, units: Units, shown: Field) -> None:
     """Mark the largest value of the section, at (2,) in the picture, at `before` (3,) on the undeformed bodies."""
     size = float(np.ptp(points, axis=0).max())
-    kind = "maximum" if value >= 0.0 else "minimum"
-    label = (
-        f"{kind} on the section {valued(float(value), units, shown.quantity, 5)}\nundeformed at {placed(before, size)}"
-    )
-    axes.plot([at[0]], [at[1]], "o", mfc="none", mec="red", ms=9, mew=1.5, label=label, zorder=10)
+    mark(axes, at, f"{shown.told(value, units, ' on the section')}\nundeformed at {placed(before, size)}")

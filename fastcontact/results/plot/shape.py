@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array
 from fastcontact.errors import FastcontactError
-from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.plot._axes import (
     UNKNOWN,
     Units,
     bar_beside,
     legend_below,
+    mark,
     new_axes,
     part_shown,
     placed,
@@ -25,7 +27,7 @@ from fastcontact.results.plot.fields import Field, field_of
 from fastcontact.results.plot.patches import fill, outlines
 from fastcontact.results.plot.solid import MOST_EDGES, draw_solid, is_seen, view_of_extreme
 from fastcontact.results.step import StepResult
-from fastcontact.results.units import labelled, valued
+from fastcontact.results.units import labelled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -110,8 +112,8 @@ def deformed_shape(
         view = view or view_of_extreme(shown, points)
         drawn = draw_solid(axes, shown, points, edges, view, limits or shown.range)
         _mark(axes, shown, points, mesh, units, hidden=not is_seen(shown, points, view))
-        framed = _framed(axes, drawn, shown, heading, units, 0.02)
-        return framed if ax is not None else settled(framed)
+        framed(axes, drawn, shown, heading, units, 0.02, 0.6, "xyz")
+        return axes if ax is not None else settled(axes)
     extent = np.concatenate([points, points * [-1.0, 1.0]]) if mirrored else points
     extent = extent if zoom is None else np.array(part_shown(points[shown.extreme], zoom, extent))
     axes = new_axes(ax, size_around(extent))
@@ -120,22 +122,23 @@ def deformed_shape(
     if zoom is not None:
         axes.set(xlim=extent[:, 0], ylim=extent[:, 1])
     _mark(axes, shown, points, mesh, units)
-    return _framed(
-        axes, drawn, shown, heading, units, -0.09 if ax is not None else legend_below(extent), bar_beside(extent)
-    )
+    below = -0.09 if ax is not None else legend_below(extent)
+    return framed(axes, drawn, shown, heading, units, below, bar_beside(extent), "xy")
 
 
-def _framed(axes: Any, drawn: Any, shown: Field, heading: str, units: Units, below: float, bar: float = 0.8) -> Any:
-    """Give axes their colour bar, title, labels, and a legend that begins at a height [-]; return them.
+def framed(
+    axes: Any, drawn: Any, shown: Field, heading: str, units: Units, below: float, bar: float, labels: Sequence[str]
+) -> Any:
+    """Give axes their colour bar, title, a label for each direction, and a legend that begins at a height [-]; return them.
 
     The colour bar is as long as a part `bar` of the room [-].
     """
-    caption, dim = labelled(shown.caption, units, shown.quantity), shown.mesh.dim
-    axes.figure.colorbar(drawn, ax=axes, label=caption, shrink=0.6 if dim == 3 else bar)
-    if dim == 2:
+    caption, flat = labelled(shown.caption, units, shown.quantity), len(labels) == 2
+    axes.figure.colorbar(drawn, ax=axes, label=caption, shrink=bar)
+    if flat:
         axes.set_aspect("equal")
-    axes.set_title(heading, fontsize="medium", pad=18 if dim == 3 else None)
-    axes.set(**{f"{axis}label": labelled(axis, units, "length") for axis in "xyz"[:dim]})
+    axes.set_title(heading, fontsize="medium", pad=None if flat else 18)
+    axes.set(**{f"{axis}label": labelled(label, units, "length") for axis, label in zip("xyz", labels)})
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, below))
     return axes
 
@@ -144,13 +147,9 @@ def _mark(axes: Any, shown: Field, points: Array, mesh: Mesh, units: Units, hidd
     """Mark the extreme value: where it stands in the picture, and in another line where it was before the load."""
     before = mesh.points[shown.node[shown.extreme]]
     at, size = points[shown.extreme], float(np.ptp(points, axis=0).max())
-    value = shown.values[shown.extreme]
     here, there = placed(at, size), placed(before, size)
-    label = f"{'maximum' if value >= 0.0 else 'minimum'} {valued(value, units, shown.quantity, 5)} at {here}"
-    label += ", hidden" if hidden else ""
-    label += f"\nundeformed at {there}" if here != there else ""
-    style = {"mfc": "none", "mec": "red", "ms": 9, "mew": 1.5, "zorder": 10}
-    axes.plot(*([x] for x in at), "o", label=label, **style)
+    label = f"{shown.told(shown.values[shown.extreme], units)} at {here}{', hidden' * hidden}"
+    mark(axes, at, label + (f"\nundeformed at {there}" if here != there else ""))
 
 
 def _draw(

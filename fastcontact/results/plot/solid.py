@@ -113,13 +113,13 @@ def towards(view: tuple[float, float]) -> Array:
 def _facing(shown: Field, points: Array, eye: Array) -> list[tuple[str, Array, Array, Indices]]:
     """Return of each kind of facet, for those that face the eye: name, corners, values of the field, flat triangles."""
     cut = len(shown.node) != shown.node.max(initial=-1) + 1
-    found = []
+    facing = []
     for name, facets in (_without_cuts(shown.mesh, shown.node) if cut else outer_facets(shown.mesh)).items():
         flat = flat_triangles(facets.shape[1])
         a, b, c = np.moveaxis(points[facets][:, flat], -2, 0)
         kept = facets[np.cross(b - a, c - a).sum(axis=1) @ eye > 0]
-        found.append((name, points[kept], shown.values[kept], flat))
-    return found
+        facing.append((name, points[kept], shown.values[kept], flat))
+    return facing
 
 
 def _seen(triangles: Array, values: Array, screen: Screen) -> tuple[Array, Array]:

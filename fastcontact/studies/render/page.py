@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import base64
 import html
-import io
 from collections.abc import Sequence
 from typing import Any
 
+from fastcontact._tools.html_table import html_table
 from fastcontact.cases.summary import versions
+from fastcontact.results.plot._axes import png
 
 STYLE = """
 body { font-family: system-ui, sans-serif; line-height: 1.45; color: #1b1b1b; background: #fff;
@@ -48,7 +49,7 @@ def section(heading: str) -> str:
 
 def paragraph(text: str) -> str:
     """Return a text as a paragraph."""
-    return f"<p class='say'>{_text(text)}</p>"
+    return f"<p class='say'>{_signs(html.escape(text))}</p>"
 
 
 def failure(text: str) -> str:
@@ -58,23 +59,14 @@ def failure(text: str) -> str:
 
 def table(rows: Sequence[Sequence[str]], caption: str = "") -> str:
     """Return rows of texts as a table, the first row a header."""
-
-    def row(cells: Sequence[str], tag: str) -> str:
-        inside = "".join(f"<{tag}>{_text(cell)}</{tag}>" for cell in cells)
-        return f"<tr>{inside}</tr>"
-
-    body = "".join(row(cells, "td") for cells in rows[1:])
-    above = f"<caption>{_text(caption)}</caption>" if caption else ""
-    return f"<div class='wide'><table>{above}<thead>{row(rows[0], 'th')}</thead><tbody>{body}</tbody></table></div>"
+    return f"<div class='wide'>{_signs(html_table(rows[1:], rows[0], caption, style=''))}</div>"
 
 
 def image(figure: Any, description: str) -> str:
     """Return a matplotlib figure as an image element that holds the picture."""
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png")
-    data = base64.b64encode(buffer.getvalue()).decode("ascii")
+    data = base64.b64encode(png(figure)).decode("ascii")
     return f"<p><img alt='{html.escape(description, quote=True)}' src='data:image/png;base64,{data}'></p>"
 
 
-def _text(text: str) -> str:
-    return html.escape(text).replace("+-", "&plusmn;")
+def _signs(text: str) -> str:
+    return text.replace("+-", "&plusmn;")

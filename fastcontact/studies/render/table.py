@@ -1,14 +1,9 @@
-"""Tables: rows of texts aligned for a terminal, columns of numbers for CSV, numbers written as text."""
+"""Tables: rows of texts aligned for a terminal, numbers written as text."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
-
-import numpy as np
-
-from fastcontact.arrays import AnyArray
+from collections.abc import Sequence
 
 Rows = list[list[str]]
 
@@ -37,18 +32,3 @@ def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
     """Return rows of texts as lines, columns right-aligned, the first row a header."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return ["  " + "  ".join(text.rjust(width) for text, width in zip(row, widths, strict=True)) for row in rows]
-
-
-def structured(columns: Mapping[str, Sequence[Any]]) -> AnyArray:
-    """Return columns of equal length (n_rows,) as a structured array (n_rows,) with a field each, in their units."""
-    arrays = {name: np.array(values) for name, values in columns.items()}
-    length = len(next(iter(arrays.values())))
-    result = np.empty(length, dtype=[(name, column.dtype) for name, column in arrays.items()])
-    for name, column in arrays.items():
-        result[name] = column
-    return result
-
-
-def finite(value: Any) -> Any:
-    """Return a number that JSON can hold: None for NaN and infinity."""
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -95,10 +95,10 @@ import os, sys, time
 from fastcontact.studies.execute import started_pool
 
 if __name__ == "__main__":
-    pool = started_pool(2)
-    print(*{pool.submit(os.getpid).result() for _ in range(20)}, flush=True)
-    running = [pool.submit(time.sleep, 600) for _ in range(2)]
-    time.sleep(600)
+    with started_pool(2) as pool:
+        print(*{pool.submit(os.getpid).result() for _ in range(20)}, flush=True)
+        running = [pool.submit(time.sleep, 600) for _ in range(2)]
+        time.sleep(600)
 """
 
 

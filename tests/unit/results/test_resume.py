@@ -18,7 +18,7 @@ from test_result_files import MESH, assert_same, nth_step, step_result
 
 import fastcontact as fc
 from fastcontact import ConvergenceError, FileError, ModelError, ResultWriter, open_results
-from fastcontact.mesh.files.packing import packed, unpacked
+from fastcontact._tools.packing import packed, unpacked
 from fastcontact.results import committed_file, write_arrays
 
 

@@ -13,8 +13,8 @@ from models import elastic_model
 
 import fastcontact as fc
 from fastcontact._jit import compiling
+from fastcontact._tools.html_table import html_table
 from fastcontact.analysis.progress import Progress, StatusLine
-from fastcontact.mesh.html_table import html_table
 from fastcontact.results.steps import HEAD, SHOWN, Steps
 
 # Longest repr of anything [characters]: a screen.

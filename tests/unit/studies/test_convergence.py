@@ -9,7 +9,7 @@ import fastcontact as fc
 from fastcontact.cases.case import read_case
 from fastcontact.cli import main
 from fastcontact.errors import CaseError, ContactError
-from fastcontact.studies import convergence, levels
+from fastcontact.studies import convergence, execute, levels
 from fastcontact.studies.settings import combinations, settings
 
 FORCE, PRESSURE = 600_000.0, 2900.0  # of theory
@@ -110,10 +110,11 @@ def test_what_failed_is_told_and_the_rest_shown(case):
     assert study.table()["element"].tolist() == ["quad8"] * 4 + ["quad4"]
 
 
-def test_where_nothing_could_be_solved_the_first_error_is_raised(case):
+def test_where_nothing_could_be_solved_the_first_error_is_raised(case, monkeypatch):
     broken = {"error": "side 'CONT1' is empty", "kind": "ContactError", "seconds": 1.0}
+    monkeypatch.setattr(execute, "run_all", lambda jobs, **_: [broken] * len(jobs))
     with pytest.raises(ContactError, match=r"no level could be solved; .* side 'CONT1' is empty"):
-        gathered(case, [[broken, broken]])
+        convergence.convergence_study(case, 2, ["quad8"], ["continuous"])
 
 
 def test_a_quantity_that_nothing_gives_is_named(case):

@@ -13,11 +13,18 @@ import numpy as np
 SHOWN = 9
 
 
-def html_table(rows: Iterable[Sequence[object]], head: Sequence[object] = (), caption: str = "") -> str:
-    """Return rows as an HTML table; what they hold is text, whatever characters are in it."""
-    above = f"<caption style='text-align:left'>{html.escape(caption)}</caption>" if caption else ""
-    top = f"<thead>{_row(head, 'th')}</thead>" if head else ""
-    body = "".join(_row(cells, "td") for cells in rows)
+def html_table(
+    rows: Iterable[Sequence[object]], head: Sequence[object] = (), caption: str = "", style: str = "text-align:left"
+) -> str:
+    """Return rows as an HTML table; what they hold is text, whatever characters are in it. `style` is that of all cells."""
+    style = f" style='{style}'" if style else ""
+
+    def row(cells: Sequence[object], tag: str) -> str:
+        return f"<tr>{''.join(f'<{tag}{style}>{html.escape(str(cell))}</{tag}>' for cell in cells)}</tr>"
+
+    above = f"<caption{style}>{html.escape(caption)}</caption>" if caption else ""
+    top = f"<thead>{row(head, 'th')}</thead>" if head else ""
+    body = "".join(row(cells, "td") for cells in rows)
     return f"<table>{above}{top}<tbody>{body}</tbody></table>"
 
 
@@ -36,8 +43,3 @@ def _text(value: Any) -> str:
     if numbers.size > SHOWN:
         return f"{numbers.size} numbers, {numbers.min():.6g} to {numbers.max():.6g}"
     return ", ".join(f"{number:.6g}" for number in numbers.ravel())
-
-
-def _row(cells: Sequence[object], tag: str) -> str:
-    inside = "".join(f"<{tag} style='text-align:left'>{html.escape(str(cell))}</{tag}>" for cell in cells)
-    return f"<tr>{inside}</tr>"

@@ -18,7 +18,7 @@ from collections import abc
 from collections.abc import Callable
 from numbers import Real
 from reprlib import Repr
-from typing import Any, TypeVar, Union
+from typing import Any, NamedTuple, TypeVar, Union
 
 import numpy as np
 import numpy.typing
@@ -30,6 +30,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 _ARRAY_LIKE = {*typing.get_args(np.typing.ArrayLike)}
 _SHORT = Repr()
 _SHORT.maxstring = _SHORT.maxother = 60
+_REAL = {bool: "True or False", int: "a whole number", float: "a number"}
 
 
 def typed(error: type[FastcontactError]) -> Callable[[F], F]:
@@ -161,43 +162,92 @@ def values_at(function: Callable[..., Any], points: Any, name: str, error: type[
     return returned
 
 
+class Kind(NamedTuple):
+    """An annotated type: the test of a value, which does not use it up, and its name in messages."""
+
+    fits: Callable[[Any], bool]
+    words: str
+
+
 def fits(value: Any, annotation: Any) -> bool:
     """Return whether a value is of the annotated type, as far as that can be seen without using it up."""
-    origin, members = typing.get_origin(annotation), typing.get_args(annotation)
-    if annotation in (Any, inspect.Parameter.empty, object) or isinstance(annotation, TypeVar):
-        return True
-    if _is_array_like(annotation):
-        return _makes_an_array(value)
-    if origin in (Union, types.UnionType):
-        if {*members} >= _ARRAY_LIKE:  # a union of its own, to which others were added
-            return _makes_an_array(value) or any(fits(value, member) for member in {*members} - _ARRAY_LIKE)
-        return any(fits(value, member) for member in members)
-    if annotation is None or annotation is type(None):
-        return value is None
-    if annotation in (bool, int, float):
-        return _is_real(value, annotation)
-    if origin is typing.Literal:
-        return isinstance(value, str) if all(isinstance(m, str) for m in members) else value in members
-    kind = origin or annotation
-    if kind is os.PathLike:
-        return isinstance(value, os.PathLike) and isinstance(os.fspath(value), str)
-    if kind is tuple:
-        return _fits_tuple(value, members)
-    if kind in (abc.Sequence, abc.Iterable, abc.Collection, list):
-        return _is_series(value) and _members_fit(value, members[:1])
+    return kind_of(annotation).fits(value)
+
+
+def words(annotation: Any) -> str:
+    """Return an annotated type in words: "a number or a function"."""
+    return kind_of(annotation).words
+
+
+def kind_of(annotation: Any) -> Kind:
+    """Return the test of an annotated type, and its name."""
+    kind, members = typing.get_origin(annotation) or annotation, typing.get_args(annotation)
+    if annotation == np.typing.ArrayLike or kind is np.ndarray:
+        return Kind(_makes_an_array, "an array of numbers")
+    if kind in (Union, types.UnionType):
+        return _union(members)
+    if annotation in (None, type(None)):
+        return Kind(lambda value: value is None, "None")
+    if annotation in _REAL:
+        return Kind(lambda value: _is_real(value, annotation), _REAL[annotation])
+    if kind in (tuple, list, abc.Sequence, abc.Iterable, abc.Collection):
+        return _series(kind, members)
     if kind in (abc.Mapping, dict):
-        return isinstance(value, abc.Mapping) and (not members or all(_item_fits(i, members) for i in value.items()))
+        return _mapping(members)
+    known = {str: "string", os.PathLike: "path", abc.Callable: "function"}
+    name = str(known.get(kind) or getattr(kind, "__name__", kind))
+    return Kind(_test(annotation, kind, members), f"{'an' if name[0] in 'AEIOU' else 'a'} {name}")
+
+
+def _test(annotation: Any, kind: Any, members: tuple[Any, ...]) -> Callable[[Any], bool]:
+    """Return the test of a type that holds no others."""
+    if kind is typing.Literal:
+        texts = all(isinstance(member, str) for member in members)
+        return lambda value: isinstance(value, str) if texts else value in members
+    if kind is os.PathLike:
+        return lambda value: isinstance(value, os.PathLike) and isinstance(os.fspath(value), str)
     if kind is abc.Callable:
-        return callable(value)
+        return callable
     if getattr(kind, "_is_protocol", False):
-        return all(hasattr(value, name) for name in _asked(kind)) and not isinstance(value, type)
-    return isinstance(value, kind) if isinstance(kind, type) else True
+        asked = [name for name in (*vars(kind), *inspect.get_annotations(kind)) if not name.startswith("_")]
+        return lambda value: all(hasattr(value, name) for name in asked) and not isinstance(value, type)
+    if annotation in (Any, inspect.Parameter.empty) or not isinstance(kind, type):
+        return lambda value: True
+    return lambda value: isinstance(value, kind)
 
 
-def _asked(protocol: type) -> list[str]:
-    """Return the attributes that a protocol asks for."""
-    names = [*vars(protocol), *inspect.get_annotations(protocol)]
-    return [name for name in names if not name.startswith("_")]
+def _union(members: tuple[Any, ...]) -> Kind:
+    if {*members} >= _ARRAY_LIKE:  # a union of its own, to which others were added
+        members = (np.typing.ArrayLike, *(member for member in members if member not in _ARRAY_LIKE))
+    kinds = [kind_of(member) for member in members]
+    phrases = sorted(dict.fromkeys(kind.words for kind in kinds), key="None".__eq__)
+    return Kind(lambda value: any(kind.fits(value) for kind in kinds), " or ".join(phrases))
+
+
+def _series(kind: Any, members: tuple[Any, ...]) -> Kind:
+    """Return the test of a series; its members are not looked at in an iterator, nor but for the first in an array."""
+    kinds = [kind_of(member) for member in members if member is not ...]
+    if kind is tuple and members and members[-1] is not ...:
+        count = {2: "two", 3: "three"}.get(len(members), str(len(members)))
+        phrase = f"{count} numbers" if {*members} <= {int, float} else f"a sequence of {count}"
+        return Kind(lambda value: _is_series(value) and hasattr(value, "__len__") and len(value) == len(kinds)
+                    and all(member_kind.fits(member) for member_kind, member in zip(kinds, value)), phrase)  # fmt: skip
+
+    def fits(value: Any) -> bool:
+        if not kinds or not isinstance(value, list | tuple | set | frozenset | np.ndarray):
+            return _is_series(value)
+        return _is_series(value) and all(map(kinds[0].fits, value[:1] if isinstance(value, np.ndarray) else value))
+
+    return Kind(fits, "a sequence" + (f" of {_plural(kinds[0].words)}" if kinds else ""))
+
+
+def _mapping(members: tuple[Any, ...]) -> Kind:
+    if not members:
+        return Kind(lambda value: isinstance(value, abc.Mapping), "a dictionary")
+    keys, values = map(kind_of, members)
+    of = f" of {_plural(values.words)}" if members[1] is not Any else ""
+    return Kind(lambda value: isinstance(value, abc.Mapping) and all(map(keys.fits, value))
+                and all(map(values.fits, value.values())), f"a dictionary{of} by name")  # fmt: skip
 
 
 def _is_real(value: Any, kind: type) -> bool:
@@ -210,10 +260,6 @@ def _is_real(value: Any, kind: type) -> bool:
         return isinstance(value, Real) and not truth and (math.isfinite(value) or kind is float)
     except OverflowError:  # a whole number of hundreds of digits
         return False
-
-
-def _is_array_like(annotation: Any) -> bool:
-    return annotation == np.typing.ArrayLike or typing.get_origin(annotation) is np.ndarray or annotation is np.ndarray
 
 
 def _makes_an_array(value: Any) -> bool:
@@ -231,55 +277,6 @@ def _is_series(value: Any) -> bool:
     if isinstance(value, np.ndarray):
         return value.ndim > 0
     return isinstance(value, abc.Iterable) and not isinstance(value, str | bytes | abc.Mapping)
-
-
-def _members_fit(value: Any, members: tuple[Any, ...]) -> bool:
-    """Return whether the members of a series fit; an iterator is not looked into, nor a long array."""
-    if not members or not isinstance(value, list | tuple | set | frozenset | np.ndarray):
-        return True
-    return all(fits(member, members[0]) for member in (value[:1] if isinstance(value, np.ndarray) else value))
-
-
-def _fits_tuple(value: Any, members: tuple[Any, ...]) -> bool:
-    if not _is_series(value):
-        return False
-    if members[1:] == (...,) or not members:
-        return _members_fit(value, members[:1])
-    return hasattr(value, "__len__") and len(value) == len(members) and all(map(fits, value, members))
-
-
-def _item_fits(item: tuple[Any, Any], members: tuple[Any, ...]) -> bool:
-    return fits(item[0], members[0]) and fits(item[1], members[1])
-
-
-def words(annotation: Any) -> str:
-    """Return an annotated type in words: "a number or a function"."""
-    origin, members = typing.get_origin(annotation), typing.get_args(annotation)
-    if _is_array_like(annotation):
-        return "an array of numbers"
-    if origin in (Union, types.UnionType):
-        if {*members} >= _ARRAY_LIKE:
-            members = (np.typing.ArrayLike, *({*members} - _ARRAY_LIKE))
-        parts = list(dict.fromkeys(words(member) for member in members if member is not type(None)))
-        return " or ".join([*parts, *["None"] * (type(None) in members)])
-    simple = {bool: "True or False", int: "a whole number", float: "a number", str: "a string", None: "None"}
-    if annotation in simple:
-        return simple[annotation]
-    kind = origin or annotation
-    if kind is os.PathLike:
-        return "a path"
-    if kind is tuple and members and members[-1] is not ...:
-        count = {2: "two", 3: "three"}.get(len(members), str(len(members)))
-        return f"{count} numbers" if {*members} <= {int, float} else f"a sequence of {count}"
-    if kind in (abc.Sequence, abc.Iterable, abc.Collection, list, tuple):
-        return "a sequence" + (f" of {_plural(words(members[0]))}" if members else "")
-    if kind in (abc.Mapping, dict):
-        of = f" of {_plural(words(members[1]))}" if members and members[1] is not Any else ""
-        return f"a dictionary{of}" + (" by name" if members else "")
-    if kind is abc.Callable:
-        return "a function"
-    name = str(getattr(kind, "__name__", kind))
-    return f"{'an' if name[0] in 'AEIOU' else 'a'} {name}"
 
 
 def _plural(phrase: str) -> str:

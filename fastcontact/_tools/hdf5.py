@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.paths import PathLike, existing_file
 from fastcontact.arrays import AnyArray
 from fastcontact.errors import FastcontactError, FileError
-from fastcontact.mesh.files.paths import PathLike, existing_file
 
 # What a data set may take in memory: this much [bytes], or this many times the size of its file if that is more.
 # Zeros compress a thousandfold, but no whole file does that holds a mesh or results.
