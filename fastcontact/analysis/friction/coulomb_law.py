@@ -1,7 +1,7 @@
 """Unilateral contact and Coulomb's law as a complementarity function, scaled by the stiffness of each constraint.
 
 Another law begins here. Its tangential force is also used where a sliding constraint is linearised: `dense._step`,
-`eliminated.Eliminated`, and in the fallbacks `sweep_kernels` and `dense._on_edges`. Its parameters come from
+`eliminated.Eliminated`, and in the fallback `dense._on_edges`. Its parameters come from
 `PairOptions` by way of `Constraints`; those that are forces are scaled where `Law` is made, as forces are. That a constraint
 without friction needs no tangents is assumed by `Law.state` and by the formulations.
 """

@@ -1,4 +1,4 @@
-"""Kernels of the friction solver against plain NumPy: block Gauss-Seidel sweeps and Lemke's pivots."""
+"""Kernels of the friction solver against plain NumPy: products of rows and Lemke's pivots."""
 
 import itertools
 
@@ -6,38 +6,8 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from fastcontact.analysis.friction import lemke_kernels, sweep_kernels
+from fastcontact.analysis.friction import lemke_kernels
 from fastcontact.analysis.friction.slip_directions import compliance_of_rows
-
-
-def swept_once(F, free, mu, y):
-    """One sweep, constraint by constraint, in plain NumPy."""
-    y, (parts, m) = y.copy(), free.shape
-    for i in range(m):
-
-        def gaps(y):
-            return free + (F @ y.ravel()).reshape(free.shape)
-
-        stiff = max(F[a * m + i, a * m + i] for a in range(1, parts))
-        y[0, i] = max(0.0, y[0, i] - gaps(y)[0, i] / F[i, i])
-        t = y[1:, i] - gaps(y)[1:, i] / stiff
-        limit, length = mu[i] * y[0, i], np.linalg.norm(t)
-        y[1:, i] = t * (limit / length if length > limit else 1.0)
-    return y
-
-
-@pytest.mark.parametrize("parts", [2, 3])
-def test_sweeps_against_numpy(parts):
-    rng = np.random.default_rng(parts)
-    m = 7
-    A = rng.normal(size=(parts * m, parts * m))
-    F, free, mu = A @ A.T + np.eye(parts * m), rng.normal(size=(parts, m)), rng.uniform(0.1, 1.0, m)
-    y, gaps, plain = np.zeros((parts, m)), np.empty((parts, m)), np.zeros((parts, m))
-    assert sweep_kernels.sweep(F, free, mu, y, gaps, 0.0, 3) == 3
-    for _ in range(3):
-        plain = swept_once(F, free, mu, plain)
-    np.testing.assert_allclose(y, plain, atol=1e-12 * np.abs(plain).max())
-    np.testing.assert_allclose(gaps, free + (F @ y.ravel()).reshape(free.shape), atol=1e-10)
 
 
 def test_pivots_against_all_bases():
