@@ -16,6 +16,7 @@ from fastcontact.cases.model_tables import LISTS, build_model, points
 from fastcontact.cases.shipped import case_path, shipped_cases
 from fastcontact.errors import CaseError, in_file, unknown
 from fastcontact.linear.choice import check_tolerance
+from fastcontact.linear.protocol import TOLERANCE
 from fastcontact.mesh import generate
 from fastcontact.mesh.files import toml_text
 from fastcontact.mesh.files.mesh_files import read_mesh
@@ -130,7 +131,7 @@ def _case_of_deck(path: Path) -> Case:
         ramp=deck.ramp,
         criteria=deck.criteria,
         linear_solver="auto",
-        linear_tolerance=1e-10,
+        linear_tolerance=TOLERANCE,
         probes={},
         units=known_units({}),
         folder=path.parent.resolve(),
@@ -198,7 +199,7 @@ def build_case(
             raise CaseError(f"the key '{key}' is missing")
     solve = data.get("solve", {})
     ramp = _ramp(data.get("ramp", {}))
-    tolerance = float(solve.get("linear_tolerance", 1e-10))
+    tolerance = float(solve.get("linear_tolerance", TOLERANCE))
     check_tolerance(tolerance)
     criteria = Criteria(**{key: value for key, value in solve.items() if not key.startswith("linear_")})
     mesh = _mesh(Path(folder), data["mesh"]) if mesh is None else mesh

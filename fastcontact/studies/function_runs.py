@@ -18,6 +18,7 @@ from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.run import solve
 from fastcontact.cases.case import Case
 from fastcontact.errors import CaseError, FastcontactError, unknown
+from fastcontact.linear.protocol import TOLERANCE
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import linear_ramp
 from fastcontact.results.step import StepResult
@@ -83,7 +84,7 @@ def _solved(made: Any, name: str) -> tuple[Case | None, Sequence[StepResult]]:
     if isinstance(made, Model):
         case = Case(
             name=name, title=name, text="", mesh=made.mesh, model=made, ramp=linear_ramp(), criteria=Criteria(),
-            linear_solver="auto", linear_tolerance=1e-10, probes={}, units=known_units(made.units),
+            linear_solver="auto", linear_tolerance=TOLERANCE, probes={}, units=known_units(made.units),
         )  # fmt: skip
         return case, solve(made, case.ramp)
     if isinstance(made, StepResult):

@@ -50,5 +50,5 @@ class Law:
     def slide(self, y: Array, gaps: Array, sliding: Indices) -> tuple[Array, Array]:
         """Return the directions (k, q) in which constraints `sliding` (q,) slide, and how much of a turn t follows (q,)."""
         _, t, reach, radius = self.trial(y, gaps)
-        along = np.maximum(reach[sliding], 1e-300)
+        along = np.maximum(reach[sliding], np.finfo(float).tiny)
         return t[:, sliding] / along, np.minimum(radius[sliding] / along, 1.0)

@@ -17,7 +17,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fastcontact.analysis.friction import lemke_kernels
+from fastcontact.analysis.friction import lemke
 from fastcontact.analysis.friction.cone_newton import Forces, newton
 from fastcontact.analysis.friction.coulomb_law import Law
 from fastcontact.arrays import Array, Mask
@@ -183,7 +183,5 @@ def _on_edges(problem: _Problem, edges: int) -> Array | None:
     M[m:last, last:] = np.tile(np.eye(m), edges).T
     q = SHIFT * (0.5 + np.arange(size) * 0.6180339887498949 % 1.0)  # no two alike
     q[:last] += X.T @ problem.free.ravel()
-    z = np.empty(size)
-    if lemke_kernels.pivot(M, q, z, 5 * size) < 0:
-        return None
-    return (X @ z[:last]).reshape(1 + k, m)
+    z, _ = lemke.solved(M, q, 5 * size)
+    return None if z is None else (X @ z[:last]).reshape(1 + k, m)

@@ -15,7 +15,14 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, min_weight_full_bipartite_matching
 
 from fastcontact.arrays import Indices, Mask
-from fastcontact.linear.elimination.coupled_pivots import CoupledError, CoupledPivots, RepeatedError, block_inverse
+from fastcontact.linear.elimination.coupled_pivots import (
+    CoupledError,
+    CoupledPivots,
+    Inverse,
+    RepeatedError,
+    SparseInverse,
+    block_inverse,
+)
 
 # An unknown is taken as pivot where its entry is at least this part of the largest one of the equation.
 SMALLEST = 0.25
@@ -27,7 +34,7 @@ DENSE_UP_TO = 400
 MOST_LAYERS = 4
 
 
-def chosen(B: csr_array, nodes: Indices | None = None, size: int = 1) -> tuple[Indices, csr_array | CoupledPivots]:
+def chosen(B: csr_array, nodes: Indices | None = None, size: int = 1) -> tuple[Indices, Inverse]:
     """Return the pivot of every equation and the inverse of their columns, ``B[:, pivots]^-1``.
 
     Parameters
@@ -42,7 +49,7 @@ def chosen(B: csr_array, nodes: Indices | None = None, size: int = 1) -> tuple[I
     Returns
     -------
     pivots : ndarray of int (m,)
-    inverse : csr_array (m, m) or CoupledPivots
+    inverse : SparseInverse or CoupledPivots
 
     Raises
     ------
@@ -50,24 +57,25 @@ def chosen(B: csr_array, nodes: Indices | None = None, size: int = 1) -> tuple[I
         If constraints are linearly dependent.
     """
     if not B.shape[0]:
-        return np.empty(0, np.intp), csr_array((0, 0))
+        return np.empty(0, np.intp), SparseInverse(csr_array((0, 0)))
     return (pivots := _chosen(B, nodes, size)), inverse_of(B, pivots, size)
 
 
 def _chosen(B: csr_array, nodes: Indices | None, size: int) -> Indices:
     """Return the pivot of every equation (m,), see `chosen`."""
     alone = np.arange(B.shape[0])
+    by_node = [] if nodes is None else [nodes]
     for layers in (1, MOST_LAYERS):
-        for groups in (alone, nodes):
-            if groups is not None and (pivots := of_groups(B, groups, layers)) is not None:
+        for groups in (alone, *by_node):
+            if (pivots := of_groups(B, groups, layers)) is not None:
                 return pivots
-    if nodes is not None:
-        if (pivots := of_nodes(B, nodes, size)) is not None or (pivots := of_most_groups(B, nodes)) is not None:
+    for owners in by_node:
+        if (pivots := of_nodes(B, owners, size)) is not None or (pivots := of_most_groups(B, owners)) is not None:
             return pivots
     return assigned(B)
 
 
-def inverse_of(B: csr_array, pivots: Indices, size: int) -> csr_array | CoupledPivots:
+def inverse_of(B: csr_array, pivots: Indices, size: int) -> Inverse:
     """Return the inverse of the columns `pivots` (m,) of B, small blocks or factors; a node has `size` unknowns.
 
     Raises
@@ -87,10 +95,10 @@ def inverse_of(B: csr_array, pivots: Indices, size: int) -> csr_array | CoupledP
                 return inverse
             if largest > FULL_UP_TO:
                 raise
-    return block_inverse(P)
+    return SparseInverse(block_inverse(P))
 
 
-def _triangular_inverse(P: csr_array, largest: int, layers: int) -> csr_array | None:
+def _triangular_inverse(P: csr_array, largest: int, layers: int) -> SparseInverse | None:
     """Return the inverse of a matrix of blocks on its diagonal, at most so large, in so many layers; None for others."""
     label = connected_components(P, connection="strong")[1]
     if np.bincount(label).max(initial=0) > largest:
@@ -206,7 +214,7 @@ def _place_in_group(group: Indices) -> Indices:
     return position
 
 
-def _layered_inverse(inner: csr_array, beyond: csr_array, layers: int) -> csr_array | None:
+def _layered_inverse(inner: csr_array, beyond: csr_array, layers: int) -> SparseInverse | None:
     """Return the inverse of a matrix that couples every row to deeper layers only: a finite Neumann series.
 
     `inner` is the inverse of what couples no layers, `beyond` what does. None where there are more than so many `layers`.
@@ -215,7 +223,7 @@ def _layered_inverse(inner: csr_array, beyond: csr_array, layers: int) -> csr_ar
     for _ in range(layers):
         term = csr_array(-(inner @ beyond @ term))
         if not term.nnz:
-            return total
+            return SparseInverse(total)
         total = csr_array(total + term)
     return None
 
