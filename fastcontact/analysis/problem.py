@@ -36,7 +36,7 @@ from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 from fastcontact.elasticity.temperature import Temperature
 from fastcontact.errors import ContactError
 from fastcontact.linear import choice
-from fastcontact.linear.protocol import LinearSolver
+from fastcontact.linear.protocol import TOLERANCE, LinearSolver
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
 from fastcontact.model.model import Model
 from fastcontact.model.obstacle_rotation import angle_at
@@ -321,7 +321,7 @@ def prepare(
     criteria: Criteria,
     *,
     linear_solver: str = "auto",
-    linear_tolerance: float = 1e-10,
+    linear_tolerance: float = TOLERANCE,
     linear_precision: str | None = None,
 ) -> Problem:
     """Assemble a model that was checked before, and prepare the linear solver; see `run.solve` for the parameters."""

@@ -17,6 +17,7 @@ from fastcontact.analysis.result_warnings import result_warnings
 from fastcontact.analysis.stages import go_on, stage_of
 from fastcontact.errors import ModelError, warn
 from fastcontact.linear.choice import DIRECT_UP_TO, check_tolerance
+from fastcontact.linear.protocol import TOLERANCE
 from fastcontact.model.model import Model
 from fastcontact.model.model_warnings import model_warnings
 from fastcontact.model.ramp import Ramp, RampLike, ramp_of
@@ -30,7 +31,7 @@ def solve(
     ramp: RampLike | None = None,
     *,
     linear_solver: str = "auto",
-    linear_tolerance: float = 1e-10,
+    linear_tolerance: float = TOLERANCE,
     linear_precision: str | None = None,
     criteria: Criteria | None = None,
     on_step: Callable[[StepResult], None] | None = None,
@@ -123,7 +124,7 @@ def solve_steps(
     ramp: RampLike | None = None,
     *,
     linear_solver: str = "auto",
-    linear_tolerance: float = 1e-10,
+    linear_tolerance: float = TOLERANCE,
     linear_precision: str | None = None,
     criteria: Criteria | None = None,
     resume: Sequence[StepResult] = (),

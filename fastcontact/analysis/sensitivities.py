@@ -166,7 +166,9 @@ def _derivatives(contact: MovingContact, gradient: Gradient, changes: Sequence[C
         other = Adjoint(contact, gradient, csr_array(0.5 * (forward + backward) + kinks))
         off = np.abs([other.derivative(change) for change in changes] - values)
         if (off > BETWEEN * np.abs(values)).any():
-            raise ModelError(_between(contact, kinks, float((off / np.maximum(np.abs(values), 1e-300)).max())))
+            raise ModelError(
+                _between(contact, kinks, float((off / np.maximum(np.abs(values), np.finfo(float).tiny)).max()))
+            )
     return values, adjoint.solutions
 
 

@@ -16,6 +16,13 @@ from fastcontact.analysis.work import ContactForces, Work
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.cohesion import Bond
 
+# What a restart stores of each contact pair, and of numbers: key and attribute.
+OF_PAIRS = {
+    "closed": "never_opening", "now": "obstacles", "first_contact": "first_contact", "traction": "traction",
+    "angle": "angles", "slipped": "slipped", "worn": "worn",
+}  # fmt: skip
+NUMBERS = {"largest_force": "largest_force", "largest_work": "largest_rigid_force", "round_off": "gap_round_off"}
+
 
 @dataclass(frozen=True, eq=False)
 class State:
@@ -116,12 +123,7 @@ class State:
     def to_dict(self, n_dofs: int) -> dict[str, Any]:
         """Return the restart data, without the displacements of the `n_dofs` components of the mesh."""
         return {
-            "numbers": {
-                "largest_force": float(self.largest_force),
-                "largest_work": float(self.largest_rigid_force),
-                "round_off": float(self.gap_round_off),
-                "halved": self.halved,
-            },
+            "numbers": {**{key: float(getattr(self, name)) for key, name in NUMBERS.items()}, "halved": self.halved},
             "obstacles": self.u[n_dofs:].copy(),
             "touched": sorted(self.touched),
             "locked": dict(self.locked),
@@ -133,18 +135,8 @@ class State:
             "active": dict(self.active),
             "pressure": dict(self.pressure),
             "pairs": {
-                name: {
-                    "closed": _listed(self.never_opening.get(name)),
-                    "now": self.obstacles[name].copy() if name in self.obstacles else None,
-                    "first_contact": _listed(self.first_contact.get(name)),
-                    "traction": _listed(self.traction.get(name)),
-                    "angle": self.angles.get(name),
-                    "slipped": self.slipped.get(name),
-                    "worn": [self.worn[name].depth, self.worn[name].pressure, self.worn[name].pace]
-                    if name in self.worn
-                    else None,
-                }
-                for name in self.active
+                pair: {key: _listed(getattr(self, name).get(pair)) for key, name in OF_PAIRS.items()}
+                for pair in self.active
             },
             "extrapolation": self.extrapolation.to_dict(),
             "solver": self.solver,
@@ -164,26 +156,20 @@ class State:
         """
         u = np.concatenate([displacement.ravel(), kept["obstacles"]])
         pairs, numbers = kept["pairs"], kept["numbers"]
-        values = {
-            key: {name: own[key] for name, own in pairs.items() if own.get(key) is not None}
-            for key in ("closed", "now", "first_contact", "traction", "angle", "slipped", "worn")
+        of_pairs: dict[str, Any] = {
+            name: {pair: _from_list(key, own[key]) for pair, own in pairs.items() if own.get(key) is not None}
+            for key, name in OF_PAIRS.items()
         }
         return cls(
             u,
-            numbers["round_off"],
+            **{name: numbers[key] for key, name in NUMBERS.items()},
+            **of_pairs,
             history=dict(kept.get("history", {})),
             rise=kept.get("rise"),
             instant=kept.get("instant", 0.0),
             halved=int(numbers.get("halved", 0)),
             active=dict(kept["active"]),
             pressure=dict(kept["pressure"]),
-            obstacles={name: now.copy() for name, now in values["now"].items()},
-            angles=dict(values["angle"]),
-            worn={name: Worn(*parts) for name, parts in values["worn"].items()},
-            slipped=dict(values["slipped"]),
-            never_opening={name: (both[0], both[1]) for name, both in values["closed"].items()},
-            first_contact={name: (both[0], both[1]) for name, both in values["first_contact"].items()},
-            traction={name: (both[0], both[1]) for name, both in values["traction"].items()},
             locked=dict(kept.get("locked", {})),
             bonds={name: Bond(**own) for name, own in kept.get("bonds", {}).items()},
             work=Work(**kept["work"]) if kept.get("work") else None,
@@ -191,11 +177,19 @@ class State:
             extrapolation=Extrapolation.from_dict(kept["extrapolation"], u)
             if "extrapolation" in kept
             else Extrapolation(),
-            largest_force=numbers["largest_force"],
-            largest_rigid_force=numbers["largest_work"],
             touched=touched.union(kept.get("touched", ())),
         )
 
 
-def _listed(both: tuple[Array, Any] | None) -> list[Any] | None:
-    return None if both is None else list(both)
+def _listed(value: Any) -> Any:
+    """Return the value of an attribute as lists, arrays and numbers."""
+    if isinstance(value, Worn):
+        return [value.depth, value.pressure, value.pace]
+    return list(value) if isinstance(value, tuple) else value
+
+
+def _from_list(key: str, value: Any) -> Any:
+    """Return what `_listed` was given."""
+    if key == "worn":
+        return Worn(*value)
+    return tuple(value) if isinstance(value, list) else value

@@ -19,6 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from fastcontact.analysis.problem import Problem
+from fastcontact.analysis.stress_scatter import SUSPICIOUS
 from fastcontact.arrays import Array, Mask
 from fastcontact.elasticity import incompatible_modes, recovery
 from fastcontact.elasticity.energy import cell_volumes
@@ -26,9 +27,8 @@ from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.mesh import elements
 from fastcontact.model.model import Model
 
-# Poisson's ratio from which on plain elements may lock, the excess of stiffness that is worth a warning, and the number of
-# conjugate gradients.
-SUSPICIOUS, EXCESS, ITERATIONS = 0.45, 0.05, 5
+# The excess of stiffness that is worth a warning, and the number of conjugate gradients.
+EXCESS, ITERATIONS = 0.05, 5
 # Elements whose dilatation is averaged at the nodes for comparison.
 AT_NODES = ("tri3", "tet4", "wedge6", "pyramid5")
 

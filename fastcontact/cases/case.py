@@ -18,6 +18,7 @@ from fastcontact.cases.model_tables import LISTS, build_model, points
 from fastcontact.cases.shipped import case_path, shipped_cases
 from fastcontact.errors import CaseError, in_file, unknown
 from fastcontact.linear.choice import check_tolerance
+from fastcontact.linear.protocol import TOLERANCE
 from fastcontact.mesh import generate
 from fastcontact.mesh.files.mesh_files import read_mesh
 from fastcontact.mesh.mesh import Mesh
@@ -77,7 +78,7 @@ class Case:
     ramp: Ramp
     criteria: Criteria = field(default_factory=Criteria)
     linear_solver: str = "auto"
-    linear_tolerance: float = 1e-10
+    linear_tolerance: float = TOLERANCE
     probes: dict[str, int] = field(default_factory=dict)
     theories: dict[str, dict[str, Any]] = field(default_factory=dict)
     checks: list[Check] = field(default_factory=list)
@@ -195,7 +196,7 @@ def build_case(
             raise CaseError(f"the key '{key}' is missing")
     solve = data.get("solve", {})
     ramp = _ramp(data.get("ramp", {}))
-    tolerance = float(solve.get("linear_tolerance", 1e-10))
+    tolerance = float(solve.get("linear_tolerance", TOLERANCE))
     check_tolerance(tolerance)
     criteria = Criteria(**{key: value for key, value in solve.items() if not key.startswith("linear_")})
     mesh = _mesh(Path(folder), data["mesh"]) if mesh is None else mesh

@@ -9,7 +9,8 @@ import pkgutil
 
 from fastcontact.errors import ModelError, unknown
 from fastcontact.linear import solvers
-from fastcontact.linear.protocol import LinearSolver
+from fastcontact.linear.factors.factor_solver import AFFORDABLE
+from fastcontact.linear.protocol import TOLERANCE, LinearSolver
 
 log = logging.getLogger("fastcontact")
 # Solvers that need a package which is not among the dependencies, and the extra that brings it.
@@ -20,12 +21,12 @@ SOLVERS = tuple(name for name in KNOWN if name not in OPTIONAL or importlib.util
 LOOSEST = 1e-3
 # Above these sizes a multigrid solution is cheaper than a factorisation (measured, see bench/README.md). The second where
 # constraints need columns of K^-1, which factors give at once and multigrid one solution each.
-DIRECT_UP_TO = {2: 3_000_000, 3: 15_000}
-DIRECT_WITH_COLUMNS_UP_TO = {2: 3_000_000, 3: 150_000}
+DIRECT_UP_TO = {2: AFFORDABLE[2], 3: 15_000}
+DIRECT_WITH_COLUMNS_UP_TO = AFFORDABLE
 
 
 def make(
-    name: str, *, dim: int, n_dofs: int, tolerance: float = 1e-10, precision: str | None = None, columns: bool = False
+    name: str, *, dim: int, n_dofs: int, tolerance: float = TOLERANCE, precision: str | None = None, columns: bool = False
 ) -> LinearSolver:  # fmt: skip
     """Return a linear solver by name.
 

@@ -18,6 +18,10 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.linear.field_compliance import FieldCompliance
 from fastcontact.linear.springs import Springs
 
+# Relative accuracy of the solutions unless another is asked for.
+TOLERANCE = 1e-10
+# Contrasts of materials up to this, see `LinearSolver`, are taken for none.
+MILD = 10.0
 # Called with an unfinished solution (u, multiplier, relative residual); where it returns True, the solver stops there.
 Monitor = Callable[[Array, Array, float], bool]
 

@@ -10,7 +10,6 @@ from starting import ROOT, finished, start
 KERNEL_TESTS = (
     "tests/unit/contact/test_clip.py",
     "tests/unit/analysis/test_coulomb.py",
-    "tests/unit/analysis/test_friction_kernels.py",
     "tests/unit/linear/test_linear_multigrid.py",
     "tests/unit/_jit/test_norms.py",
     "tests/unit/linear/test_grouped_pivots.py",

@@ -1,7 +1,7 @@
 """Unilateral contact and Coulomb's law as a complementarity function, scaled by the stiffness of each constraint.
 
 Another law begins here. Its tangential force is also used where a sliding constraint is linearised: `dense._step`,
-`eliminated.Eliminated`, and in the fallbacks `sweep_kernels` and `dense._on_edges`. Its parameters come from
+`eliminated.Eliminated`, and in the fallback `dense._on_edges`. Its parameters come from
 `PairOptions` by way of `Constraints`; those that are forces are scaled where `Law` is made, as forces are. That a constraint
 without friction needs no tangents is assumed by `Law.state` and by the formulations.
 """
@@ -50,5 +50,5 @@ class Law:
     def slide(self, y: Array, gaps: Array, sliding: Indices) -> tuple[Array, Array]:
         """Return the directions (k, q) in which constraints `sliding` (q,) slide, and how much of a turn t follows (q,)."""
         _, t, reach, radius = self.trial(y, gaps)
-        along = np.maximum(reach[sliding], 1e-300)
+        along = np.maximum(reach[sliding], np.finfo(float).tiny)
         return t[:, sliding] / along, np.minimum(radius[sliding] / along, 1.0)

@@ -1,12 +1,11 @@
 """Contact with Coulomb friction on a dense Delassus operator: forces from the gaps and slips without contact forces.
 
-Gaps and slips are ``(g, s) = free + F (n, t)`` with the normal forces n and the tangential ones t. Three methods stand
+Gaps and slips are ``(g, s) = free + F (n, t)`` with the normal forces n and the tangential ones t. Two methods stand
 behind each other:
 
 1. Newton's, see `cone_newton`; in two dimensions it is an active set of open, stick and slip forwards or backwards. It
    nearly always suffices.
-2. The same from forces that block Gauss-Seidel sweeps have found (Jean, 1999), which suffices unless mu is large.
-3. The same from the solution for a cone with few edges, a linear complementarity problem that Lemke's pivots solve for
+2. The same from the solution for a cone with few edges, a linear complementarity problem that Lemke's pivots solve for
    every positive definite F and every mu (Klarbring, 1986; Stewart and Trinkle, 1996; Klarbring and Pang, 1998).
 
 With large mu there may be several solutions; one of them is found.
@@ -18,15 +17,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fastcontact.analysis.friction import lemke_kernels, sweep_kernels
+from fastcontact.analysis.friction import lemke
 from fastcontact.analysis.friction.cone_newton import Forces, newton
 from fastcontact.analysis.friction.coulomb_law import Law
 from fastcontact.arrays import Array, Mask
 
 # Residual of a solution over the largest force where round-off leaves no better one.
 ACCEPTABLE = 1e-9
-# Relative changes down to which starts are swept, and the sweeps that one may take.
-SWEPT, MOST_SWEEPS = (1e-1, 1e-2, 1e-3, 1e-4), 2000
 # Edges of the cones in three dimensions, and the largest complementarity problem.
 EDGES, LARGEST = (8, 16, 32), 2500
 # Slips that depend on each other get this compliance, in units of that of the gaps: at nodes that several sides hold, or that
@@ -120,11 +117,6 @@ def _starts(problem: _Problem, closed: Mask, guess: Array | None) -> Iterator[tu
     if guess is not None and guess.any():
         yield guess, False
     yield stuck, False
-    y, gaps = np.zeros_like(problem.free), np.empty_like(problem.free)
-    for exactness in SWEPT:
-        if sweep_kernels.sweep(problem.F, problem.free, problem.mu, y, gaps, exactness, MOST_SWEEPS) == MOST_SWEEPS:
-            break
-        yield y.copy(), True
     for edges in EDGES if len(problem.free) == 3 else (2,):
         edge_forces = _on_edges(problem, edges)
         if edge_forces is not None:
@@ -191,7 +183,5 @@ def _on_edges(problem: _Problem, edges: int) -> Array | None:
     M[m:last, last:] = np.tile(np.eye(m), edges).T
     q = SHIFT * (0.5 + np.arange(size) * 0.6180339887498949 % 1.0)  # no two alike
     q[:last] += X.T @ problem.free.ravel()
-    z = np.empty(size)
-    if lemke_kernels.pivot(M, q, z, 5 * size) < 0:
-        return None
-    return (X @ z[:last]).reshape(1 + k, m)
+    z, _ = lemke.solved(M, q, 5 * size)
+    return None if z is None else (X @ z[:last]).reshape(1 + k, m)

@@ -20,7 +20,7 @@ from fastcontact.analysis.solution import Accuracy
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.errors import ConvergenceError
-from fastcontact.linear.protocol import FrictionTerms, LoadedNonsymmetric
+from fastcontact.linear.protocol import MILD, FrictionTerms, LoadedNonsymmetric
 from fastcontact.linear.sparse_rows import scaled, taken
 from fastcontact.linear.springs import Springs
 
@@ -31,7 +31,7 @@ STIFFEST = 100.0
 # Nearly incompressible cells resist a single node far more than a surface (`LinearSolver.contrast`): beyond MILD, constraints
 # are softer still, with its root, or Newton's method reverses a few slips again and again (nu = 0.4999, 161 442 unknowns: 588
 # iterations, where it did not settle; nu = 0.499 did not care).
-SOFTER, MILD = 0.2, 10.0
+SOFTER = 0.2
 # The residual of the friction law that is small enough, in units of that of the linear solutions; and that which will do
 # after PATIENCE steps: contact forces that are a small part of all forces are no more accurate.
 ENOUGH, ACCEPTABLE, PATIENCE = 10.0, 300.0, 12
@@ -218,7 +218,7 @@ class Eliminated:
             return _Sliding(at, pull)
         across = np.stack([-d[1], d[0]])
         rows = sum(scaled(taken(T, at), factor) for factor, T in zip(across, self._rows[1:], strict=True))
-        spring = np.minimum(turning / np.maximum(1.0 - turning, 1e-300), STIFFEST) * self._unit[at] ** 2
+        spring = np.minimum(turning / np.maximum(1.0 - turning, np.finfo(float).tiny), STIFFEST) * self._unit[at] ** 2
         spring = spring / (1.0 + spring * self._gives[1, at])  # behind that of the constraint itself
         return _Sliding(
             at, pull, _Across(across, Springs(csr_array(rows), spring), (across * self._free[1:, at]).sum(axis=0))

@@ -8,7 +8,6 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import block_array, csr_array, diags_array
 
-from fastcontact.analysis.friction import slip_directions_kernels
 from fastcontact.arrays import Array, Mask
 
 # A direction of slip whose compliance, relative to that of the gap, is less than this is held.
@@ -35,10 +34,8 @@ def compliance_of_rows(rows: tuple[csr_array, ...], yielding: Array) -> Array:
     yielding : ndarray (n,)
         Compliance of each unknown [length / force].
     """
-    compliance = np.empty((len(rows), len(rows), rows[0].shape[0]))
-    parts = tuple(tuple(getattr(R, part) for R in rows) for part in ("indptr", "indices", "data"))
-    slip_directions_kernels.products_of_rows(*parts, yielding, compliance)
-    return compliance
+    weighted = [csr_array((R.data * yielding[R.indices], R.indices, R.indptr), shape=R.shape) for R in rows]
+    return np.array([[own.multiply(R).sum(axis=1) for R in rows] for own in weighted])
 
 
 def aligning(compliance: Array, directions: tuple[Array, ...] = ()) -> csr_array | None:

@@ -68,23 +68,13 @@ def _eliminated(rows: csr_array, nodes: Indices, size: int) -> tuple[Indices, cs
         elimination = eliminate(rows, np.zeros(rows.shape[0]), None, nodes, size)
     except RepeatedError:
         return _independent(rows)
-    weights = elimination.weights
-    if elimination.coupled is not None:
-        columns = np.unique(weights.indices)
-        full = elimination.coupled.solve(weights[:, columns].toarray())
-        weights = csr_array(full @ _selection(columns, rows.shape[1]))
-    return elimination.pivots, weights
+    return elimination.pivots, elimination.full_weights()
 
 
 def _independent(rows: csr_array) -> tuple[Indices, csr_array]:
     columns = np.unique(rows.indices)
     _, R, order = qr(rows[:, columns].toarray(), mode="economic", pivoting=True)
     rank = int((np.abs(np.diag(R)) > REPEATED * abs(R[0, 0])).sum())
-    weights = -solve_triangular(R[:rank, :rank], R[:rank, rank:])
-    others = _selection(columns[order[rank:]], rows.shape[1])
-    return columns[order[:rank]].astype(np.intp), csr_array(csr_array(weights) @ others)
-
-
-def _selection(columns: Indices, n: int) -> csr_array:
-    """Return the selection matrix (k, n) of k columns."""
-    return csr_array((np.ones(len(columns)), (np.arange(len(columns)), columns)), shape=(len(columns), n))
+    weights, others = csr_array(-solve_triangular(R[:rank, :rank], R[:rank, rank:])), columns[order[rank:]]
+    of_all = csr_array((weights.data, others[weights.indices], weights.indptr), shape=(rank, rows.shape[1]))
+    return columns[order[:rank]].astype(np.intp), of_all

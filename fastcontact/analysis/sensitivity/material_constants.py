@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from fastcontact.analysis.problem import Problem
-from fastcontact.analysis.sensitivity.moving_contact import MovingContact
+from fastcontact.analysis.sensitivity.moving_contact import CHANGED, MovingContact
 from fastcontact.analysis.sensitivity.quantities import Asked
 from fastcontact.arrays import Array
 from fastcontact.elasticity.anisotropic_materials import NAMES, Anisotropic, Orthotropic
@@ -21,8 +21,6 @@ from fastcontact.model.ramp import combined
 
 # Constants, and how the components of an orthotropic material's are called.
 CONSTANTS = {"E": "123", "nu": NAMES, "G": NAMES, "expansion": "123"}
-# By how much constants are changed, relative to what is allowed.
-CHANGED = 1e-3
 
 
 def by_constant(contact: MovingContact, asked: Asked) -> tuple[Array, Array | None]:

@@ -29,6 +29,8 @@ from fastcontact.errors import ModelError
 REMEDY = "Take another load a little off this one, or differences of two solutions to either side"
 # By how much points are moved, in units of the shortest edge: what central differences leave is then about 1e-10.
 MOVED = 1e-5
+# By how much constants and forces are changed, relative to what is allowed, or to the largest.
+CHANGED = 1e-3
 # What differences to either side may differ by where they are smooth, relative to what turning a facet by an edge makes.
 SMOOTH = 1e-3
 # So many components are moved one by one.

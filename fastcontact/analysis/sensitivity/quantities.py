@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.analysis.sensitivity.adjoint import Gradient
-from fastcontact.analysis.sensitivity.moving_contact import MovingContact
+from fastcontact.analysis.sensitivity.moving_contact import CHANGED, MovingContact
 from fastcontact.errors import ModelError, unknown
 from fastcontact.model.model import Model
 from fastcontact.results.step import StepResult
@@ -132,12 +132,12 @@ def _pressure(contact: MovingContact, none: Gradient, step: StepResult, asked: A
     contact = replace(contact, pair=name, closed=result.active)
     multiplier, by_multiplier = contact.solution.multiplier, none.multiplier
     rows_of_pair, rows = contact.constraints.rows()[name], contact.active
-    size = float(np.abs(multiplier[rows_of_pair]).max(initial=0.0)) or 1.0
+    step = CHANGED * (float(np.abs(multiplier[rows_of_pair]).max(initial=0.0)) or 1.0)
     base = contact.pressure(multiplier)[row]
     for k in np.flatnonzero((rows >= rows_of_pair.start) & (rows < rows_of_pair.stop)):
         more = multiplier.copy()
-        more[rows[k]] += 1e-3 * size
-        by_multiplier[k] = (contact.pressure(more)[row] - base) / (1e-3 * size)
+        more[rows[k]] += step
+        by_multiplier[k] = (contact.pressure(more)[row] - base) / step
     sample = np.zeros(len(contact.u) + len(rows) + len(result.points))
     sample[len(contact.u) + len(rows) + row] = 1.0
     return contact, replace(none, value=float(base), sample=sample)

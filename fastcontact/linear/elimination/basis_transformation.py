@@ -16,7 +16,7 @@ from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.linear.elimination import elimination_kernels, pivot_order
-from fastcontact.linear.elimination.coupled_pivots import CoupledPivots
+from fastcontact.linear.elimination.coupled_pivots import CoupledPivots, SparseInverse
 from fastcontact.linear.elimination.elimination import Elimination, eliminate
 from fastcontact.linear.sparse_rows import scaled
 
@@ -54,30 +54,21 @@ class BasisTransformation(Elimination):
         W = self.force_weights
         elimination_kernels.add_rows(W.indptr, W.indices, W.data, self.multiplier(r[self.pivots]), r)
 
-    def restore_forces(self, r: Array, forces: Array) -> None:
-        """See `Elimination.restore_forces`; forces (q,)."""
-        W = self.force_weights
-        elimination_kernels.add_rows(W.indptr, W.indices, W.data, -self.multiplier(forces), r)
-        r[self.pivots] = forces
-
     def full_weights(self) -> csr_array:
         """See `Elimination.full_weights`."""
-        inverse = self.own_inverse if self.coupled is None else csr_array(self.coupled.solve(np.eye(len(self.corners))))
-        assert inverse is not None
-        return self._following(inverse, self.weights)
+        inverse = self.own.matrix if isinstance(self.own, SparseInverse) else self.own.solve(np.eye(len(self.corners)))
+        return self._following(csr_array(inverse), self.weights)
 
     def with_sparse_weights(self) -> Elimination:
         """See `Elimination.with_sparse_weights`."""
-        if self.coupled is None:
-            assert self.own_inverse is not None
-            inverse, rows = self.own_inverse, self.weights
-        else:
+        rows = self.weights
+        if isinstance(self.own, CoupledPivots):
             # The equations with the lumped matrix in place of their own: what they leave of a motion obeys them again.
-            m, n = self.weights.shape
+            m, n = rows.shape
             E = csr_array((np.ones(m), self.corners, np.arange(m + 1)), shape=(m, n))
-            inverse, rows = self.coupled.sparse_inverse, csr_array(self.weights + self.coupled.beyond_lumped @ E)
-        W = self._following(inverse, rows)
-        return Elimination(self.pivots, W, np.zeros(len(self.pivots)), W, inverse)
+            rows = csr_array(rows + self.own.beyond_lumped @ E)
+        W = self._following(self.own.sparse.matrix, rows)
+        return Elimination(self.pivots, W, np.zeros(len(self.pivots)), W, self.own.sparse)
 
     def _following(self, inverse: csr_array, rows: csr_array) -> csr_array:
         """Return the weights (q, n) that the pivots are of all unknowns."""
@@ -139,12 +130,9 @@ def eliminate_transformed(
     D = csr_array(beside[:, corners] + csr_array((np.ones(m), (corners, np.arange(m))), shape=(n, m)))
     pivots = np.flatnonzero(np.diff(D.indptr))
     moves, weights = csr_array(D[pivots]), csr_array(-B)
-    coupled, sparse_inverse = (inverse, None) if isinstance(inverse, CoupledPivots) else (None, inverse)
-    offset = moves @ (inverse.solve(c) if isinstance(inverse, CoupledPivots) else inverse @ c)
-    force_weights = weights
+    force_weights, of_forces = weights, inverse
     if force_rows is not None:
         force_weights = csr_array(-force_rows)
-        inverse = pivot_order.inverse_of(csr_array(force_rows + force_rows @ beside), corners, size)
-    return BasisTransformation(
-        pivots, weights, offset, force_weights, inverse, coupled, sparse_inverse, moves=moves, corners=corners
-    )
+        of_forces = pivot_order.inverse_of(csr_array(force_rows + force_rows @ beside), corners, size)
+    offset = moves @ inverse.solve(c)
+    return BasisTransformation(pivots, weights, offset, force_weights, of_forces, inverse, moves=moves, corners=corners)

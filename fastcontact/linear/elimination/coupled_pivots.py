@@ -7,6 +7,8 @@ and take a sparse inverse instead, that of one block a node which does the same 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.sparse import coo_array, csc_array, csr_array
 from scipy.sparse.csgraph import connected_components
@@ -45,8 +47,33 @@ class CoupledError(RepeatedError):
         )
 
 
+@dataclass(frozen=True, eq=False)
+class SparseInverse:
+    """The inverse of the pivot columns where it is sparse.
+
+    Attributes
+    ----------
+    matrix : csr_array (m, m)
+    """
+
+    matrix: csr_array
+
+    @property
+    def sparse(self) -> SparseInverse:
+        """The inverse itself."""
+        return self
+
+    def solve(self, b: Array) -> Array:
+        """Return ``P^-1 b``, shape (m,)."""
+        return np.asarray(self.matrix @ b, np.float64)
+
+    def solve_transposed(self, b: Array) -> Array:
+        """Return ``P^-T b``, shape (m,)."""
+        return np.asarray(self.matrix.T @ b)
+
+
 class CoupledPivots:
-    """A sparse matrix (m, m) with its factors.
+    """The factors of the pivot columns P (m, m) where their inverse is full.
 
     Parameters
     ----------
@@ -58,7 +85,7 @@ class CoupledPivots:
 
     Attributes
     ----------
-    sparse_inverse : csr_array (m, m)
+    sparse : SparseInverse
         Close enough to the inverse for a preconditioner: that of `lumped`.
     beyond_lumped : csr_array (m, m)
         The matrix less `lumped`.
@@ -74,7 +101,7 @@ class CoupledPivots:
         kept = np.asarray(abs(L).sum(axis=1)) / np.asarray(abs(P).sum(axis=1))
         if not kept.min() >= LUMPED:
             raise CoupledError()
-        self.sparse_inverse, self.beyond_lumped = block_inverse(L), csr_array(P - L)
+        self.sparse, self.beyond_lumped = SparseInverse(block_inverse(L)), csr_array(P - L)
         try:
             self._factors = splu(csc_array(P))
         except RuntimeError:  # exactly singular
@@ -89,6 +116,9 @@ class CoupledPivots:
     def solve_transposed(self, b: Array) -> Array:
         """Return ``P^-T b``, shape (m,)."""
         return np.asarray(self._factors.solve(b, "T"))
+
+
+Inverse = SparseInverse | CoupledPivots
 
 
 def lumped(P: csr_array, pivots: Indices, size: int) -> csr_array:

@@ -9,7 +9,9 @@ from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.linear.elimination import elimination_kernels, pivot_order
-from fastcontact.linear.elimination.coupled_pivots import CoupledPivots
+from fastcontact.linear.elimination.coupled_pivots import CoupledPivots, Inverse, SparseInverse
+
+NONE = SparseInverse(csr_array((0, 0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,12 +28,10 @@ class Elimination:
     force_weights : csr_array (m, n)
         Shares of the force at each pivot that go to the other unknowns: `weights`, unless multipliers act through other
         rows than B.
-    inverse : csr_array (m, m) or CoupledPivots
+    inverse : SparseInverse or CoupledPivots
         Inverse of the pivots' columns of the rows that multipliers act through.
-    coupled : CoupledPivots, optional
-        P, the pivots' columns of the equations, where their inverse is full.
-    own_inverse : csr_array (m, m), optional
-        P^-1, where it is not.
+    own : SparseInverse or CoupledPivots
+        Inverse of the pivots' columns of the equations. Where these are coupled, it is not yet part of the weights.
     compliance : ndarray (m,), optional
         Compliance of the equations themselves: ``B u + compliance * multiplier = c`` [length / force].
     """
@@ -40,30 +40,28 @@ class Elimination:
     weights: csr_array
     offset: Array
     force_weights: csr_array
-    inverse: csr_array | CoupledPivots
-    coupled: CoupledPivots | None = None
-    own_inverse: csr_array | None = None
+    inverse: Inverse = NONE
+    own: Inverse = NONE
     compliance: Array | None = None
+
+    @property
+    def coupled(self) -> bool:
+        """Whether equations of many nodes share pivots."""
+        return isinstance(self.own, CoupledPivots)
 
     def shifted(self, c: Array) -> Array:
         """Return the change of the pivots (m,) for a change c (m,) of the right-hand sides."""
-        if self.coupled is not None:
-            return self.coupled.solve(c)
-        assert self.own_inverse is not None
-        return np.asarray(self.own_inverse @ c, np.float64)
+        return self.own.solve(c)
 
     def multiplier(self, forces: Array) -> Array:
         """Return the multiplier (m,) with ``B.T multiplier = forces`` at the pivots; forces = (K u - f)[pivots]."""
-        inverse = self.inverse
-        return (
-            inverse.solve_transposed(forces) if isinstance(inverse, CoupledPivots) else np.asarray(inverse.T @ forces)
-        )
+        return self.inverse.solve_transposed(forces)
 
     def complete(self, x: Array, offset: Array | None = None) -> None:
         """Set the pivots of `x` (n,) to their weighted sums, plus `offset` (m,)."""
         elimination_kernels.complete(self.pivots, self.weights.indptr, self.weights.indices, self.weights.data, x)
-        if self.coupled is not None:
-            x[self.pivots] = self.coupled.solve(x[self.pivots])
+        if self.coupled:
+            x[self.pivots] = self.own.solve(x[self.pivots])
         if offset is not None:
             x[self.pivots] += offset
 
@@ -74,24 +72,20 @@ class Elimination:
             r[self.pivots] = self.inverse.solve_transposed(r[self.pivots])
         elimination_kernels.move_forces(self.pivots, W.indptr, W.indices, W.data, r)
 
-    def restore_forces(self, r: Array, forces: Array) -> None:
-        """Undo `move_forces`, given the `forces` (m,) that were at the pivots."""
-        W, inverse = self.force_weights, self.inverse
-        shared = inverse.solve_transposed(forces) if isinstance(inverse, CoupledPivots) else forces
-        elimination_kernels.restore_forces(self.pivots, W.indptr, W.indices, W.data, shared, r)
-        r[self.pivots] = forces
-
     def full_weights(self) -> csr_array:
         """Return the weights (m, n) of the other unknowns, a full matrix where pivots are coupled."""
-        return self.weights if self.coupled is None else csr_array(self.coupled.solve(self.weights.toarray()))
+        if not self.coupled:
+            return self.weights
+        columns = np.unique(self.weights.indices)
+        full = csr_array(self.own.solve(self.weights[:, columns].toarray()))
+        return csr_array((full.data, columns[full.indices], full.indptr), shape=self.weights.shape)
 
     def with_sparse_weights(self) -> Elimination:
         """Return this, or, where pivots are coupled, nearly the same with weights that a preconditioner can use."""
-        if self.coupled is None:
+        if not self.coupled:
             return self
-        inverse = self.coupled.sparse_inverse
-        weights = _product(inverse, self.weights)
-        return Elimination(self.pivots, weights, np.zeros(len(self.pivots)), weights, inverse)
+        weights = _weighted(self.own.sparse, self.weights)
+        return Elimination(self.pivots, weights, np.zeros(len(self.pivots)), weights, self.own.sparse)
 
 
 def eliminate(
@@ -120,27 +114,23 @@ def eliminate(
         B.sum_duplicates()
     B.eliminate_zeros()
     pivots, inverse = pivot_order.chosen(B, nodes, size)
-    weights, coupled = _weights(B, pivots, inverse), None
-    if isinstance(inverse, CoupledPivots):
-        sparse_inverse, coupled, offset = None, inverse, inverse.solve(c)
-    else:
-        sparse_inverse, offset = inverse, np.asarray(inverse @ c, np.float64)
+    weights, offset = _weights(B, pivots, inverse), inverse.solve(c)
     if force_rows is None:
-        return Elimination(pivots, weights, offset, weights, inverse, coupled, sparse_inverse)
-    inverse = pivot_order.inverse_of(force_rows, pivots, size)
-    return Elimination(pivots, weights, offset, _weights(force_rows, pivots, inverse), inverse, coupled, sparse_inverse)
+        return Elimination(pivots, weights, offset, weights, inverse, inverse)
+    of_forces = pivot_order.inverse_of(force_rows, pivots, size)
+    return Elimination(pivots, weights, offset, _weights(force_rows, pivots, of_forces), of_forces, inverse)
 
 
-def _weights(B: csr_array, pivots: Indices, inverse: csr_array | CoupledPivots) -> csr_array:
-    """Return the weights (m, n) of the other unknowns, given the `inverse` (m, m) of the pivots' columns."""
+def _weights(B: csr_array, pivots: Indices, inverse: Inverse) -> csr_array:
+    """Return the weights (m, n) of the other unknowns, given the inverse of the pivots' columns."""
     is_pivot = np.zeros(B.shape[1], bool)
     is_pivot[pivots] = True
     rest = csr_array((np.where(is_pivot[B.indices], 0.0, -B.data), B.indices, B.indptr), shape=B.shape, copy=True)
     rest.eliminate_zeros()
-    return rest if isinstance(inverse, CoupledPivots) else _product(inverse, rest)
+    return rest if isinstance(inverse, CoupledPivots) else _weighted(inverse, rest)
 
 
-def _product(inverse: csr_array, rest: csr_array) -> csr_array:
-    weights = csr_array(inverse @ rest)
+def _weighted(inverse: SparseInverse, rest: csr_array) -> csr_array:
+    weights = csr_array(inverse.matrix @ rest)
     weights.sort_indices()
     return weights

@@ -30,16 +30,6 @@ def move_forces(pivots, indptr, indices, weights, r):
 
 
 @kernel
-def restore_forces(pivots, indptr, indices, weights, forces, r):
-    """Undo `move_forces`, given the `forces` (m,) that were at the pivots."""
-    for p in range(pivots.shape[0]):
-        for k in range(indptr[p], indptr[p + 1]):
-            r[indices[k]] -= weights[k] * forces[p]
-    for p in range(pivots.shape[0]):
-        r[pivots[p]] = forces[p]
-
-
-@kernel
 def add_rows(indptr, indices, weights, factors, r):
     """Add ``W.T factors`` to r (n,), factors (m,)."""
     for p in range(factors.shape[0]):

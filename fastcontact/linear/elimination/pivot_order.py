@@ -1,22 +1,28 @@
 """Choice of the pivot of each constraint, and the inverse of the pivot columns.
 
-Six ways, the first that succeeds: every equation has an unknown that no other equation has; the equations of a node have
-unknowns that those of no other node have; layers of equations, each with an unknown that no later layer has; layers of nodes,
-whose equations have unknowns that those of no later layer have; the equations of a node have large enough entries in that
-node's unknowns; the assignment of unknowns to equations with the largest product of entries (Duff and Koster, 2001). The
-columns of the pivots are inverted in small blocks, independent or in layers, or, where equations of many nodes share
-unknowns otherwise, factorised (`coupled_pivots`).
+Groups of equations, each equation by itself or those of a node together, take unknowns that no other group has, or no group
+of a later layer (`of_groups`). Where there are too few, the equations of a node take large enough entries in that node's
+unknowns (`of_nodes`), or what is left over is assigned (`of_most_groups`, `assigned`). The columns of the pivots are inverted
+in small blocks, independent or in layers, or, where equations of many nodes share unknowns otherwise, factorised
+(`coupled_pivots`).
 """
 
 from __future__ import annotations
 
 import numpy as np
 from scipy.linalg import qr
-from scipy.sparse import csr_array, diags_array
+from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, min_weight_full_bipartite_matching
 
 from fastcontact.arrays import Indices, Mask
-from fastcontact.linear.elimination.coupled_pivots import CoupledError, CoupledPivots, RepeatedError, block_inverse
+from fastcontact.linear.elimination.coupled_pivots import (
+    CoupledError,
+    CoupledPivots,
+    Inverse,
+    RepeatedError,
+    SparseInverse,
+    block_inverse,
+)
 
 # An unknown is taken as pivot where its entry is at least this part of the largest one of the equation.
 SMALLEST = 0.25
@@ -28,7 +34,7 @@ DENSE_UP_TO = 400
 MOST_LAYERS = 4
 
 
-def chosen(B: csr_array, nodes: Indices | None = None, size: int = 1) -> tuple[Indices, csr_array | CoupledPivots]:
+def chosen(B: csr_array, nodes: Indices | None = None, size: int = 1) -> tuple[Indices, Inverse]:
     """Return the pivot of every equation and the inverse of their columns, ``B[:, pivots]^-1``.
 
     Parameters
@@ -43,7 +49,7 @@ def chosen(B: csr_array, nodes: Indices | None = None, size: int = 1) -> tuple[I
     Returns
     -------
     pivots : ndarray of int (m,)
-    inverse : csr_array (m, m) or CoupledPivots
+    inverse : SparseInverse or CoupledPivots
 
     Raises
     ------
@@ -51,24 +57,25 @@ def chosen(B: csr_array, nodes: Indices | None = None, size: int = 1) -> tuple[I
         If constraints are linearly dependent.
     """
     if not B.shape[0]:
-        return np.empty(0, np.intp), csr_array((0, 0))
-    if (layers := layered(B, layers=1)) is not None:
-        return layers
-    if nodes is not None and (pivots := of_groups(B, nodes, layers=1)) is not None:
-        return pivots, block_inverse(csr_array(B[:, pivots]))
-    if (layers := layered(B)) is not None:
-        return layers
-    if nodes is not None and (pivots := of_groups(B, nodes)) is not None:
-        return pivots, inverse_of(B, pivots, size)
-    if nodes is not None and (pivots := of_nodes(B, nodes, size)) is not None:
-        return pivots, inverse_of(B, pivots, size)
-    if nodes is not None and (pivots := of_most_groups(B, nodes)) is not None:
-        return pivots, inverse_of(B, pivots, size)
-    pivots = assigned(B)
-    return pivots, inverse_of(B, pivots, size)
+        return np.empty(0, np.intp), SparseInverse(csr_array((0, 0)))
+    return (pivots := _chosen(B, nodes, size)), inverse_of(B, pivots, size)
 
 
-def inverse_of(B: csr_array, pivots: Indices, size: int) -> csr_array | CoupledPivots:
+def _chosen(B: csr_array, nodes: Indices | None, size: int) -> Indices:
+    """Return the pivot of every equation (m,), see `chosen`."""
+    alone = np.arange(B.shape[0])
+    by_node = [] if nodes is None else [nodes]
+    for layers in (1, MOST_LAYERS):
+        for groups in (alone, *by_node):
+            if (pivots := of_groups(B, groups, layers)) is not None:
+                return pivots
+    for owners in by_node:
+        if (pivots := of_nodes(B, owners, size)) is not None or (pivots := of_most_groups(B, owners)) is not None:
+            return pivots
+    return assigned(B)
+
+
+def inverse_of(B: csr_array, pivots: Indices, size: int) -> Inverse:
     """Return the inverse of the columns `pivots` (m,) of B, small blocks or factors; a node has `size` unknowns.
 
     Raises
@@ -77,11 +84,10 @@ def inverse_of(B: csr_array, pivots: Indices, size: int) -> csr_array | CoupledP
         If it is singular.
     """
     P = csr_array(B[:, pivots])
-    label = connected_components(P, directed=False)[1]
-    largest = np.bincount(label).max(initial=0)
+    if (inverse := _triangular_inverse(P, LARGEST_BLOCK, MOST_LAYERS)) is not None:
+        return inverse
+    largest = np.bincount(connected_components(P, directed=False)[1]).max(initial=0)
     if largest > LARGEST_BLOCK:
-        if (inverse := _triangular_inverse(P, LARGEST_BLOCK, MOST_LAYERS)) is not None:
-            return inverse
         try:
             return CoupledPivots(P, pivots, size)
         except CoupledError:
@@ -89,13 +95,13 @@ def inverse_of(B: csr_array, pivots: Indices, size: int) -> csr_array | CoupledP
                 return inverse
             if largest > FULL_UP_TO:
                 raise
-    return block_inverse(P)
+    return SparseInverse(block_inverse(P))
 
 
-def _triangular_inverse(P: csr_array, largest: int, layers: int) -> csr_array | None:
+def _triangular_inverse(P: csr_array, largest: int, layers: int) -> SparseInverse | None:
     """Return the inverse of a matrix of blocks on its diagonal, at most so large, in so many layers; None for others."""
     label = connected_components(P, connection="strong")[1]
-    if np.bincount(label).max() > largest:
+    if np.bincount(label).max(initial=0) > largest:
         return None
     inside = np.repeat(label, np.diff(P.indptr)) == label[P.indices]
     diagonal, beyond = (
@@ -110,7 +116,9 @@ def _triangular_inverse(P: csr_array, largest: int, layers: int) -> csr_array | 
 def of_groups(B: csr_array, groups: Indices, layers: int = MOST_LAYERS) -> Indices | None:
     """Return the unknown (m,) of each row among those of its group alone; None where there are too few.
 
-    In so many layers at most: unknowns of a group alone are those that no other group of its own and later layers has.
+    In so many layers at most: unknowns of a group alone are those that no other group of its own and later layers has. Such
+    are the weighted gaps of quadratic facets with dual multipliers: no other mid node has the unknowns of a mid node, and
+    without the mid nodes the same holds for corners.
     """
     pivots = _in_layers(B, groups, layers)
     return pivots if (pivots >= 0).all() else None
@@ -206,40 +214,7 @@ def _place_in_group(group: Indices) -> Indices:
     return position
 
 
-def layered(B: csr_array, smallest: float = SMALLEST, layers: int = MOST_LAYERS) -> tuple[Indices, csr_array] | None:
-    """Return pivots and inverse, see `chosen`, of equations in so many layers at most; None where no such order exists.
-
-    Such are the weighted gaps of quadratic facets with dual multipliers: no other mid node has the unknowns of a mid node,
-    and without the mid nodes the same holds for corners. The columns of the pivots then make a triangular matrix, and
-    its inverse is a short sum of sparse products. Pivots are at least `smallest` of the largest entry of their equation.
-    """
-    m, n = B.shape
-    size, row = np.abs(B.data), np.repeat(np.arange(m), np.diff(B.indptr))
-    largest = np.zeros(m)
-    np.maximum.at(largest, row, size)
-    strong = size >= smallest * largest[row]
-    pivots = np.full(m, -1, np.intp)
-    left = np.ones(m, bool)
-    for _ in range(layers):
-        among = left[row]
-        count = np.bincount(B.indices[among], minlength=n)
-        own = np.flatnonzero(among & strong & (count[B.indices] == 1))
-        own = own[np.lexsort((own, -size[own], row[own]))]  # of each row the largest, of equal ones the first
-        rows, first = np.unique(row[own], return_index=True)
-        if not len(rows):
-            return None
-        pivots[rows] = B.indices[own[first]]
-        left[rows] = False
-        if not left.any():
-            P = csr_array(B[:, pivots])
-            beyond = csr_array(P - diags_array(P.diagonal(), format="csr"))
-            beyond.eliminate_zeros()
-            inverse = _layered_inverse(csr_array(diags_array(1.0 / P.diagonal(), format="csr")), beyond, layers)
-            return None if inverse is None else (pivots, inverse)
-    return None
-
-
-def _layered_inverse(inner: csr_array, beyond: csr_array, layers: int) -> csr_array | None:
+def _layered_inverse(inner: csr_array, beyond: csr_array, layers: int) -> SparseInverse | None:
     """Return the inverse of a matrix that couples every row to deeper layers only: a finite Neumann series.
 
     `inner` is the inverse of what couples no layers, `beyond` what does. None where there are more than so many `layers`.
@@ -248,7 +223,7 @@ def _layered_inverse(inner: csr_array, beyond: csr_array, layers: int) -> csr_ar
     for _ in range(layers):
         term = csr_array(-(inner @ beyond @ term))
         if not term.nnz:
-            return total
+            return SparseInverse(total)
         total = csr_array(total + term)
     return None
 

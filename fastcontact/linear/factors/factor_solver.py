@@ -19,6 +19,8 @@ from fastcontact.linear.protocol import Counters, LinearSolver, Monitor
 log = logging.getLogger("fastcontact")
 # Beyond this many unknowns last, their dense block costs more than the solutions it saves.
 LAST_UP_TO = 4000
+# Unknowns up to which a factorisation is affordable, by the number of components of a displacement.
+AFFORDABLE = {1: 3_000_000, 2: 3_000_000, 3: 150_000}
 ATTAINABLE = 1e-14
 # Errors of one solution, in units of those of another.
 MARGIN = 10.0

@@ -5,6 +5,7 @@ from numba import prange
 
 from fastcontact._jit.decorators import kernel, parallel_kernel
 
+# Numbers that one thread takes at a time.
 CHUNK = 4096
 
 

@@ -13,10 +13,10 @@ from numba import prange
 
 from fastcontact._jit.decorators import kernel, parallel_kernel
 from fastcontact.linear.multigrid.block_products import row_times
+from fastcontact.linear.multigrid.symmetric_storage_kernels import CHUNK
 
-# Block rows that one thread takes at a time, and up to how many rows waking another thread costs more than it saves.
-CHUNK = 256
-ALONE = 1024
+# Up to so many block rows, waking another thread costs more than it saves.
+ALONE = 4 * CHUNK
 
 
 @kernel

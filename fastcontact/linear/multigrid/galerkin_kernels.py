@@ -11,10 +11,9 @@ from numba import prange
 
 from fastcontact._jit.decorators import kernel, parallel_kernel
 from fastcontact.linear.multigrid.block_products import add_product, add_transposed
-from fastcontact.linear.multigrid.symmetric_storage_kernels import part_of, place_of
+from fastcontact.linear.multigrid.symmetric_storage_kernels import CHUNK, part_of, place_of
 
-# Block rows that one thread takes at a time; in Galerkin products the number of parts, each with its own work space.
-CHUNK = 512
+# Parts of Galerkin products, each with its own work space.
 PARTS = 8
 
 

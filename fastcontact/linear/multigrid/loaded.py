@@ -194,7 +194,7 @@ class _Parts:
     @property
     def coupled(self) -> bool:
         """Whether equations eliminated have pivots in common."""
-        return self.elimination is not None and self.elimination.coupled is not None
+        return self.elimination is not None and self.elimination.coupled
 
     @property
     def giving(self) -> bool:

@@ -12,7 +12,7 @@ import contextlib
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import bsr_array
+from scipy.sparse import bsr_array, csr_array
 
 from fastcontact.arrays import AnyArray, Array, Indices, Numbers
 from fastcontact.linear.multigrid import cycle_kernels, split_matrix_kernels, symmetric_storage_kernels
@@ -105,6 +105,18 @@ class BlockMatrix:
         )
         return out
 
+    def rows_of(self, dofs: Indices) -> csr_array:
+        """Return rows `dofs` (m,) of a symmetric matrix, in double precision."""
+        size, node = len(self.rows), dofs // len(self.rows)
+        count = np.diff(self.indptr)[node]
+        starts = np.concatenate([[0], np.cumsum(count)])
+        blocks = np.repeat(self.indptr[node] - starts[:-1], count) + np.arange(starts[-1])
+        columns, data = self.indices[blocks][:, None] * size + np.arange(size), np.empty(starts[-1] * size)
+        split_matrix_kernels.rows_of(dofs, self.indptr, self.indices, self.storage, self.exact, size, data)
+        rows = csr_array((data, columns.ravel(), size * starts), shape=(len(dofs), (len(self.indptr) - 1) * size))
+        rows.eliminate_zeros()
+        return rows
+
     def to_scipy(self) -> bsr_array:
         """Return a square matrix as SciPy's, in double precision."""
         size, n = len(self.rows), len(self.indptr) - 1
@@ -189,13 +201,6 @@ class ScaledMatrix:
             dofs, A.indptr, A.indices, A.storage, A.exact, 1.0 / self.unit, len(A.rows), u, f, out
         )  # fmt: skip
         return out
-
-    def add_forces_of(self, dofs: Indices, values: Array, out: Array) -> None:
-        """Add ``K[:, dofs] values`` to `out` (n,) [force]."""
-        A = self.scaled
-        split_matrix_kernels.forces_of(
-            dofs, values, A.indptr, A.indices, A.storage, A.exact, 1.0 / self.unit, len(A.rows), out
-        )  # fmt: skip
 
     def diagonal(self) -> Array:
         """Return the diagonal (n,) [force / length]."""

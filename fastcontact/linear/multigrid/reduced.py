@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array
 from fastcontact.linear.elimination.elimination import Elimination
@@ -46,11 +45,6 @@ class Reduced:
         if elimination is not None and elimination.compliance is not None:
             assert diagonal is not None
             self._excess = _Excess(diagonal, elimination, elimination.compliance)
-
-    @property
-    def bare(self) -> bool:
-        """Whether there are neither springs nor compliant constraints."""
-        return self.springs is None and self._excess is None
 
     def begin(self, x: Array, f: Array, r: Array) -> None:
         """Turn the displacement x (n,) [length] into a vector of the iteration, and fill r (n,) with its residual."""
@@ -123,11 +117,7 @@ class _Excess:
         gives, self._compliance = compliance > 0.0, compliance
         self._stiffness = np.divide(1.0, compliance, out=np.zeros(len(compliance)), where=gives)
         # Its own stiffness and that of the pivot; an exact equation stays as it is.
-        inverse = elimination.own_inverse
-        if inverse is None:
-            inverse = elimination.with_sparse_weights().inverse
-        assert isinstance(inverse, csr_array)
-        of_pivots = inverse.power(2).T @ diagonal[self._pivots]
+        of_pivots = elimination.own.sparse.matrix.power(2).T @ diagonal[self._pivots]
         self._inverse = np.where(gives, 1.0 / (self._stiffness + of_pivots), 0.0)
         self._gives = gives
         self._u = np.empty(len(diagonal))

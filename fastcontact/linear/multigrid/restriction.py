@@ -6,14 +6,11 @@ import numpy as np
 
 from fastcontact.arrays import AnyArray
 from fastcontact.linear.multigrid import restriction_kernels
-from fastcontact.linear.multigrid.matrix import BlockMatrix
-
-# Parts of the rows, of so many at least; each has work space of its own.
-PARTS, SHORTEST = 32, 1024
+from fastcontact.linear.multigrid.matrix import PARTS, SHORTEST, BlockMatrix
 
 
 class Restriction:
-    """The transpose of a prolongator P, which is not stored.
+    """The transpose of a prolongator P, which is not stored; parts of its rows have work space of their own.
 
     Parameters
     ----------

@@ -9,9 +9,7 @@ from numba import prange
 
 from fastcontact._jit.decorators import kernel, parallel_kernel
 from fastcontact.linear.multigrid.block_products import add_row_transposed
-
-# Columns that one thread takes at a time.
-CHUNK = 256
+from fastcontact.linear.multigrid.symmetric_storage_kernels import CHUNK
 
 
 @parallel_kernel

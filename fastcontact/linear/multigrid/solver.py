@@ -30,7 +30,7 @@ from fastcontact.linear.multigrid.constrained_hierarchy import ConstrainedHierar
 from fastcontact.linear.multigrid.hierarchy import Hierarchy
 from fastcontact.linear.multigrid.matrix import ScaledMatrix
 from fastcontact.linear.multigrid.reduced import Reduced, multiplier
-from fastcontact.linear.protocol import Counters, Monitor
+from fastcontact.linear.protocol import MILD, TOLERANCE, Counters, Monitor
 from fastcontact.linear.springs import Springs
 
 log = logging.getLogger("fastcontact")
@@ -54,8 +54,6 @@ WARM, WARM_LEAST, MOST_WARM = 0.05, 1e-3, 10
 STOOD, LONGEST_WARM = 0.2, 40
 # A nonsymmetric iteration whose residual does not fall to this part in so many iterations stands still for good.
 FALLS, STANDING = 0.99, 40
-# Smaller contrasts of materials are taken for none.
-MILD = 10.0
 # Where the smoother amplifies something, its bound of the spectrum is raised by this factor, at most so often.
 RAISE, RAISES = 1.3, 4
 
@@ -95,7 +93,7 @@ class Multigrid:
         If there is no such precision.
     """
 
-    def __init__(self, tolerance: float = 1e-10, precision: str = "single") -> None:
+    def __init__(self, tolerance: float = TOLERANCE, precision: str = "single") -> None:
         if precision not in ("single", "double"):
             raise ModelError(f"the precision of the multigrid cycle is 'single' or 'double', not '{precision}'")
         self.tolerance, self.precision = tolerance, precision
@@ -124,7 +122,6 @@ class Multigrid:
         self._cg = ConjugateGradients(n)
         self._residuals: ConjugateResiduals | None = None
         self._diagonal: Array | None = None
-        self._solved: Array | None = None  # the right-hand side that iterate and residual belong to
         self._build(rigid_modes)
         self.columns = InverseColumns(n, self._solve_many, MOST_COLUMNS)
 
@@ -182,19 +179,13 @@ class Multigrid:
         ConvergenceError
             If the residual does not fall below the tolerance.
         """
-        cg, old = self._cg, self._reduced
+        cg = self._cg
         scale = self._scale(f, elimination)
         if scale == 0.0:  # nothing moves anything
-            self._solved = None
             return np.zeros_like(f)
-        goes_on = guess is not None and f is self._solved and np.array_equal(guess, cg.x)
         self.constrain(elimination, springs)
-        if goes_on and old.bare and self._reduced.bare:
-            self._go_on(f, old.elimination, elimination)
-        else:
-            cg.x[:] = 0.0 if guess is None else guess
-            self._begin(cg, f)
-        self._solved = f
+        cg.x[:] = 0.0 if guess is None else guess
+        self._begin(cg, f)
         enough = self._enough(tolerance or 0.0) * scale
         made, raised, first = 0, 0, cg.norm
         watched_from = WATCH_EVERY if self._contrast <= MILD else WATCH_CONTRAST_FROM
@@ -249,7 +240,6 @@ class Multigrid:
         """
         if self._residuals is None:
             self._residuals = ConjugateResiduals(len(f))
-        self._solved = None
         iteration = self._residuals
         scale = self._scale(f, elimination)
         self.constrain(elimination, springs)
@@ -275,7 +265,7 @@ class Multigrid:
         StallError
             If the residual does not fall below the tolerance.
         """
-        n, self._solved = len(f), None
+        n = len(f)
         iteration = ConjugateResiduals(n + len(border))
         scale = self._scale(f, elimination)
         self.constrain(elimination, springs)
@@ -357,25 +347,13 @@ class Multigrid:
         self._reduced.begin(iteration.x, f, iteration.r)
         iteration.start()
 
-    def _go_on(self, f: Array, old: Elimination | None, new: Elimination | None) -> None:
-        """Make the iterate obey other equations: its residual changes near the pivots only."""
-        cg = self._cg
-        if old is not None:
-            old.restore_forces(cg.r, -self.K.forces_at(old.pivots, cg.x, f))
-        if new is not None:
-            before = cg.x[new.pivots]
-            new.complete(cg.x, new.offset)
-            moved = before - cg.x[new.pivots]
-            self.K.add_forces_of(new.pivots, moved, cg.r)
-            new.move_forces(cg.r)
-        cg.start()
-
     def _scale(self, f: Array, elimination: Elimination | None) -> float:
         """Return the norm of the right-hand side, constraint forces included."""
         square = self._cg.dot(f, f)
         if elimination is not None and elimination.offset.any():
-            forces = np.zeros(len(f))
-            self.K.add_forces_of(elimination.pivots, elimination.offset, forces)
+            moved = np.zeros(len(f))
+            moved[elimination.pivots] = elimination.offset
+            forces = self.K @ moved
             square += self._cg.dot(forces, forces)
         return float(np.sqrt(square))
 

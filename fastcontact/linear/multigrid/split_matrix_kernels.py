@@ -9,10 +9,8 @@ import numpy as np
 from numba import prange
 
 from fastcontact._jit.decorators import kernel, parallel_kernel
+from fastcontact.linear.krylov.krylov_kernels import CHUNK
 from fastcontact.linear.multigrid.symmetric_storage_kernels import entry_of, part_of, place_of
-
-# Numbers that one thread takes at a time.
-CHUNK = 4096
 
 
 @parallel_kernel
@@ -53,12 +51,14 @@ def forces_at(dofs, indptr, indices, storage, K, factor, size, u, f, out):
 
 
 @kernel
-def forces_of(dofs, values, indptr, indices, storage, K, factor, size, out):
-    """Add ``factor K[:, dofs] values`` for a symmetric K to `out` (n,)."""
+def rows_of(dofs, indptr, indices, storage, K, size, out):
+    """Fill `out` with rows `dofs` (m,) of the block matrix K, the entries of one row behind those of the other."""
+    at = 0
     for p in range(dofs.shape[0]):
         i, a = dofs[p] // size, dofs[p] % size
         part = part_of(storage, i)
         for k in range(indptr[i], indptr[i + 1]):
             slot = place_of(storage, part, i, indices[k], k)
             for b in range(size):
-                out[indices[k] * size + b] += factor * entry_of(K, slot, a, b, size) * values[p]
+                out[at] = entry_of(K, slot, a, b, size)
+                at += 1

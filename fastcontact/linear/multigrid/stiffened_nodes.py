@@ -98,7 +98,7 @@ def followers(elimination: Elimination, nodes: Indices, size: int) -> Eliminatio
     across = csr_array((moved[at, direction], (at, beside[at, direction])), shape=(len(unknowns), n))
     by = moved[np.arange(len(unknowns)), unknowns % size]
     weights = csr_array(diags_array(1.0 / by, format="csr") @ (share @ weights_of_followers - across))
-    return Elimination(unknowns, weights, np.zeros(len(unknowns)), weights, csr_array((0, 0)))
+    return Elimination(unknowns, weights, np.zeros(len(unknowns)), weights)
 
 
 def composed(elimination: Elimination, following: Elimination) -> tuple[Indices, csr_array]:

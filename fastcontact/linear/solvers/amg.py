@@ -20,6 +20,7 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.delassus import TooManyColumnsError
 from fastcontact.linear.elimination.elimination import Elimination
+from fastcontact.linear.factors.factor_solver import AFFORDABLE
 from fastcontact.linear.lower_tolerance import put_back_tolerance, tighten
 from fastcontact.linear.multigrid.loaded import LoadedMultigrid
 from fastcontact.linear.multigrid.reduced import Reduced
@@ -30,13 +31,13 @@ from fastcontact.linear.multigrid.solver import (
     StallError,
     TooManyIterationsError,
 )
-from fastcontact.linear.protocol import FrictionTerms, LinearSolver, Loaded, Product
+from fastcontact.linear.protocol import TOLERANCE, FrictionTerms, LinearSolver, Loaded, Product
 from fastcontact.linear.solvers.direct import Direct
 from fastcontact.linear.springs import Springs
 
 log = logging.getLogger("fastcontact")
-# Unknowns up to which a factorisation replaces multigrid, by the number of components of a displacement.
-FACTORS_UP_TO = {1: 3_000_000, 2: 3_000_000, 3: 150_000}
+# Unknowns up to which a factorisation replaces multigrid.
+FACTORS_UP_TO = AFFORDABLE
 # Equations that stiffen a node by more than this leave the softer body too little of multigrid's tolerance; coupled ones,
 # whose weights are nearly right only, take hundreds of iterations from the second on.
 STIFFENED, STIFFENED_COUPLED = 3e4, 6.0
@@ -61,7 +62,7 @@ class Amg(Multigrid, LinearSolver):
 
     name = "amg"
 
-    def __init__(self, tolerance: float = 1e-10, precision: str = "single") -> None:
+    def __init__(self, tolerance: float = TOLERANCE, precision: str = "single") -> None:
         super().__init__(tolerance, precision)
         self.instead: Direct | None = None
         self._factored: Direct | None = None  # kept where an analysis goes back to before that
@@ -157,7 +158,7 @@ class Amg(Multigrid, LinearSolver):
             If multigrid would need hundreds of iterations and factors can take over.
         """
         super().constrain(elimination, springs)
-        coupled = elimination is not None and elimination.coupled is not None
+        coupled = elimination is not None and elimination.coupled
         stiffening = self._constrained.stiffening
         if stiffening > (STIFFENED_COUPLED if coupled else STIFFENED) and self._may_factorise:
             raise StallError(
@@ -214,7 +215,7 @@ def _elimination(tied: Mapping[str, Any], n: int) -> Elimination:
     """Return the elimination of `Amg.snapshot`; its offsets and multipliers are not needed any more."""
     m = len(tied["pivots"])
     rows = csr_array((tied["data"], tied["indices"], tied["indptr"]), shape=(m, n))
-    return Elimination(tied["pivots"], rows, np.zeros(m), rows, csr_array((m, m)))
+    return Elimination(tied["pivots"], rows, np.zeros(m), rows)
 
 
 def _or_by_factors(method: Callable[..., Any]) -> Callable[..., Any]:

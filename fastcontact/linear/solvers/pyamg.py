@@ -20,7 +20,7 @@ from fastcontact.linear.delassus import InverseColumns
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.elimination.loaded import LoadedIteration
 from fastcontact.linear.lower_tolerance import put_back_tolerance, tighten
-from fastcontact.linear.protocol import Counters, LinearSolver, Monitor
+from fastcontact.linear.protocol import TOLERANCE, Counters, LinearSolver, Monitor
 
 MAX_ITERATIONS = 1000
 # All neighbours are strong, as in our multigrid; rigid-body modes need no improvement, and polynomials smooth cheapest.
@@ -43,7 +43,7 @@ class Pyamg(LinearSolver):
     name = "pyamg"
     iterative = True
 
-    def __init__(self, tolerance: float = 1e-10) -> None:
+    def __init__(self, tolerance: float = TOLERANCE) -> None:
         self.tolerance, self.counters = tolerance, Counters()
         self._hierarchy: Any = None
 

@@ -6,19 +6,25 @@ from scipy.sparse import csr_array
 from test_coupled_pivots import mass_equations
 
 from fastcontact.linear.elimination import pivot_order
-from fastcontact.linear.elimination.condition import condition, one_norm
+from fastcontact.linear.elimination.condition import condition
 from fastcontact.linear.elimination.coupled_pivots import CoupledError, CoupledPivots, RepeatedError
 from fastcontact.linear.elimination.elimination import eliminate
 
 
+def estimated(A):
+    return condition(csr_array(A), lambda b: np.linalg.solve(A, b), lambda b: np.linalg.solve(A.T, b))
+
+
+def exactly(A):
+    return np.abs(np.abs(np.linalg.inv(A)) @ np.abs(A)).sum(axis=1).max()
+
+
 @pytest.mark.parametrize("m", [1, 2, 5, 30, 200])
-def test_the_estimate_is_a_close_lower_bound_of_the_largest_column_sum(m):
+def test_the_estimate_is_a_close_lower_bound_of_the_condition_number(m):
     rng = np.random.default_rng(m)
     for _ in range(20):
         A = rng.normal(size=(m, m)) * 10.0 ** rng.uniform(-3, 3, m)
-        exact = np.abs(A).sum(axis=0).max()
-        found = one_norm(lambda x, A=A: A @ x, lambda x, A=A: A.T @ x, m)
-        assert exact / 3 <= found <= exact * (1 + 1e-12)
+        assert exactly(A) / 3 <= estimated(A) <= exactly(A) * (1 + 1e-6)
 
 
 @pytest.mark.parametrize("size", [1.0, 1e-3, 1e3])
@@ -26,14 +32,12 @@ def test_condition_numbers_do_not_depend_on_the_scale_of_rows(size):
     rng = np.random.default_rng(3)
     A = rng.normal(size=(40, 40)) + 5 * np.eye(40)
     scaled = A * (size ** rng.uniform(-1, 1, 40))[:, None]
-    exact = np.abs(np.abs(np.linalg.inv(A)) @ np.abs(A)).sum(axis=1).max()
-    found = condition(csr_array(scaled), lambda b: np.linalg.solve(scaled, b), lambda b: np.linalg.solve(scaled.T, b))
-    assert exact / 3 <= found <= exact * (1 + 1e-6)
+    assert exactly(A) / 3 <= estimated(scaled) <= exactly(A) * (1 + 1e-6)
 
 
-def test_what_overflows_is_infinitely_ill_conditioned():
-    assert one_norm(lambda x: x * np.inf, lambda x: x * np.inf, 3) == np.inf
-    assert one_norm(lambda x: x * np.nan, lambda x: x * np.nan, 3) == np.inf
+def test_what_overflows_has_no_finite_condition():
+    for wrong in (np.inf, np.nan):
+        assert not np.isfinite(condition(csr_array(np.eye(3)), lambda x, w=wrong: x * w, lambda x, w=wrong: x * w))
 
 
 @pytest.mark.parametrize("parts", [1, 3])

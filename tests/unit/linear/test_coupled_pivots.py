@@ -35,10 +35,10 @@ def mass_equations(m, parts=3, seed=0):
 def test_coupled_equations_hold_and_forces_do_the_same_work(parts, nonsymmetric):
     B, nodes = mass_equations(80, parts)
     rng = np.random.default_rng(1)
-    c, u, r = rng.normal(size=B.shape[0]), rng.normal(size=B.shape[1]), rng.normal(size=B.shape[1])
+    c, u = rng.normal(size=B.shape[0]), rng.normal(size=B.shape[1])
     F = csr_array(B + 0.2 * mass_equations(80, parts, seed=5)[0]) if nonsymmetric else B
     found = eliminate(B, c, F if nonsymmetric else None, nodes, 3)
-    assert found.coupled is not None
+    assert found.coupled
     assert set(found.pivots // 3) <= set(range(80))  # each pivot is its node's own
     found.complete(u, found.offset)
     assert np.abs(B @ u - c).max() < 1e-12 * np.abs(u).max()
@@ -48,10 +48,6 @@ def test_coupled_equations_hold_and_forces_do_the_same_work(parts, nonsymmetric)
     assert found.multiplier(total[found.pivots]) == pytest.approx(multiplier, abs=1e-10)
     found.move_forces(total)
     assert np.abs(total).max() < 1e-12 * np.abs(multiplier).max()
-    before, forces = r.copy(), r[found.pivots]
-    found.move_forces(r)
-    found.restore_forces(r, forces)
-    assert r == pytest.approx(before, abs=1e-12)
 
 
 def test_sparse_weights_move_translations_exactly_and_stay_sparse():

@@ -32,7 +32,7 @@ def equations(directions, tilt, rng):
             pivots.append(node * SIZE + direction)
             rows.append(row.ravel())
     W = csr_array(np.array(rows))
-    return Elimination(np.array(pivots), W, np.zeros(len(pivots)), W, csr_array((0, 0)))
+    return Elimination(np.array(pivots), W, np.zeros(len(pivots)), W)
 
 
 def matrix(pivots, weights):
@@ -94,5 +94,5 @@ def test_unknowns_that_move_no_pivot_by_themselves_do_not_follow():
     W = elimination.weights.toarray()
     W[:, NODES[0] * SIZE + 2] = -0.1
     W = csr_array(W)
-    following = followers(Elimination(elimination.pivots, W, elimination.offset, W, elimination.inverse), NODES, SIZE)
+    following = followers(Elimination(elimination.pivots, W, elimination.offset, W), NODES, SIZE)
     assert NODES[0] * SIZE + 2 not in following.pivots

@@ -1,0 +1,77 @@
+"""Lemke's pivoting method for linear complementarity problems: slow, but finite where Newton's method does not converge."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fastcontact.arrays import Array, Indices
+
+# Pivots and differences of ratios that are smaller, relative to others, are none.
+ROUND_OFF = 1e-12
+
+
+def solved(M: Array, q: Array, most: int) -> tuple[Array | None, int]:
+    """Return z (n,) with ``w = M z + q, w >= 0, z >= 0, w.T z = 0`` by complementary pivots from a ray (Lemke, 1965).
+
+    They end with a solution if M is copositive, q not negative along the solutions of the problem without it, and no
+    basis degenerate (Cottle, Pang and Stone, 1992, theorem 4.4.13).
+
+    Parameters
+    ----------
+    M : ndarray (n, n)
+    q : ndarray (n,)
+    most : int
+        Pivots allowed.
+
+    Returns
+    -------
+    z : ndarray (n,) or None
+        None where the pivots end on a ray, or do not end.
+    count : int
+        Pivots made.
+    """
+    n, z = len(q), np.zeros(len(q))
+    if not (q < 0.0).any():
+        return z, 0
+    # Basic variables as functions of the others: w_i has the number i, z_i n + i, the artificial variable 2 n.
+    table = np.column_stack([M, np.ones(n), q])
+    basic, others = np.arange(n), np.arange(n, 2 * n + 1)
+    row, column = int(q.argmin()), n
+    for count in range(1, most + 1):
+        _exchange(table, row, column)
+        leaving = int(basic[row])
+        basic[row], others[column] = others[column], leaving
+        if leaving == 2 * n:
+            own = basic >= n
+            z[basic[own] - n] = np.maximum(table[own, -1], 0.0)
+            return z, count
+        column = int(np.flatnonzero(others == (leaving + n if leaving < n else leaving - n))[0])
+        blocking = _blocking(table, basic, column)
+        if blocking is None:
+            return None, count
+        row = blocking
+    return None, most
+
+
+def _exchange(table: Array, row: int, column: int) -> None:
+    """Exchange a basic variable with another one."""
+    at, factors = table[row, column], table[:, column].copy()
+    table[:, column], factors[row] = 0.0, 0.0
+    table[row] /= -at
+    table[row, column] = 1.0 / at
+    table += factors[:, None] * table[row]
+
+
+def _blocking(table: Array, basic: Indices, column: int) -> int | None:
+    """Return the row whose variable vanishes first as that of the column grows, None if none does.
+
+    Of equal ones that of the artificial variable, then that with the largest pivot.
+    """
+    slope = -table[:, column]
+    falling = np.flatnonzero(slope > ROUND_OFF * np.abs(slope).max())
+    if not len(falling):
+        return None
+    ratio = np.maximum(table[falling, -1], 0.0) / slope[falling]
+    first = falling[ratio <= ratio.min() * (1.0 + ROUND_OFF)]
+    artificial = first[basic[first] == 2 * len(basic)]
+    return int(artificial[0] if len(artificial) else first[slope[first].argmax()])
