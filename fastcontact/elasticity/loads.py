@@ -11,7 +11,7 @@ the load]; `Components` are values by the number of their axis.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
 from typing import Any, ClassVar, Protocol
@@ -23,8 +23,9 @@ from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.elasticity.symmetry_axis import axis_nodes
 from fastcontact.errors import ModelError, unknown
 from fastcontact.mesh import elements, quadrature
+from fastcontact.mesh.area_vectors import area_vectors
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.mesh.topology import outer_facets
+from fastcontact.mesh.topology import outer_facets, same_facets
 
 Table = tuple[tuple[float, float], ...]
 Value = float | Callable[[Array], Array]
@@ -56,6 +57,7 @@ class Load:
     CONSTANT: ClassVar[bool] = False  # values are numbers, not functions of position
     group: str
     components: Components
+    value: Value  # of loads that have no components
     ramp: Table | None
 
     @property
@@ -70,8 +72,8 @@ class Load:
 
     @property
     def values(self) -> list[Value]:
-        """Values of all components."""
-        return list(self.components.values())
+        """Values of all components, or the only value."""
+        return [self.value] if hasattr(self, "value") else list(self.components.values())
 
     def check(self, mesh: Mesh, kinematics: str) -> None:
         """Raise MeshError or ModelError if the load cannot act on this mesh."""
@@ -108,11 +110,6 @@ class Pressure(Load):
     group: str
     value: Value
     ramp: Table | None = None
-
-    @property
-    def values(self) -> list[Value]:
-        """The pressure alone."""
-        return [self.value]
 
     def _check_place(self, mesh: Mesh, kinematics: str) -> None:
         for element, block in facets_of(mesh, self.group).items():
@@ -161,35 +158,20 @@ class VolumeLoad(Load):
     @property
     def name(self) -> str:
         """As for other loads."""
-        where = ", ".join(f"'{group}'" for group in self.groups) if self.groups is not None else EVERYWHERE
-        return f"{self.KIND} on {where}"
+        return f"{self.KIND} on {listed(self.groups)}"
 
     @property
     def places(self) -> tuple[str, ...]:
         """Names of its groups."""
         return (EVERYWHERE,) if self.groups is None else self.groups
 
-    def rows(self, mesh: Mesh) -> Iterator[tuple[str, Indices]]:
-        """Yield each element and the numbers (n,) of the solid cells on which the load acts."""
-        if self.groups is None:
-            yield from ((element, np.arange(len(block))) for element, block in mesh.solids.items())
-            return
-        numbers = np.unique(np.concatenate([mesh.cell_groups[group] for group in self.groups]))
-        for element, rows in mesh.split(numbers).items():
-            if element in mesh.solids:
-                yield element, rows
-
     def cells(self, mesh: Mesh) -> Iterator[tuple[str, Numbers]]:
         """Yield each element and the solid cells (n_cells, n_nodes) on which the load acts."""
-        for element, rows in self.rows(mesh):
+        for element, rows in solid_rows(mesh, self.groups).items():
             yield element, mesh.cells[element][rows]
 
     def _check_place(self, mesh: Mesh, kinematics: str) -> None:
-        for group in self.groups or ():
-            if not mesh.cells_of(group, dim=mesh.dim):
-                raise ModelError(
-                    f"group '{group}' holds no solid cells: no {self.KIND.removeprefix('the ')} can act on it"
-                )
+        check_solids(mesh, self.groups, f": no {self.KIND.removeprefix('the ')} can act on it")
 
 
 @dataclass(frozen=True)
@@ -217,8 +199,7 @@ class NodalForce(Load):
     ramp: Table | None = None
 
     def _check_place(self, mesh: Mesh, kinematics: str) -> None:
-        if not len(mesh.points_of(self.group)):
-            raise ModelError(f"group '{self.group}' is empty: no force can act on it")
+        check_points(mesh, self.group, "no force can act on it")
         if kinematics == "axisymmetric" and 0 in self.components:
             on_axis = np.intersect1d(mesh.points_of(self.group), axis_nodes(mesh))
             if len(on_axis):
@@ -261,6 +242,39 @@ class TotalForce(Load):
             forces[:, axis] = shares[:, 0] * (value / area)
 
 
+def listed(groups: Sequence[str] | None) -> str:
+    """Return groups of solid cells in words, for messages; None stands for all."""
+    return EVERYWHERE if groups is None else ", ".join(f"'{group}'" for group in groups)
+
+
+def solid_rows(mesh: Mesh, groups: Sequence[str] | None) -> dict[str, Indices]:
+    """Return by element the numbers (n,) of the solid cells of groups, or of all."""
+    if groups is None:
+        return {name: np.arange(len(block)) for name, block in mesh.solids.items()}
+    rows = mesh.split(np.unique(np.concatenate([mesh.cell_groups[group] for group in groups])))
+    return {name: rows[name] for name in mesh.solids if name in rows}
+
+
+def solid_points(mesh: Mesh, groups: Sequence[str] | None) -> Indices:
+    """Return the points of the solid cells of groups, or of all, ascending."""
+    return np.unique(
+        np.concatenate([mesh.cells[name][rows].ravel() for name, rows in solid_rows(mesh, groups).items()])
+    )
+
+
+def check_solids(mesh: Mesh, groups: Sequence[str] | None, otherwise: str) -> None:
+    """Raise ModelError that ends with `otherwise` if one of the groups holds no solid cells."""
+    for group in groups or ():
+        if not mesh.cells_of(group, dim=mesh.dim):
+            raise ModelError(f"group '{group}' holds no solid cells{otherwise}")
+
+
+def check_points(mesh: Mesh, group: str, otherwise: str) -> None:
+    """Raise ModelError that ends with `otherwise` if a group holds no points."""
+    if not len(mesh.points_of(group)):
+        raise ModelError(f"group '{group}' is empty: {otherwise}")
+
+
 def facets_of(mesh: Mesh, group: str) -> dict[str, Numbers]:
     """Return the facets (n, n_nodes) of a group by element, each once, though it may stand in the mesh more often.
 
@@ -281,17 +295,15 @@ def outward(mesh: Mesh, group: str, element: str, block: Numbers) -> Numbers:
     ModelError if a facet does not lie on the outside of a solid.
     """
     outer = outer_facets(mesh).get(element, np.empty((0, block.shape[1]), np.int32))
-    keys = np.sort(np.vstack([outer, block]), axis=1)
-    _, first, index = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-    match = first[index.ravel()[len(outer) :]]
-    missing = np.flatnonzero(match >= len(outer))
+    rows = same_facets(outer, block)
+    missing = np.flatnonzero(rows < 0)
     if len(missing):
         where = mesh.points[block[missing[0]]].mean(axis=0)
         raise ModelError(
             f"{len(missing)} of {len(block)} facets of '{group}' do not lie on the outside of a solid (first near "
             f"{where}), so a pressure has no side to act from: use add_traction there"
         )
-    return np.ascontiguousarray(outer[match])
+    return np.ascontiguousarray(outer[rows])
 
 
 def evaluated(value: Value, points: Array, name: str) -> Array:
@@ -345,14 +357,12 @@ def axes_of(caption: str, components: Mapping[str, Any], dim: int) -> dict[int, 
     return {"xyz".index(name): value for name, value in given.items()}
 
 
-def _mapped(mesh: Mesh, element: str, cells: Numbers) -> tuple[Array, Array, Array, Array]:
-    """Return positions (c, q, dim), shape values (q, n), Jacobians (c, q, dim, cell dim) and weights (q,)."""
+def _places(mesh: Mesh, element: str, cells: Numbers) -> tuple[Array, Array, Array, Array]:
+    """Return positions (c, q, dim), shape values (q, n), their derivatives (q, n, cell dim) and weights (q,)."""
     reference = elements.get(element)
     xi, weights = quadrature.product_rule(reference.linear, _POINTS, _STRAIGHT)
-    N, dN = reference.shape(xi), reference.gradient(xi)
-    corners = mesh.points[cells]
-    x = np.einsum("qn,cnd->cqd", N, corners)
-    return x, N, np.einsum("qnk,cnd->cqdk", dN, corners), weights
+    N = reference.shape(xi)
+    return np.einsum("qn,cnd->cqd", N, mesh.points[cells]), N, reference.gradient(xi), weights
 
 
 def cell_points(mesh: Mesh, element: str, cells: Numbers, kinematics: str) -> tuple[Array, Array, Array]:
@@ -360,7 +370,8 @@ def cell_points(mesh: Mesh, element: str, cells: Numbers, kinematics: str) -> tu
 
     At the quadrature points of `cells` (c, n) of int of an element; in axisymmetry over the full circle.
     """
-    x, N, J, weights = _mapped(mesh, element, cells)
+    x, N, dN, weights = _places(mesh, element, cells)
+    J = np.einsum("qnk,cnd->cqdk", dN, mesh.points[cells])
     return x, N, _turned(np.linalg.det(J) * weights, x, kinematics)
 
 
@@ -369,11 +380,8 @@ def facet_points(mesh: Mesh, element: str, facets: Numbers, kinematics: str) -> 
 
     At the quadrature points of `facets` (f, n) of int of an element; in axisymmetry over the full circle.
     """
-    x, N, J, weights = _mapped(mesh, element, facets)
-    if mesh.dim == 2:
-        normal = np.stack([J[:, :, 1, 0], -J[:, :, 0, 0]], axis=2)
-    else:
-        normal = np.cross(J[:, :, :, 0], J[:, :, :, 1])
+    x, N, dN, weights = _places(mesh, element, facets)
+    normal = area_vectors(mesh.points[facets], dN)
     return x, N, _turned(normal * weights[:, None], x, kinematics)
 
 
