@@ -15,7 +15,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from fastcontact._tools.argument_types import typed
-from fastcontact.arrays import Array, Numbers
+from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements, topology_kernels
 from fastcontact.mesh.mesh import Mesh
