@@ -18,7 +18,7 @@ from fastcontact.contact.cohesion import Bond
 
 # What a restart stores of each contact pair, and of numbers: key and attribute.
 OF_PAIRS = {
-    "closed": "never_opening", "now": "obstacles", "first_contact": "first_contact", "traction": "traction",
+    "closed": "never_opening", "now": "obstacles", "first_contact": "first_contact", "elastic_slip": "elastic_slip",
     "angle": "angles", "slipped": "slipped", "worn": "worn",
 }  # fmt: skip
 NUMBERS = {"largest_force": "largest_force", "largest_work": "largest_rigid_force", "round_off": "gap_round_off"}
@@ -49,9 +49,9 @@ class State:
         By contact pair, the slip of its secondary nodes so far [length].
     never_opening : dict of str to (ndarray (m, dim), ndarray of bool (m,))
         By contact pair that is bilateral once closed, places of constraints [length] and which of them are closed for good.
-    traction : dict of str to (ndarray (m, dim), ndarray (m, dim))
-        By contact pair that slips a little before it slides, places of constraints [length] and the tangential tractions
-        there [pressure].
+    elastic_slip : dict of str to (ndarray (m, dim), ndarray (m, dim))
+        By contact pair whose sticking constraints have a compliance of their own, places of constraints and the slips by
+        which they give way to the present forces [length].
     first_contact : dict of str to (ndarray (dim,), ndarray (dim,))
         By contact pair in space, where the bodies met first [length] and the normal there [-].
     bonds : dict of str to Bond
@@ -97,7 +97,7 @@ class State:
     slipped: Mapping[str, Array] = field(default_factory=dict)
     never_opening: Mapping[str, tuple[Array, Mask]] = field(default_factory=dict)
     first_contact: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
-    traction: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
+    elastic_slip: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
     bonds: Mapping[str, Bond] = field(default_factory=dict)
     locked: Mapping[str, Any] = field(default_factory=dict)
     extrapolation: Extrapolation = field(default_factory=Extrapolation)
