@@ -7,7 +7,7 @@ digits, so that an analysis that continues repeats an uninterrupted one bit for 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
@@ -17,6 +17,7 @@ from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
+from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 from fastcontact.model.fingerprint import different, fingerprint, formulation_behind
 from fastcontact.model.model import Model
@@ -86,9 +87,20 @@ def put_back(problem: Problem, step: StepResult, touched: frozenset[str]) -> Sta
         if kept["solver"]["kind"] == _kind(problem.solver):
             problem.solver.put_back(kept["solver"]["memory"])
         state = State.from_dict(kept, step.displacement, touched)
+        state = replace(state, elastic_slip={**state.elastic_slip, **_of_tractions(problem, kept["pairs"])})
     if not _extrapolates(problem):
         state = replace(state, extrapolation=Extrapolation())
     return replace(state, solver=problem.solver.snapshot())
+
+
+def _of_tractions(problem: Problem, pairs: Mapping[str, Any]) -> dict[str, tuple[Array, Array]]:
+    """Return the elastic slips [length] by pair of files that hold tangential tractions instead, of pairs with a penalty."""
+    slips = {}
+    for name, (positions, traction) in ((name, kept["traction"]) for name, kept in pairs.items() if kept.get("traction")):
+        stiffness = problem.pairs[name].options.tangential_penalty
+        assert stiffness is not None
+        slips[name] = positions, traction / stiffness(positions)[:, None]
+    return slips
 
 
 @contextmanager

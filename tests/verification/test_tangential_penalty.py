@@ -161,3 +161,15 @@ def test_multigrid_agrees():
     model = sheared("node_to_segment", 0.004, dim=3)
     one, other = solved(model)[2], solved(model, linear_solver="amg", linear_tolerance=1e-12)[2]
     np.testing.assert_allclose(other.displacement, one.displacement, atol=1e-9 * PRESS)
+
+
+def test_tractions_of_earlier_files_continue_as_slips():
+    """Restart data of earlier versions hold the tangential tractions in place of the elastic slips."""
+    model = sheared("node_to_segment", 0.02)
+    whole = solved(model)
+    begun = solved(model, (1.0, 2.0))
+    pair = begun[-1].restart["pairs"]["pair"]
+    positions, slips = pair.pop("elastic_slip")
+    pair["traction"] = [positions, slips * STIFFNESS]
+    resumed = solved(model, resume=begun)
+    assert abs(resumed[-1].displacement - whole[-1].displacement).max() < 1e-12
