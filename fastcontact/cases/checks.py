@@ -57,6 +57,11 @@ def _at_surface(field: str) -> Callable[[StepResult, int], float]:
     return value
 
 
+def _entry(vector: Callable[..., Any], index: int) -> Callable[..., Any]:
+    """Return what gives an entry of what another function returns."""
+    return lambda *of: vector(*of)[index]
+
+
 # Quantities of a contact pair: the kind of their unit, and what gives them at a step, from the pair; None for none.
 OF_PAIRS: dict[str, tuple[str, Callable[[ContactResult], Any]]] = {
     "force": ("force", lambda contact: np.linalg.norm(contact.force)),
@@ -66,9 +71,8 @@ OF_PAIRS: dict[str, tuple[str, Callable[[ContactResult], Any]]] = {
     "torque": ("moment", lambda contact: contact.torque),
     "wear_max": ("length", lambda contact: None if contact.wear is None else contact.wear.max(initial=0.0)),
     "heat": ("power", lambda contact: None),  # which the step has
-    **{f"force.{a}": ("force", lambda contact, i=i: contact.force[i]) for a, i in _AXES.items()},
-    **{f"moment.{a}": ("moment", lambda contact, i=i: contact_moment(contact)[i * (len(contact.force) == 3)])
-       for a, i in _AXES.items()},
+    **{f"force.{axis}": ("force", _entry(lambda contact: contact.force, i)) for axis, i in _AXES.items()},
+    **{f"moment.{axis}": ("moment", _entry(contact_moment, i)) for axis, i in {**_AXES, "z": -1}.items()},
 }  # fmt: skip
 # The same of a probe, from the step and the point.
 OF_PROBES: dict[str, tuple[str, Callable[[StepResult, int], Any]]] = {
@@ -77,8 +81,8 @@ OF_PROBES: dict[str, tuple[str, Callable[[StepResult, int], Any]]] = {
     "von_mises": ("pressure", lambda step, point: step.von_mises[point]),
     "temperature": (
         "temperature", lambda step, point: None if step.temperature is None else step.temperature[point]),
-    **{f"stress.{c}": ("pressure", lambda step, point, i=i: step.stress[point][i]) for c, i in STRESS.items()},
-    **{f"displacement.{a}": ("length", lambda step, point, i=i: step.displacement[point][i]) for a, i in _AXES.items()},
+    **{f"stress.{c}": ("pressure", _entry(lambda step, point: step.stress[point], i)) for c, i in STRESS.items()},
+    **{f"displacement.{a}": ("length", _entry(lambda step, point: step.displacement[point], i)) for a, i in _AXES.items()},
 }  # fmt: skip
 
 

@@ -9,7 +9,7 @@ import os
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from fastcontact.cli._outputs import check_outputs, profile_picture, write_json
 from fastcontact.cli._terminal import say, somebody_watches
@@ -71,8 +71,8 @@ def run(options: argparse.Namespace) -> int:
         case.model.check(case.ramp)  # a wrong model must not replace the results of a right one
     with warnings_shown() as caught:
         caught += early
-        done, last, steps = _solved(options, case, output)
-    texts = list(dict.fromkeys([*done.warnings, *caught]))
+        n_done, earlier, last, steps = _solved(options, case, output)
+    texts = list(dict.fromkeys([*earlier, *caught]))
     computed = _modes(options, case, last)
     timings = {"read": read - started, "solve": time.perf_counter() - read, "cpu": time.process_time()}
     numbers = summary.summarise(case, last, steps, timings, texts, computed)
@@ -86,7 +86,7 @@ def run(options: argparse.Namespace) -> int:
     if not options.quiet:
         say("\n".join(summary.lines(numbers)))
         others = [path for path in (options.json, options.plot, options.modes) if path]
-        say(f"  {_written(output, len(done.summaries), len(steps), others)}")
+        say(f"  {_written(output, n_done, len(steps), others)}")
     failed = [check["name"] for check in numbers["checks"] if not check["passed"]]
     if options.strict and failed:
         say(f"{len(failed)} of {len(numbers['checks'])} checks of the case failed: {', '.join(failed)}", error=True)
@@ -132,26 +132,8 @@ def _diameters(text: str | None) -> dict[str, Any]:
         raise CaseError(f"--nodal-diameters {text}: write whole numbers with commas between them, or all") from None
 
 
-class _Done(NamedTuple):
-    """What is kept of the steps that were there before: a summary of each, and their warnings."""
-
-    summaries: list[dict[str, Any]]
-    warnings: list[str]
-
-
-def _done(steps: Sequence[StepResult]) -> _Done:
-    """Read each step once: they may be many and large."""
-    from fastcontact.cases.summary import of_step
-
-    done = _Done([], [])
-    for step in steps:
-        done.summaries.append(of_step(step))
-        done.warnings.extend(text for text in step.warnings if text not in done.warnings)
-    return done
-
-
-def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[_Done, Any, list[dict[str, Any]]]:
-    """Write all steps; return what is kept of those that were there before, the last one, and the summaries of all."""
+def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[int, list[str], Any, list[dict[str, Any]]]:
+    """Write all steps; return how many were there before, their warnings, the last one, and the summaries of all."""
     from fastcontact.analysis.progress import Progress
     from fastcontact.analysis.restart import remaining
     from fastcontact.analysis.run import solve_steps
@@ -163,8 +145,9 @@ def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[_Don
         output, case.model, case_text=case.text, cell_fields=fields, resume=options.resume, background=large
     ) as writer:
         _check_same(case, writer.done, output)
-        last, done = writer.done[-1] if writer.done else None, _done(writer.done)
-        steps = list(done.summaries)
+        last = writer.done[-1] if writer.done else None
+        done = [(of_step(step), step.warnings) for step in writer.done]  # each is read once: they may be many and large
+        steps = [summary for summary, _ in done]
         _tell_other_steps(case, [summary["load_factor"] for summary in steps], output)
         total = len(steps) + len(remaining(case.ramp, last))
         progress = Progress(total, show=somebody_watches() and not options.quiet, done=len(steps))
@@ -187,7 +170,7 @@ def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[_Don
             raise
         finally:
             progress.close()
-    return done, last, steps
+    return len(done), list(dict.fromkeys(text for _, texts in done for text in texts)), last, steps
 
 
 def _stopped(error: BaseException, writer: ResultWriter, output: Path, summary: str | None) -> None:

@@ -43,10 +43,7 @@ def triangle_3() -> Rule:
 
 def triangle_6() -> Rule:
     """Six interior points, exact to degree 4 (Dunavant, 1985)."""
-    a, b = 0.445948490915965, 0.091576213509771
-    wa, wb = 0.223381589678011 / 2.0, 0.109951743655322 / 2.0
-    points = [[a, a], [1 - 2 * a, a], [a, 1 - 2 * a], [b, b], [1 - 2 * b, b], [b, 1 - 2 * b]]
-    return np.array(points), np.array([wa, wa, wa, wb, wb, wb])
+    return _symmetric([], [(0.223381589678011, 0.445948490915965), (0.109951743655322, 0.091576213509771)], [])
 
 
 def triangle_3_sides() -> Rule:
@@ -56,13 +53,8 @@ def triangle_3_sides() -> Rule:
 
 def triangle_7() -> Rule:
     """Seven interior points, exact to degree 5 (Radon, 1948)."""
-    root = np.sqrt(15.0)
-    points, weights = [[1.0 / 3.0, 1.0 / 3.0]], [9.0 / 80.0]
-    for sign in (1.0, -1.0):
-        a = (6.0 + sign * root) / 21.0
-        points += [[a, a], [1 - 2 * a, a], [a, 1 - 2 * a]]
-        weights += [(155.0 + sign * root) / 2400.0] * 3
-    return np.array(points), np.array(weights)
+    roots = np.sqrt(15.0) * np.array([1.0, -1.0])
+    return _symmetric([9.0 / 40.0], [((155.0 + root) / 1200.0, (6.0 + root) / 21.0) for root in roots], [])
 
 
 def triangle_12() -> Rule:

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import os
-from typing import Any
-from xml.etree import ElementTree
+from collections.abc import Iterable, Iterator, Mapping
+from xml.sax.saxutils import escape, quoteattr
 
 from fastcontact._tools.paths import PathLike, checked_target, replacing
+from fastcontact.arrays import AnyArray
 from fastcontact.errors import FileError
 from fastcontact.results import layout
 from fastcontact.results.reader import open_results
 from fastcontact.results.tables import STRESS_COMPONENTS
 
-Node = ElementTree.Element
+HEAD = """<?xml version="1.0" encoding="utf-8"?>
+<Xdmf Version="2.0"><Domain>
+<Grid Name="steps" GridType="Collection" CollectionType="Temporal">"""
+TAIL = "</Grid></Domain></Xdmf>\n"
 
 
 def write_xdmf(result_path: PathLike, xdmf_path: PathLike) -> None:
@@ -46,78 +50,60 @@ def write_xdmf(result_path: PathLike, xdmf_path: PathLike) -> None:
     reference = os.path.relpath(os.path.realpath(os.fspath(result_path)), target.parent)
     if ":" in reference or not reference.isascii():
         raise FileError(f"XDMF readers find no '{reference}': name it without colons and with ASCII letters only")
-    sizes = {"points": mesh.n_points, "topology": len(topology), "cells": sum(map(len, mesh.solids.values()))}
-    static = {
-        "Node": {name: values.dtype for name, values in layout.point_flags(mesh).items()},
-        "Cell": {name: values.dtype for name, values in layout.cell_fields(mesh).items()},
-    }
-    document = _document(reference, load_factors, fields, sizes, static)
-    ElementTree.indent(document)
-    with replacing(target) as temporary, open(temporary, "w", encoding="utf-8") as file:
-        file.write('<?xml version="1.0" encoding="utf-8"?>\n')
-        file.write(ElementTree.tostring(document, encoding="unicode") + "\n")
-
-
-def _document(
-    reference: str, load_factors: list[float], fields: list[str], sizes: dict[str, int],
-    static: dict[str, dict[str, Any]],
-) -> Node:  # fmt: skip
-    root = Node("Xdmf", Version="2.0")
-    domain = ElementTree.SubElement(root, "Domain")
-    collection = _child(domain, "Grid", Name="steps", GridType="Collection", CollectionType="Temporal")
+    n_points, n_cells, n_steps = mesh.n_points, sum(map(len, mesh.solids.values())), len(load_factors)
+    shape = [
+        f'<Topology TopologyType="Mixed" NumberOfElements="{n_cells}">',
+        _data(f"{reference}:/fastcontact/mesh/xdmf_topology", (len(topology),), "Int", 4),
+        '</Topology><Geometry GeometryType="XYZ">',
+        _data(f"{reference}:/VTKHDF/Points", (n_points, 3)),
+        "</Geometry>",
+    ]
+    static = [*_static(reference, "Node", "PointData", layout.point_flags(mesh))]
+    static += _static(reference, "Cell", "CellData", layout.cell_fields(mesh))
+    grids = []
     for number, load_factor in enumerate(load_factors):
-        grid = _child(collection, "Grid", Name=f"step {number + 1}", GridType="Uniform")
-        _child(grid, "Time", Value=repr(load_factor))
-        _geometry(grid, reference, sizes)
+        grids += [f'<Grid Name="step {number + 1}" GridType="Uniform"><Time Value="{load_factor!r}"/>', *shape]
         for field in fields:
-            _field(grid, f"{reference}:/VTKHDF/PointData/{field}", sizes["points"], number, len(load_factors))
-        for center, arrays in static.items():
-            count = sizes["points"] if center == "Node" else sizes["cells"]
-            group = "PointData" if center == "Node" else "CellData"
-            for name, dtype in arrays.items():
-                attribute = _child(grid, "Attribute", Name=name, AttributeType="Scalar", Center=center)
-                kind = "Char" if dtype.itemsize == 1 else "Int"
-                _hdf(attribute, f"{reference}:/VTKHDF/{group}/{name}", str(count), kind, dtype.itemsize)
-    return root
+            grids += _field(f"{reference}:/VTKHDF/PointData/{field}", n_points, number, n_steps)
+        grids += [*static, "</Grid>"]
+    with replacing(target) as temporary:
+        temporary.write_text("\n".join([HEAD, *grids, TAIL]), encoding="utf-8")
 
 
-def _child(parent: Node, tag: str, **attributes: str) -> Node:
-    return ElementTree.SubElement(parent, tag, attributes)
+def _words(numbers: Iterable[int]) -> str:
+    return " ".join(map(str, numbers))
 
 
-def _hdf(parent: Node, address: str, dimensions: str, kind: str, precision: int) -> None:
-    item = _child(parent, "DataItem", Format="HDF", Dimensions=dimensions, NumberType=kind, Precision=str(precision))
-    item.text = address
+def _data(address: str, shape: Iterable[int], kind: str = "Float", precision: int = 8) -> str:
+    """Return an item that refers to a data set."""
+    form = f'Dimensions="{_words(shape)}" NumberType="{kind}" Precision="{precision}"'
+    return f'<DataItem Format="HDF" {form}>{escape(address)}</DataItem>'
 
 
-def _geometry(grid: Node, reference: str, sizes: dict[str, int]) -> None:
-    topology = _child(grid, "Topology", TopologyType="Mixed", NumberOfElements=str(sizes["cells"]))
-    _hdf(topology, f"{reference}:/fastcontact/mesh/xdmf_topology", str(sizes["topology"]), "Int", 4)
-    geometry = _child(grid, "Geometry", GeometryType="XYZ")
-    _hdf(geometry, f"{reference}:/VTKHDF/Points", f"{sizes['points']} 3", "Float", 8)
+def _attribute(name: str, kind: str, center: str, item: str) -> str:
+    return f'<Attribute Name={quoteattr(name)} AttributeType="{kind}" Center="{center}">{item}</Attribute>'
 
 
-def _field(grid: Node, address: str, n_points: int, number: int, n_steps: int) -> None:
+def _static(reference: str, center: str, group: str, arrays: Mapping[str, AnyArray]) -> Iterator[str]:
+    """Yield the arrays that are the same in all steps."""
+    for name, values in arrays.items():
+        address, kind = f"{reference}:/VTKHDF/{group}/{name}", "Char" if values.itemsize == 1 else "Int"
+        yield _attribute(name, "Scalar", center, _data(address, values.shape, kind, values.itemsize))
+
+
+def _field(address: str, n_points: int, number: int, n_steps: int) -> Iterator[str]:
+    """Yield a field at the points in one step: parts of the data set of all steps."""
     name = address.rpartition("/")[2]
-    width, rows = {**layout.POINT_FIELDS, **layout.HEAT_FIELDS}[name], n_points * n_steps
-    parts = [(name, 0, width)]  # label, first column and number of columns of each field
+    width = {**layout.POINT_FIELDS, **layout.HEAT_FIELDS}[name]
+    parts = [(name, 0, width)]  # label, first column and number of columns of each
     if name == "stress":  # XDMF orders the components of a symmetric tensor otherwise than VTK: each is a field
         parts = [(f"stress_{component}", column, 1) for column, component in enumerate(STRESS_COMPONENTS)]
+    dims = 1 if width == 1 else 2
     for label, column, count in parts:
-        kind = "Vector" if count == 3 else "Scalar"
-        attribute = _child(grid, "Attribute", Name=label, AttributeType=kind, Center="Node")
-        shape, selection = (rows, width), ((number * n_points, column), (1, 1), (n_points, count))
-        dims = 1 if width == 1 else 2
-        _hyperslab(attribute, address, shape[:dims], tuple(row[:dims] for row in selection))
-
-
-def _hyperslab(parent: Node, address: str, shape: tuple[int, ...], selection: tuple[tuple[int, ...], ...]) -> None:
-    """Refer to a part of a data set: where it starts, its stride, its size."""
-    item = _child(parent, "DataItem", ItemType="HyperSlab", Dimensions=_words(selection[2]), Type="HyperSlab")
-    part = _child(item, "DataItem", Format="XML", Dimensions=f"3 {len(shape)}")
-    part.text = " ".join(_words(row) for row in selection)
-    _hdf(item, address, _words(shape), "Float", 8)
-
-
-def _words(numbers: tuple[int, ...]) -> str:
-    return " ".join(map(str, numbers))
+        start, size = (number * n_points, column)[:dims], (n_points, count)[:dims]
+        selection = f'<DataItem Format="XML" Dimensions="3 {dims}">{_words((*start, *[1] * dims, *size))}</DataItem>'
+        whole = _data(address, (n_points * n_steps, width)[:dims])
+        item = (
+            f'<DataItem ItemType="HyperSlab" Dimensions="{_words(size)}" Type="HyperSlab">{selection}{whole}</DataItem>'
+        )
+        yield _attribute(label, "Vector" if count == 3 else "Scalar", "Node", item)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -90,14 +89,16 @@ def adaptive_study(
     member = one_combination(chosen, element, formulation)
     forest, curves = _first_mesh(case, chosen, member)
     rounds: list[Round] = []
-    with _telling(on_round, progress) as tell:
+    with StatusLine(80, progress) as line:
         while True:
             started = time.perf_counter()
             linear, leaf = forest.mesh()
             solved = _case_on(linear, curves, case, chosen, member)
             last, error, this = _solved(solved, quantity, chosen.pair, rounds, started)
             rounds.append(this)
-            tell(this)
+            if on_round is not None:
+                on_round(this)
+            line.draw(f"{this.n_dofs} degrees of freedom, estimated error {this.estimate:.1e}")
             reached = this.estimate <= tolerance
             if reached or len(rounds) == max_rounds or this.n_dofs > 0.6 * max_dofs:
                 break
@@ -105,19 +106,6 @@ def adaptive_study(
     return AdaptiveStudy(
         **of_case(case), combination=str(member), quantity=quantity, tolerance=tolerance, reached=reached, rounds=rounds,
         case=solved, last=last, error=error)  # fmt: skip
-
-
-@contextmanager
-def _telling(on_round: Callable[[Round], None] | None, progress: bool) -> Iterator[Callable[[Round], None]]:
-    """Give a function that tells of a round whoever asked for it."""
-    with StatusLine(80, progress) as line:
-
-        def tell(this: Round) -> None:
-            if on_round is not None:
-                on_round(this)
-            line.draw(f"{this.n_dofs} degrees of freedom, estimated error {this.estimate:.1e}")
-
-        yield tell
 
 
 def _checked(case: Case | str | Path, tolerance: float) -> Case:

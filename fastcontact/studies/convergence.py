@@ -99,13 +99,8 @@ def convergence_study(
     >>> study = fc.convergence_study(squeezed, [0.5, 0.25, 0.125], quantities=bulge)  # doctest: +SKIP
     >>> study.best.limits["bulge"].value, study.best.limits["bulge"].uncertainty  # doctest: +SKIP
     """
-    options = {
-        "executor": executor,
-        "workers": workers,
-        "store": store,
-        "on_progress": on_progress,
-        "progress": progress,
-    }
+    options: dict[str, Any] = {"executor": executor, "workers": workers, "store": store}
+    options |= {"on_progress": on_progress, "progress": progress}
     if callable(case):
         functions.refuse({"elements": elements, "formulations": formulations})
         return _of_function(case, levels, quantities, options)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from itertools import zip_longest
@@ -115,11 +116,12 @@ class Study(Report):
     def figure(self) -> Any:
         """Return a matplotlib figure: errors, pressure over the radius, differences from theory."""
         of_case = not isinstance(self.best.combination, Named)
-        drawn = [partial(self._draw_errors, quantity=name) for name in self._drawn()]
+        of_all: dict[str, Any] = {"all_series": self.series, "units": self.units}
+        drawn: list[Callable[[Any], None]] = [partial(draw_errors, quantity=name, **of_all) for name in self._drawn()]
         if of_case or self.best.finest.profile:
             drawn.append(partial(draw_pressure, series=self.best, theory=self.theory, units=self.units))
         if of_case:
-            drawn.append(partial(self._draw_differences, quantity="pressure_max"))
+            drawn.append(partial(draw_differences, best=self.best, quantity="pressure_max", **of_all))
         rows, columns = (len(drawn) + 1) // 2, min(2, len(drawn))
         axes = panels(rows, columns, (6.0 * columns, 4.6 * rows), self.title)
         for ax, draw in zip_longest(axes.flat, drawn, fillvalue=partial(message, text="")):
@@ -130,9 +132,3 @@ class Study(Report):
         """Return the quantities whose errors are drawn."""
         known = self.best.shown(COMPARED) or list(self.best.quantities[:2])
         return known if isinstance(self.best.combination, Named) else list(COMPARED)
-
-    def _draw_errors(self, ax: Any, quantity: str) -> None:
-        draw_errors(ax, self.series, quantity, self.units)
-
-    def _draw_differences(self, ax: Any, quantity: str) -> None:
-        draw_differences(ax, self.series, self.best, quantity, self.units)

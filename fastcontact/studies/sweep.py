@@ -93,13 +93,8 @@ def parameter_sweep(
     >>> [round(point.values["force"], 6) for point in sweep.points]
     [1.0, 1.098901]
     """
-    options = {
-        "executor": executor,
-        "workers": workers,
-        "store": store,
-        "on_progress": on_progress,
-        "progress": progress,
-    }
+    options: dict[str, Any] = {"executor": executor, "workers": workers, "store": store}
+    options |= {"on_progress": on_progress, "progress": progress}
     if callable(case):
         functions.refuse({"element": element, "formulation": formulation, "level": level})
         return _of_function(case, parameters, quantities, options)
