@@ -1,10 +1,9 @@
 """Choice of the pivot of each constraint, and the inverse of the pivot columns.
 
-Groups of equations, each equation by itself or those of a node together, take unknowns that no other group has, or no group
-of a later layer (`of_groups`). Where there are too few, the equations of a node take large enough entries in that node's
-unknowns (`of_nodes`), or what is left over is assigned (`of_most_groups`, `assigned`). The columns of the pivots are inverted
-in small blocks, independent or in layers, or, where equations of many nodes share unknowns otherwise, factorised
-(`coupled_pivots`).
+The equations of a node together, or each by itself, take unknowns that no others have, or none of a later layer
+(`of_groups`). Where there are too few, the equations of a node take large enough entries in that node's unknowns (`of_nodes`),
+or what is left over is assigned (`of_most_groups`, `assigned`). The columns of the pivots are inverted in small blocks,
+independent or in layers, or, where equations of many nodes share unknowns otherwise, factorised (`coupled_pivots`).
 """
 
 from __future__ import annotations
@@ -63,15 +62,12 @@ def chosen(B: csr_array, nodes: Indices | None = None, size: int = 1) -> tuple[I
 
 def _chosen(B: csr_array, nodes: Indices | None, size: int) -> Indices:
     """Return the pivot of every equation (m,), see `chosen`."""
-    alone = np.arange(B.shape[0])
-    by_node = [] if nodes is None else [nodes]
-    for layers in (1, MOST_LAYERS):
-        for groups in (alone, *by_node):
-            if (pivots := of_groups(B, groups, layers)) is not None:
-                return pivots
-    for owners in by_node:
-        if (pivots := of_nodes(B, owners, size)) is not None or (pivots := of_most_groups(B, owners)) is not None:
-            return pivots
+    if (pivots := of_groups(B, np.arange(B.shape[0]) if nodes is None else nodes)) is not None:
+        return pivots
+    if nodes is not None and (pivots := of_nodes(B, nodes, size)) is not None:
+        return pivots
+    if nodes is not None and (pivots := of_most_groups(B, nodes)) is not None:
+        return pivots
     return assigned(B)
 
 
