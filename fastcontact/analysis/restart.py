@@ -23,12 +23,11 @@ from fastcontact.model.fingerprint import different, fingerprint, formulation_be
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, table_value
 from fastcontact.results.step import StepResult
+from fastcontact.round_off import ROUND_OFF
 
 FORMAT = 1
 # Criteria that an answer depends on; others are limits and tolerances.
 ANSWER = ("geometry_updates", "keep_pairing")
-# Instants that differ by less than this part of their size are one.
-SAME_INSTANT = 1e-12
 
 
 def identity(model: Model, ramp: Ramp, criteria: Criteria) -> dict[str, Any]:
@@ -125,7 +124,7 @@ def remaining(ramp: Ramp, last: StepResult | None) -> list[float]:
     if last is None:
         return list(ramp.instants)
     end = last.load_factor
-    return [t for t in ramp.instants if t > end and abs(t - end) > SAME_INSTANT * max(abs(t), abs(end))]
+    return [t for t in ramp.instants if t > end and abs(t - end) > ROUND_OFF * max(abs(t), abs(end))]
 
 
 def _history(table: Sequence[Sequence[float]], end: float, other: Sequence[Sequence[float]]) -> list[float]:

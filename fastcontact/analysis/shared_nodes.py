@@ -24,9 +24,8 @@ from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints, StackedConstraints
 from fastcontact.model.periodicity import PeriodicInterface
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# Entries of rows [-] that differ by less are the same.
-SAME = 1e-9
 # Gaps that differ by less than this part of the coordinates are the same.
 SAME_GAP = 64 * float(np.finfo(float).eps)
 
@@ -246,7 +245,7 @@ def _alike(constraints: StackedConstraints) -> tuple[Indices, Indices, Indices]:
     first, second = _of_one_node(constraints)
     if not len(first):
         return first, first, first
-    alike = _apart(constraints.B, first, second) <= SAME
+    alike = _apart(constraints.B, first, second) <= LENGTH_ROUND_OFF
     if constraints.equality is not None:
         alike &= ~(constraints.equality[first] | constraints.equality[second])
     first, second = first[alike], second[alike]

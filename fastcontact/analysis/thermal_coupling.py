@@ -27,13 +27,12 @@ from fastcontact.contact.constraints import Constraints
 from fastcontact.errors import ConvergenceError
 from fastcontact.model.parts.heat import HEAT_FLUX
 from fastcontact.results.step import StepResult
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 Equilibrium = tuple[SettledContact | None, Array, Balance]
 Solve = Callable[[StepLoad, SettledContact | None], Equilibrium]
 # Exchanges after which heat and contact have no common solution that this finds, and temperatures that are mixed.
 MOST_EXCHANGES, MIXED = 60, 8
-# Sides that are nearer to each other than this touch, in sizes of the model: gaps of bodies at rest scatter by round-off.
-TOUCHING = 1e-9
 # Linear solutions leave temperatures to this many times their tolerance.
 SETTLED = 10.0
 
@@ -173,7 +172,7 @@ def _pressed(
 ) -> tuple[Constraints, Array, Array]:
     """Return the places where a pair touches, normal forces (m,) there [force] and gaps (m,), zero where it does [length]."""
     pair, constraints, solution = problem.pairs[name], settled.constraints.parts[name], settled.solution
-    touching = TOUCHING * float(np.ptp(pair.points, axis=0).max())
+    touching = LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max())
     forces = np.maximum(constraints.normal_forces(solution.multiplier[rows]), 0.0)
     if pair.options.tied:
         return pair.unilateral(Configuration.undeformed(pair.points)), forces, np.zeros(len(forces))

@@ -26,6 +26,7 @@ from fastcontact.elasticity.energy import cell_volumes
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.mesh import elements
 from fastcontact.model.model import Model
+from fastcontact.round_off import ROUND_OFF
 
 # The excess of stiffness that is worth a warning, and the number of conjugate gradients.
 EXCESS, ITERATIONS = 0.05, 5
@@ -124,7 +125,7 @@ def excess_of_stiffness(problem: Problem, u: Array, comparison: Comparison) -> f
     for _ in range(ITERATIONS):
         step = problem.solver.load(residual).full_solution(zero)
         slope = float(residual @ step)
-        if not slope > 1e-12 * energy:
+        if not slope > ROUND_OFF * energy:
             break
         direction = step + (slope / before if before else 0.0) * direction
         moved = system.displacement(direction, still)

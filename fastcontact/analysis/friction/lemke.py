@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fastcontact.arrays import Array, Indices
-
-# Pivots and differences of ratios that are smaller, relative to others, are none.
-ROUND_OFF = 1e-12
+from fastcontact.round_off import ROUND_OFF
 
 
 def solved(M: Array, q: Array, most: int) -> tuple[Array | None, int]:

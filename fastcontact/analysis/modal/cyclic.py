@@ -20,6 +20,7 @@ from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.errors import ModelError
 from fastcontact.model.model import Model
 from fastcontact.model.periodicity import PeriodicInterface, turned_rows
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,9 +80,9 @@ class Sectors:
 def _sense(interface: PeriodicInterface, turn: Array) -> int:
     """Return 1 where an interface turns as `turn` (dim, dim) does, -1 where it turns back, 0 where it does neither."""
     assert interface.turn is not None
-    if np.allclose(interface.turn, turn, atol=1e-9):
+    if np.allclose(interface.turn, turn, atol=LENGTH_ROUND_OFF):
         return 1
-    return -1 if np.allclose(interface.turn, turn.T, atol=1e-9) else 0
+    return -1 if np.allclose(interface.turn, turn.T, atol=LENGTH_ROUND_OFF) else 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,7 +220,8 @@ def pairs_of(vectors: Array, K: bsr_array, M: bsr_array, n: int) -> tuple[Array,
     Z = _complex(vectors)
     stiff, heavy = (Z.conj().T @ _complex(matrix @ vectors) for matrix in (K, M))
     weight, basis = np.linalg.eigh(heavy)
-    basis = basis[:, weight > 1e-8 * weight.max()] / np.sqrt(weight[weight > 1e-8 * weight.max()])
+    there = weight > 1e-8 * weight.max()
+    basis = basis[:, there] / np.sqrt(weight[there])
     values, own = np.linalg.eigh(basis.conj().T @ stiff @ basis)
     found = Z @ (basis @ own[:, :n])
     largest = found[np.abs(found).argmax(axis=0), np.arange(found.shape[1])]

@@ -10,9 +10,7 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.constrained_system import System, diagonal_of, supports_apart
 from fastcontact.linear.elimination.coupled_pivots import RepeatedError
 from fastcontact.linear.elimination.elimination import eliminate
-
-# Rows that others make up but for this part of them repeat them.
-REPEATED = 1e-9
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
 class Reduced:
@@ -74,7 +72,7 @@ def _eliminated(rows: csr_array, nodes: Indices, size: int) -> tuple[Indices, cs
 def _independent(rows: csr_array) -> tuple[Indices, csr_array]:
     columns = np.unique(rows.indices)
     _, R, order = qr(rows[:, columns].toarray(), mode="economic", pivoting=True)
-    rank = int((np.abs(np.diag(R)) > REPEATED * abs(R[0, 0])).sum())
+    rank = int((np.abs(np.diag(R)) > LENGTH_ROUND_OFF * abs(R[0, 0])).sum())
     weights, others = csr_array(-solve_triangular(R[:rank, :rank], R[:rank, rank:])), columns[order[rank:]]
     of_all = csr_array((weights.data, others[weights.indices], weights.indptr), shape=(rank, rows.shape[1]))
     return columns[order[:rank]].astype(np.intp), of_all

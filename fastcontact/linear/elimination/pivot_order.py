@@ -1,10 +1,9 @@
 """Choice of the pivot of each constraint, and the inverse of the pivot columns.
 
-Groups of equations, each equation by itself or those of a node together, take unknowns that no other group has, or no group
-of a later layer (`of_groups`). Where there are too few, the equations of a node take large enough entries in that node's
-unknowns (`of_nodes`), or what is left over is assigned (`of_most_groups`, `assigned`). The columns of the pivots are inverted
-in small blocks, independent or in layers, or, where equations of many nodes share unknowns otherwise, factorised
-(`coupled_pivots`).
+The equations of a node together, or each by itself, take unknowns that no others have, or none of a later layer
+(`of_groups`). Where there are too few, the equations of a node take large enough entries in that node's unknowns
+(`of_nodes`), or what is left over is assigned (`of_most_groups`, `assigned`). The columns of the pivots are inverted in small
+blocks, independent or in layers, or, where equations of many nodes share unknowns otherwise, factorised (`coupled_pivots`).
 """
 
 from __future__ import annotations
@@ -26,10 +25,9 @@ from fastcontact.linear.elimination.coupled_pivots import (
 
 # An unknown is taken as pivot where its entry is at least this part of the largest one of the equation.
 SMALLEST = 0.25
-# Up to so many equations that share unknowns are inverted as a block; and where factors do not suit them.
+# Up to so many equations that share unknowns are inverted as a block; and where factors do not suit them. So many are also
+# assigned pivots by a dense factorisation.
 LARGEST_BLOCK, FULL_UP_TO = 64, 500
-# Up to so many equations, pivots are assigned by a dense factorisation.
-DENSE_UP_TO = 400
 # With more layers than this the sum of products costs more than it saves.
 MOST_LAYERS = 4
 
@@ -63,15 +61,12 @@ def chosen(B: csr_array, nodes: Indices | None = None, size: int = 1) -> tuple[I
 
 def _chosen(B: csr_array, nodes: Indices | None, size: int) -> Indices:
     """Return the pivot of every equation (m,), see `chosen`."""
-    alone = np.arange(B.shape[0])
-    by_node = [] if nodes is None else [nodes]
-    for layers in (1, MOST_LAYERS):
-        for groups in (alone, *by_node):
-            if (pivots := of_groups(B, groups, layers)) is not None:
-                return pivots
-    for owners in by_node:
-        if (pivots := of_nodes(B, owners, size)) is not None or (pivots := of_most_groups(B, owners)) is not None:
-            return pivots
+    if (pivots := of_groups(B, np.arange(B.shape[0]) if nodes is None else nodes)) is not None:
+        return pivots
+    if nodes is not None and (pivots := of_nodes(B, nodes, size)) is not None:
+        return pivots
+    if nodes is not None and (pivots := of_most_groups(B, nodes)) is not None:
+        return pivots
     return assigned(B)
 
 
@@ -137,7 +132,7 @@ def of_most_groups(B: csr_array, groups: Indices) -> Indices | None:
     # Unknowns of earlier layers are none of theirs. Rows of a group that has too few may still have one of their own.
     pivots[left] = _in_layers(csr_array(B[left]), np.arange(len(left)), layers=1)
     left = left[pivots[left] < 0]
-    if len(left) > DENSE_UP_TO:
+    if len(left) > FULL_UP_TO:
         return None
     if len(left):
         pivots[left] = assigned(csr_array(B[left]))
@@ -230,7 +225,7 @@ def _layered_inverse(inner: csr_array, beyond: csr_array, layers: int) -> Sparse
 
 def assigned(B: csr_array) -> Indices:
     """Return the unknown assigned to each row, so that the matrix to invert is as well conditioned as possible."""
-    if B.shape[0] <= DENSE_UP_TO:
+    if B.shape[0] <= FULL_UP_TO:
         columns = np.unique(B.indices)
         if len(columns) < B.shape[0]:
             raise RepeatedError()

@@ -10,6 +10,7 @@ from scipy.sparse.linalg import splu
 
 from fastcontact.arrays import AnyArray
 from fastcontact.linear.multigrid import cycle_kernels
+from fastcontact.round_off import ROUND_OFF
 
 # A dense factor of more unknowns costs more than a sparse one.
 DENSE_UP_TO = 1500
@@ -52,7 +53,7 @@ class Coarse:
             cycle_kernels.factorise_dense(self._factor, self._reciprocal)
             return
         diagonal = A.diagonal()
-        self._idle = np.flatnonzero(diagonal <= 1e-12 * diagonal.max())
+        self._idle = np.flatnonzero(diagonal <= ROUND_OFF * diagonal.max())
         kept = np.ones(self.n)
         kept[self._idle] = 0.0
         K = diags_array(kept) @ A @ diags_array(kept) + diags_array(1.0 - kept)

@@ -10,6 +10,7 @@ import numpy as np
 
 from fastcontact.linear.multigrid import cycle_kernels
 from fastcontact.linear.multigrid.level import Level
+from fastcontact.round_off import ROUND_OFF
 
 # Lanczos steps for the largest eigenvalue, what is added to their estimate, and the part of the spectrum smoothed.
 LANCZOS_STEPS = 8
@@ -50,7 +51,7 @@ def largest_eigenvalue(level: Level) -> float:
         if level.eliminated is not None:
             level.eliminated.complete(z)
         new = float(r @ z)
-        if not new > 1e-12 * abs(rz):
+        if not new > ROUND_OFF * abs(rz):
             break
         beta = new / rz if step else 0.0
         rz = new

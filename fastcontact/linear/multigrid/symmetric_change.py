@@ -10,10 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csc_array, csr_array
+from scipy.sparse import bsr_array, csc_array, csr_array
 
-from fastcontact.arrays import Indices
-from fastcontact.linear.multigrid.local_change import LocalChange, block_rows
+from fastcontact.arrays import Array, Indices, Numbers
+from fastcontact.linear.multigrid import symmetric_change_kernels
+from fastcontact.linear.multigrid.local_change import LocalChange
 from fastcontact.linear.multigrid.matrix import BlockMatrix
 from fastcontact.linear.sparse_rows import scaled
 from fastcontact.linear.springs import Springs
@@ -40,7 +41,9 @@ class SymmetricChange:
         m = len(pivots)
         D = csr_array(weights + csr_array((np.full(m, -1.0), pivots, np.arange(m + 1)), shape=weights.shape))
         rows = A.rows_of(pivots)
-        return cls(D, csr_array(rows + 0.5 * (rows[:, pivots] @ D)), len(A.rows))
+        G = csr_array(rows + 0.5 * (rows[:, pivots] @ D))
+        pattern = G.indices.astype(np.int32), G.indptr.astype(np.int32)
+        return cls(D, csr_array((G.data, *pattern), shape=G.shape), len(A.rows))
 
     @classmethod
     def of_springs(cls, springs: Springs, size: int) -> SymmetricChange:
@@ -49,12 +52,15 @@ class SymmetricChange:
 
     def diagonal(self) -> LocalChange:
         """Return its diagonal blocks."""
-        nodes, size = np.unique(self.D.indices // self.size), self.size
-        unknowns = (nodes[:, None] * size + np.arange(size)).ravel()
-        D, G = self.D[:, unknowns], self.G[:, unknowns]
-        half = [[D[:, a::size].multiply(G[:, b::size]).sum(axis=0) for b in range(size)] for a in range(size)]
-        blocks = np.array(half).reshape(size, size, -1)
-        return LocalChange.of_diagonal(nodes, (blocks + blocks.transpose(1, 0, 2)).transpose(2, 0, 1))
+        D, G, size = self.D, self.G, self.size
+        nodes = np.unique(D.indices // size)
+        row_of_node = np.full(D.shape[1] // size, -1, np.int32)
+        row_of_node[nodes] = np.arange(len(nodes))
+        blocks = np.zeros(len(nodes) * size * size)
+        symmetric_change_kernels.diagonal(
+            D.indptr, D.indices, D.data, G.indptr, G.indices, G.data, row_of_node, size, blocks
+        )
+        return LocalChange.of_diagonal(nodes, blocks.reshape(-1, size, size))
 
     def on_finest(self) -> csc_array:
         """Return the change itself (n, n)."""
@@ -63,19 +69,52 @@ class SymmetricChange:
 
     def on_coarse(self, P: BlockMatrix) -> LocalChange:
         """Return its Galerkin product ``P.T (D.T G + G.T D) P``."""
-        size, width = self.size, len(P.cols)
-        nodes = np.unique(np.concatenate([self.D.indices, self.G.indices]) // size)
-        P_own = csr_array(block_rows(P, nodes, (int(P.indices.max()) + 1) * width))
-        E, H = (csr_array(_among(rows, nodes, size) @ P_own) for rows in (self.D, self.G))
-        below = np.unique(np.concatenate([E.indices, H.indices]) // width)
-        half = csr_array(_among(E, below, width).T @ _among(H, below, width))
-        blocks = csr_array(half + half.T).tobsr((width, width))
-        blocks.sort_indices()
-        return LocalChange(below, blocks)
+        E, H = _restricted(self.D, P), _restricted(self.G, P)
+        return _symmetric_product(E, H, P.cols)
 
 
-def _among(rows: csr_array, nodes: Indices, size: int) -> csr_array:
-    """Return rows (m, k size) with the columns of k nodes alone, ascending, which are all that they have."""
-    columns = np.searchsorted(nodes, rows.indices // size) * size + rows.indices % size
-    pattern = columns.astype(np.int32), rows.indptr.astype(np.int32)
-    return csr_array((rows.data, *pattern), shape=(rows.shape[0], len(nodes) * size))
+@dataclass(frozen=True, eq=False)
+class _Restricted:
+    """Rows of blocks: coarse nodes and, for each, as many numbers as it has unknowns."""
+
+    indptr: Numbers
+    nodes: Numbers
+    numbers: Array
+
+
+def _restricted(rows: csr_array, P: BlockMatrix) -> _Restricted:
+    """Return ``rows @ P``."""
+    size, n_coarse, count = len(P.rows), int(P.indices.max()) + 1, np.empty(rows.shape[0], np.int32)
+    through = P.indptr, P.indices
+    symmetric_change_kernels.count_restricted(rows.indptr, rows.indices, *through, size, n_coarse, count)
+    low = _pointers(count)
+    nodes, numbers = np.empty(low[-1], np.int32), np.zeros(int(low[-1]) * len(P.cols))
+    symmetric_change_kernels.restrict(
+        rows.indptr, rows.indices, rows.data, *through, P.data, size, n_coarse, low, nodes, numbers, P.cols
+    )
+    return _Restricted(low, nodes, numbers)
+
+
+def _symmetric_product(E: _Restricted, H: _Restricted, cols: tuple[int, ...]) -> LocalChange:
+    """Return ``E.T H + H.T E`` on the nodes that they reach."""
+    nodes = np.unique(np.concatenate([E.nodes, H.nodes]))
+    row_of_node = np.empty(nodes[-1] + 1, np.int32)
+    row_of_node[nodes] = np.arange(len(nodes))
+    k, size, slots = len(nodes), len(cols), np.arange(len(E.nodes), dtype=np.int32)
+    by_column = csr_array((slots, row_of_node[E.nodes], E.indptr), shape=(len(E.indptr) - 1, k)).tocsc()
+    rows, pattern = (by_column.indptr, by_column.indices), (H.indptr, row_of_node[H.nodes])
+    count = np.empty(k, np.int32)
+    symmetric_change_kernels.count_products(*rows, *pattern, k, count)
+    into = _pointers(count)
+    columns, blocks = np.empty(into[-1], np.int32), np.zeros(int(into[-1]) * size * size)
+    symmetric_change_kernels.products(
+        *rows, by_column.data, E.numbers, *pattern, H.numbers, k, into, columns, blocks, cols
+    )
+    half = bsr_array((blocks.reshape(-1, size, size), columns, into), shape=(k * size, k * size))
+    total = bsr_array(half + half.T)
+    total.sort_indices()
+    return LocalChange(nodes, total)
+
+
+def _pointers(count: Numbers) -> Numbers:
+    return np.concatenate([[0], np.cumsum(count)]).astype(np.int32)

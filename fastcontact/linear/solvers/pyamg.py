@@ -20,9 +20,9 @@ from fastcontact.linear.delassus import InverseColumns
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.elimination.loaded import LoadedIteration
 from fastcontact.linear.lower_tolerance import put_back_tolerance, tighten
+from fastcontact.linear.multigrid.solver import MAX_ITERATIONS
 from fastcontact.linear.protocol import TOLERANCE, Counters, LinearSolver, Monitor
 
-MAX_ITERATIONS = 1000
 # All neighbours are strong, as in our multigrid; rigid-body modes need no improvement, and polynomials smooth cheapest.
 SMOOTHER = ("chebyshev", {"degree": 2, "iterations": 1})
 OPTIONS: dict[str, Any] = {

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.sparse import bsr_array, csr_array
 
+from fastcontact._jit.decorators import set_threads, threads
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.multigrid.matrix import BlockMatrix
 from fastcontact.linear.multigrid.symmetric_change import SymmetricChange
@@ -80,6 +81,17 @@ def test_changes_on_the_finest_and_the_next_coarser_level(size, width, number):
     assert np.abs(diagonal.diagonal().reshape(blocks.shape) - blocks).max() < 1e-12 * largest
     beyond = np.setdiff1d(np.arange(N_NODES), diagonal.nodes)
     assert not expected.reshape(N_NODES, size, N_NODES, size)[beyond, :, beyond].any()
+
+
+def test_coarse_changes_have_the_same_bits_for_any_number_of_threads():
+    before, found = threads(), []
+    for count in (1, min(2, before)):
+        set_threads(count)
+        rng = np.random.default_rng(1)
+        (change, _), _ = changes(3, rng)
+        found.append(change.on_coarse(prolongator(3, 6, rng)[0]).blocks.data)
+    set_threads(before)
+    assert np.array_equal(*found)
 
 
 def test_rows_scaled_and_taken():

@@ -1,0 +1,115 @@
+# mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
+"""Factors D and G of a symmetric update ``D.T G + G.T D``, restricted and multiplied.
+
+Sparse rows come as ``indptr`` and ``indices``, whose order does not matter, and numbers. Restricted ones have a block of as
+many numbers as the tuple `cols` for each coarse node. Every row of a result is computed by one thread in a fixed order.
+"""
+
+import numpy as np
+from numba import prange
+
+from fastcontact._jit.decorators import kernel, parallel_kernel
+from fastcontact.linear.multigrid.block_products import add_product, add_transposed
+from fastcontact.linear.multigrid.symmetric_storage_kernels import CHUNK
+
+
+@kernel
+def diagonal(indptr, indices, data, low, found, values, slot, size, out):
+    """Add the diagonal blocks of ``D.T G + G.T D`` to `out` (n_blocks * size * size,).
+
+    D are `indptr`, `indices`, `data`, G are `low`, `found`, `values`; `slot` (n_nodes,) is where the block of each node
+    begins in `out`, in blocks.
+    """
+    sums = np.zeros(slot.shape[0] * size)
+    for p in range(indptr.shape[0] - 1):
+        for e in range(low[p], low[p + 1]):
+            sums[found[e]] = values[e]
+        for e in range(indptr[p], indptr[p + 1]):
+            node, a = indices[e] // size, indices[e] % size
+            block = slot[node] * size * size
+            for b in range(size):
+                part = data[e] * sums[node * size + b]
+                out[block + a * size + b] += part
+                out[block + b * size + a] += part
+        for e in range(low[p], low[p + 1]):
+            sums[found[e]] = 0.0
+
+
+@parallel_kernel
+def count_restricted(indptr, indices, start, columns, size, n_coarse, count):
+    """Fill `count` (n_rows,) with the number of coarse nodes that rows reach through the prolongator `start`, `columns`."""
+    n = indptr.shape[0] - 1
+    for c in prange((n + CHUNK - 1) // CHUNK):
+        seen = np.full(n_coarse, -1, np.int32)
+        for row in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
+            n_columns = 0
+            for e in range(indptr[row], indptr[row + 1]):
+                i = indices[e] // size
+                for k in range(start[i], start[i + 1]):
+                    if seen[columns[k]] != row:
+                        seen[columns[k]] = row
+                        n_columns += 1
+            count[row] = n_columns
+
+
+@parallel_kernel
+def restrict(indptr, indices, data, start, columns, P, size, n_coarse, low, found, out, cols):
+    """Fill the products of rows with a prolongator: coarse nodes `found` (n_blocks,) and their blocks `out`.
+
+    `low` (n_rows + 1,) are the row pointers of the result, `out` holds zeros.
+    """
+    n, width = indptr.shape[0] - 1, len(cols)
+    for c in prange((n + CHUNK - 1) // CHUNK):
+        seen, column_slot = np.full(n_coarse, -1, np.int32), np.empty(n_coarse, np.int32)
+        for row in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
+            at = low[row]
+            for e in range(indptr[row], indptr[row + 1]):
+                i, a = indices[e] // size, indices[e] % size
+                for k in range(start[i], start[i + 1]):
+                    J = columns[k]
+                    if seen[J] != row:
+                        seen[J], column_slot[J], found[at] = row, at, J
+                        at += 1
+                    add_product(out, column_slot[J] * width, (data,), e, P, (k * size + a) * width, ((0,), (0,), cols))
+
+
+@parallel_kernel
+def count_products(start, origin, low, found, n_coarse, count):
+    """Fill `count` (n_rows,) with the number of blocks in each block row of `products`."""
+    n = start.shape[0] - 1
+    for c in prange((n + CHUNK - 1) // CHUNK):
+        seen = np.full(n_coarse, -1, np.int32)
+        for row in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
+            number = 0
+            for e in range(start[row], start[row + 1]):
+                for k in range(low[origin[e]], low[origin[e] + 1]):
+                    if seen[found[k]] != row:
+                        seen[found[k]] = row
+                        number += 1
+            count[row] = number
+
+
+@parallel_kernel
+def products(start, origin, slot, E, low, found, H, n_coarse, into, columns, out, cols):
+    """Fill block rows of ``E.T H``: columns, ascending, and blocks.
+
+    E comes by its block columns: `start` (n_rows + 1,), the row `origin` and the block `slot` of each entry; H by rows, as
+    `low`, `found` and numbers. `into` (n_rows + 1,) are the row pointers of the result, `out` holds zeros.
+    """
+    n, width = start.shape[0] - 1, len(cols)
+    for c in prange((n + CHUNK - 1) // CHUNK):
+        seen, column_slot = np.full(n_coarse, -1, np.int32), np.empty(n_coarse, np.int32)
+        for row in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
+            at = into[row]
+            for e in range(start[row], start[row + 1]):
+                for k in range(low[origin[e]], low[origin[e] + 1]):
+                    if seen[found[k]] != row:
+                        seen[found[k]], columns[at] = row, found[k]
+                        at += 1
+            columns[into[row] : at].sort()
+            for k in range(into[row], at):
+                column_slot[columns[k]] = k
+            for e in range(start[row], start[row + 1]):
+                for k in range(low[origin[e]], low[origin[e] + 1]):
+                    to = column_slot[found[k]] * width * width
+                    add_transposed(out, to, (E,), slot[e] * width, H, k * width, (cols, (0,), cols))
