@@ -4,6 +4,7 @@ import inspect
 
 import numpy as np
 import pytest
+from models import elastic_model
 from numpy.typing import ArrayLike, NDArray
 
 import fastcontact as fc
@@ -13,9 +14,7 @@ WRONG = (None, "5", "abc", 5, [1, 2], {"a": 1}, object(), b"x", [None], 1j, np.a
 
 
 def model(contact=True):
-    found = fc.Model(fc.generate.half_spheres(size=25.0), kinematics="axisymmetric")
-    found.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
-    found.fix("A1A2", "x")
+    found = elastic_model(fc.generate.half_spheres(size=25.0), "axisymmetric", E=20_000.0, A1A2="x")
     found.prescribe("A2B2", y=-2.0)
     found.prescribe("A1B1", y=2.0)
     if contact:

@@ -4,6 +4,7 @@ import contextlib
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 
@@ -20,8 +21,7 @@ def bar(kinematics="plane_stress", element="quad4"):
     else:
         mesh = fc.generate.block((1.0, LENGTH), (2, 4), element)
     mesh = mesh.with_facet_group("CUT", lambda x: np.abs(x[:, 1] - LENGTH / 2) < 1e-9, between=True)
-    model = fc.Model(fc.generate.cut(mesh, "CUT"), kinematics)
-    model.add_material(fc.LinearElastic(E=E, nu=0.0))
+    model = elastic_model(fc.generate.cut(mesh, "CUT"), kinematics, E=E, nu=0.0)
     for end in ("BOTTOM", "TOP"):
         model.fix(end, "xyz"[: mesh.dim])
     return model
@@ -91,8 +91,7 @@ def joint(pull, formulation="mortar", locked_from=1.0, first=1.0):
     mesh = fc.generate.union(*parts)
     mesh = mesh.with_facet_group("CUT", lambda x: (np.abs(x[:, 1] - half) < 1e-9) & (x[:, 0] < 1.5), between=True)
     mesh = mesh.with_facet_group("HEAD", lambda x: np.abs(x[:, 1] - LENGTH) < 1e-9)
-    model = fc.Model(fc.generate.cut(mesh, "CUT"), "plane_stress")
-    model.add_material(fc.LinearElastic(E=E, nu=0.0))
+    model = elastic_model(fc.generate.cut(mesh, "CUT"), "plane_stress", E=E, nu=0.0)
     for group in ("BOLT BOTTOM", "LOW BOTTOM"):
         model.fix(group, "xy")
     model.fix("UP", "x")

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 
@@ -23,9 +24,7 @@ every_way = pytest.mark.parametrize("way", WAYS, ids=lambda way: way[0])
 def pressed_and_drawn(formulation, element, size):
     """Return by instant the contact, with the slip of its nodes and how far the bodies were drawn."""
     mesh = fc.generate.crowned_blocks(element, R=R, contact_size=size)
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(E=E, nu=NU))
-    model.fix("FAR_LOWER", "xy")
+    model = elastic_model(mesh, "plane_strain", E=E, nu=NU, FAR_LOWER="xy")
     model.prescribe("FAR_UPPER", y=-PUSH, ramp=[(0, 0), (1, 1), (5, 1)])
     model.prescribe("FAR_UPPER", x=-DRAW, ramp=ALONG)
     model.add_contact("pair", secondary="CONT_LOWER", primary="CONT_UPPER", formulation=formulation, friction=FRICTION)

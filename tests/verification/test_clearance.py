@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 from two_bodies import blocks, boxes, held, touching
 
 import fastcontact as fc
@@ -86,9 +87,7 @@ def test_an_interference_may_grow_over_the_load_steps():
 def test_an_obstacle_may_stand_off(formulation):
     forces = []
     for height, options in ((0.004, {}), (0.0, {"clearance": 0.004})):
-        model = fc.Model(fc.generate.block((10.0, 5.0), (4, 2), "quad4"), "plane_strain")
-        model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-        model.fix("LEFT", "x")
+        model = elastic_model(fc.generate.block((10.0, 5.0), (4, 2), "quad4"), "plane_strain", LEFT="x")
         model.prescribe("TOP", y=-0.02)
         floor = fc.obstacles.HalfSpace((0.0, -height), (0.0, 1.0))
         model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor, formulation=formulation, **options)

@@ -272,9 +272,7 @@ def test_units_do_not_matter(formulation):
     mesh = sphere_on_block("hex8", size=25.0, contact_size=5.0, contact_radius=5.0, block_size=(30.0, 30.0))
     results = []
     for length, pressure in ((1.0, 1.0), (1e-3, 1e6), (1e6, 1e-9)):
-        model = fc.Model(mesh.replace(points=mesh.points * length), "3d")
-        model.add_material(fc.LinearElastic(E=20_000.0 * pressure, nu=0.3))
-        model.fix("SYMMETRY_X", "x")
+        model = elastic_model(mesh.replace(points=mesh.points * length), "3d", E=20_000.0 * pressure, SYMMETRY_X="x")
         model.fix("SYMMETRY_Z", "z")
         model.fix("BLOCK_BOTTOM", "y")
         model.prescribe("SPHERE_TOP", y=-0.5 * length)

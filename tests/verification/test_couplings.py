@@ -18,8 +18,7 @@ KINDS = ("rigid", "distributing")
 def beam(kind, place=(LENGTH + 2.0, 0.5), element="quad8"):
     """Return a beam held at its left end, coupled with a reference point at its right one; nu = 0."""
     mesh = fc.generate.block((LENGTH, HEIGHT), (10, 2), element)
-    model = fc.Model(fc.generate.with_reference_points(mesh, {"REF": place}), "plane_stress")
-    model.add_material(fc.LinearElastic(E=E, nu=0.0))
+    model = elastic_model(fc.generate.with_reference_points(mesh, {"REF": place}), "plane_stress", E=E, nu=0.0)
     model.fix("LEFT", "x")
     model.mesh = model.mesh.with_facet_group("END", lambda x: abs(x[:, 0]) < 1e-9)
     held = int(np.flatnonzero((np.abs(mesh.points - [0.0, 0.5]) < 1e-9).all(axis=1))[0])
@@ -134,8 +133,7 @@ CASE = {
 def test_a_case_file_has_couplings_moments_and_liquids():
     mesh = fc.generate.block((LENGTH, HEIGHT), (10, 2), "quad8")
     case = build_case(CASE, name="beam", mesh=mesh)
-    same = fc.Model(fc.generate.with_reference_points(mesh, {"REF": (12.0, 0.5)}), "plane_stress")
-    same.add_material(fc.LinearElastic(E=E, nu=0.0))
+    same = elastic_model(fc.generate.with_reference_points(mesh, {"REF": (12.0, 0.5)}), "plane_stress", E=E, nu=0.0)
     same.fix("LEFT", "xy")
     same.add_coupling("REF", "RIGHT", kind="distributing")
     same.add_moment("REF", z=MOMENT)

@@ -128,8 +128,7 @@ def test_a_body_that_only_obstacles_hold():
 def test_units_do_not_matter(length, pressure):
     def solved(length, pressure):
         mesh = block((2.0, 1.0), (8, 4), "quad4", origin=(-1.0, -1.0))
-        model = fc.Model(mesh.replace(points=mesh.points * length), "plane_strain")
-        model.add_material(fc.LinearElastic(E=1000.0 * pressure, nu=0.3))
+        model = elastic_model(mesh.replace(points=mesh.points * length), "plane_strain", E=1000.0 * pressure)
         model.fix("BOTTOM", "xy")
         ball = obstacles.Sphere((0.0, 3.0 * length), 3.0 * length)
         model.add_obstacle("ball", secondary="TOP", obstacle=ball, force={"y": -15.0 * pressure * length})

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.contact.formulations import FORMULATIONS
@@ -14,9 +15,7 @@ def pressed(formulation, *, length=1.0, pressure=1.0, push=0.02, swap=False, tur
     mesh = fc.generate.block_on_block(divisions_lower=(4, 2), divisions_upper=(4, 2))
     c, s = np.cos(turn), np.sin(turn)
     mesh = mesh.replace(points=length * mesh.points @ np.array([[c, s], [-s, c]]))
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0 * pressure, nu=0.0))
-    model.fix("LOWER_BOTTOM", "xy")
+    model = elastic_model(mesh, "plane_strain", E=1000.0 * pressure, nu=0.0, LOWER_BOTTOM="xy")
     model.prescribe("UPPER_TOP", x=length * push * s, y=-length * push * c)
     sides = ("CONT_LOWER", "CONT_UPPER") if swap else ("CONT_UPPER", "CONT_LOWER")
     model.add_contact("pair", secondary=sides[0], primary=sides[1], formulation=formulation)

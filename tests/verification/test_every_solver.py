@@ -9,6 +9,7 @@ from itertools import product
 import numpy as np
 import pytest
 from mechanics import contact_forces, given_back, in_space, out_of_balance
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.mesh.generate.box import SOLIDS
@@ -71,8 +72,7 @@ def bodies(kinematics, element, alone):
 def model(kinematics, element, formulation, friction, penalty, swapped=False, obstacle=False):
     """The upper block pressed on the lower one and pushed along it, or on a plane in the place of the lower one."""
     mesh, (bottom, lower, upper, top) = bodies(kinematics, element, alone=obstacle)
-    described = fc.Model(mesh, kinematics)
-    described.add_material(fc.LinearElastic(1000.0, 0.3))
+    described = elastic_model(mesh, kinematics)
     along = {"3d": {"x": 0.012, "y": 0.003}, "plane_strain": {"x": 0.012}, "axisymmetric": {}}[kinematics]
     described.prescribe(top, **along, **{"xyz"[mesh.dim - 1]: -0.013})
     for name in ("UPPER",) if obstacle else ("LOWER", "UPPER"):

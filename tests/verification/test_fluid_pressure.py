@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 
@@ -24,8 +25,7 @@ def seal(element="quad4", push=-0.02, source="B BOTTOM_LEFT", **options):
         names = ("BOTTOM", "TOP", "xy")
         bodies = [fc.generate.block((2.0, 1.0), (6, 2), element, (0.0, z), name="C") for z in (0.0, 1.0)]
     mesh = fc.generate.union(*(fc.generate.renamed(b, lambda g, n=n: f"{n} {g}") for b, n in zip(bodies, "AB")))
-    model = fc.Model(mesh, "3d" if element == "hex8" else "plane_strain")
-    model.add_material(fc.LinearElastic(E=E, nu=0.0))
+    model = elastic_model(mesh, "3d" if element == "hex8" else "plane_strain", E=E, nu=0.0)
     bottom, top, axes = names
     model.fix(f"A {bottom}", axes)
     model.prescribe(f"B {top}", **dict.fromkeys(axes[:-1], 0.0))

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.cases.case import build_case
@@ -33,8 +34,7 @@ def stacked(element, *divisions):
 def test_stacked_blocks_touch_at_their_faces_and_pass_the_pressure_on(kinematics, element):
     """The middle block hides the lower one from the upper one; the pressure is 2 everywhere."""
     mesh = stacked(element, 2, 3, 2)
-    model = fc.Model(mesh, kinematics)
-    model.add_material(fc.LinearElastic(E=100.0, nu=0.0))
+    model = elastic_model(mesh, kinematics, E=100.0, nu=0.0)
     found = model.add_contacts(formulation="mortar")
     assert [pair.bodies for pair in found] == [("B", "A"), ("B", "C")]
     assert {pair.reason for pair in found} == {"finer"}

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 
@@ -9,8 +10,7 @@ import fastcontact as fc
 def squeezed(element, nu, mu, **options):
     """Return the last step of a ring that the upper wall squeezes before pressure pushes it to the inner wall."""
     mesh = fc.generate.block((4.0, 4.0), (4, 4), element, origin=(20.0, 0.0))
-    model = fc.Model(mesh, "axisymmetric")
-    model.add_material(fc.LinearElastic(10.0, nu))
+    model = elastic_model(mesh, "axisymmetric", E=10.0, nu=nu)
     plane = fc.obstacles.HalfSpace
     down = {"motion": {"y": -0.1}, "ramp": [(0, 0), (1, 1), (2, 1)]}
     walls = {

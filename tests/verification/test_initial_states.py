@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 from test_temperature import ALPHA, RISE, E, free, plane, solved
 from two_bodies import rings
 
@@ -89,8 +90,7 @@ def test_a_released_stress_strains_the_body_back(kinematics, given):
 @pytest.mark.parametrize(("kinematics", "element"), ELEMENTS)
 def test_a_stress_in_balance_leaves_the_body_as_it_is(kinematics, element):
     """Two halves pulled and pressed alike between ends that are held: no displacement, no resultant, the stress itself."""
-    model = fc.Model(body(kinematics, element), kinematics)
-    model.add_material(fc.LinearElastic(E, 0.3))
+    model = elastic_model(body(kinematics, element), kinematics, E=E)
     if kinematics == "axisymmetric":  # radial and hoop stress alike are in balance
         model.add_initial_stress(xx=7.0, zz=7.0, yy=3.0)
         model.add_traction("LEFT", x=-7.0)
@@ -172,11 +172,7 @@ def test_it_is_there_from_the_first_step_on_or_has_a_history():
 def test_an_initial_gap_closes_by_a_swelling_block():
     """Two blocks held at their ends, 0.01 apart: the swelling one crosses it, then both are pressed."""
     mesh = fc.generate.block_on_block("quad4", size_lower=(10.0, 5.0), size_upper=(10.0, 5.0), divisions_upper=(8, 4))
-    model = fc.Model(mesh, "plane_stress")
-    model.add_material(fc.LinearElastic(E, 0.0))
-    model.fix("LOWER_BOTTOM", "y")
-    model.fix("UPPER_TOP", "y")
-    model.fix("LOWER_LEFT", "x")
+    model = elastic_model(mesh, "plane_stress", E=E, nu=0.0, LOWER_BOTTOM="y", UPPER_TOP="y", LOWER_LEFT="x")
     model.fix("UPPER_LEFT", "x")
     model.add_initial_strain("UPPER", yy=0.01, ramp=[(0.0, 0.0), (1.0, 1.0)])
     model.add_contact("gap", secondary="CONT_UPPER", primary="CONT_LOWER", clearance=0.02)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.cli import main
@@ -291,8 +292,7 @@ def test_what_is_refused():
     ):
         with pytest.raises(fc.ModelError, match=said):
             call()
-    bare = fc.Model(model.mesh, "plane_stress")
-    bare.add_material(fc.LinearElastic(E=1.0, nu=0.0))
+    bare = elastic_model(model.mesh, "plane_stress", E=1.0, nu=0.0)
     with pytest.raises(fc.ModelError, match="10 solid cells have none: give them density"):
         fc.modes(bare)
     # A column under more than Euler's load.

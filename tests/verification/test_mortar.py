@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 
@@ -14,8 +15,7 @@ def two_blocks(element, kinematics, swap, upper_element=None, width=None, **opti
     lower = fc.generate.block_on_block(
         divisions_lower=(3, 2), divisions_upper=(4, 3), element=element, **({} if width is None else width)
     )
-    model = fc.Model(lower, kinematics)
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model = elastic_model(lower, kinematics)
     for side in ("LOWER", "UPPER"):
         model.fix(f"{side}_LEFT", "x")
     model.fix("LOWER_BOTTOM", "y")

@@ -274,9 +274,7 @@ def test_the_force_converges_to_that_of_the_finite_bodies(forma04):
 
 
 def sphere_model(mesh, swap=False, length=1.0, pressure=1.0, **options):
-    model = fc.Model(mesh.replace(points=mesh.points * length), "3d")
-    model.add_material(fc.LinearElastic(E=20_000.0 * pressure, nu=0.3))
-    model.fix("SYMMETRY_X", "x")
+    model = elastic_model(mesh.replace(points=mesh.points * length), "3d", E=20_000.0 * pressure, SYMMETRY_X="x")
     model.fix("SYMMETRY_Z", "z")
     model.fix("BLOCK_BOTTOM", "y")
     model.prescribe("SPHERE_TOP", y=-0.5 * length)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 from scipy.sparse import csr_array
 from stepping import Stepping
 
@@ -14,9 +15,7 @@ pytestmark = pytest.mark.pairwise
 
 
 def with_material(mesh):
-    model = fc.Model(mesh, kinematics="3d")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    return model
+    return elastic_model(mesh, "3d")
 
 
 def blocks(n, formulation="node_to_segment"):

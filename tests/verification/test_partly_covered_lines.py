@@ -132,10 +132,7 @@ def test_swapped_sides_agree_where_one_curves_away(element):
         low, up = block((1.0, 0.5), (16, 8), element), block((1.3, 0.5), (16, 8), element, (0.0, 0.5))
         points = low.points.copy()
         points[:, 1] -= 0.6 * points[:, 0] ** 2 * points[:, 1]
-        model = fc.Model(named(low.replace(points=points), up), "plane_strain")
-        model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-        model.fix("L_LEFT", "x")
-        model.fix("U_LEFT", "x")
+        model = elastic_model(named(low.replace(points=points), up), "plane_strain", L_LEFT="x", U_LEFT="x")
         model.fix("L_BOTTOM", "y")
         model.prescribe("U_TOP", y=-0.04)
         model.add_contact("pair", secondary=sides[0], primary=sides[1], formulation="mortar")

@@ -9,6 +9,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 
@@ -25,8 +26,7 @@ def pressed(kinematics, element, n, formulation, options, radius):
         mesh = fc.generate.block((1.0, 1.0), (n, n), element, origin=(0.0, -1.0))
         top, held, symmetry = "TOP", ("RIGHT", "BOTTOM"), (("LEFT", "x"),)
     mesh = mesh.with_groups(points={"HELD": np.concatenate([mesh.points_of(side) for side in held])})
-    model = fc.Model(mesh, kinematics)
-    model.add_material(fc.LinearElastic(E=box.E, nu=box.nu))
+    model = elastic_model(mesh, kinematics, E=box.E, nu=box.nu)
     for side, component in symmetry:
         model.fix(side, component)
     for axis in range(mesh.dim):

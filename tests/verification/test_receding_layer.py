@@ -6,6 +6,7 @@ Keer, Dundurs and Tsai (1972): the half-width of the contact does not depend on 
 import numpy as np
 import pytest
 from graded import graded_block, lines
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.mesh.generate import renamed, union
@@ -27,8 +28,7 @@ def pressed(model, steps=4):
 
 
 def on_rigid_base(formulation, size, steps=4):
-    model = fc.Model(layer(size), "plane_strain")
-    model.add_material(fc.LinearElastic(E=E, nu=NU))
+    model = elastic_model(layer(size), "plane_strain", E=E, nu=NU)
     base = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
     model.add_obstacle("base", secondary="CONT_LAYER", obstacle=base, formulation=formulation)
     return [step.contact["base"] for step in pressed(model, steps)]
@@ -92,8 +92,7 @@ def test_contact_with_an_elastic_base_that_does_not_match(formulation, ratio):
 def test_a_wider_load_widens_the_contact():
     """A strip load of half-width h on a rigid base: c/h = 1.402."""
     size, exact = 0.05, fc.analytic.receding_layer(E1=E, nu1=NU, thickness=1.0, force=2 * FORCE, load_half_width=1.0)
-    model = fc.Model(layer(size), "plane_strain")
-    model.add_material(fc.LinearElastic(E=E, nu=NU))
+    model = elastic_model(layer(size), "plane_strain", E=E, nu=NU)
     base = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
     model.add_obstacle("base", secondary="CONT_LAYER", obstacle=base, formulation="continuous")
     model.fix("AXIS", "x")

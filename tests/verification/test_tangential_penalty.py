@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 from two_bodies import YOUNG, blocks, boxes
 
 import fastcontact as fc
@@ -19,8 +20,7 @@ SIDEWAYS = [(0.0, 0.0), (1.0, 0.0), (3.0, 1.0), (5.0, 0.0)]
 def sheared(formulation, sideways, dim=2, penalty=STIFFNESS, **options):
     """The upper block is pressed on the lower one and moved along x; both have nu = 0."""
     mesh = boxes() if dim == 3 else blocks()
-    model = fc.Model(mesh, "3d" if dim == 3 else "plane_strain")
-    model.add_material(fc.LinearElastic(E=YOUNG, nu=0.0))
+    model = elastic_model(mesh, "3d" if dim == 3 else "plane_strain", E=YOUNG, nu=0.0)
     top, bottom, up = ("U_ZMAX", "L_ZMIN", "z") if dim == 3 else ("UPPER_TOP", "LOWER_BOTTOM", "y")
     for axis in "xyz"[:dim]:
         model.fix(bottom, axis)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.mesh.generate import rings
@@ -27,8 +28,7 @@ def apart(element, gap):
 
 
 def tied(mesh, kinematics, formulation, options, sides=("BOTTOM2", "TOP")):
-    model = fc.Model(mesh, kinematics)
-    model.add_material(fc.LinearElastic(1000.0, 0.3))
+    model = elastic_model(mesh, kinematics)
     model.add_contact("tie", secondary=sides[0], primary=sides[1], kind="tied", formulation=formulation, **options)
     return model
 

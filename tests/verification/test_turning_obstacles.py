@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.cases.case import read_case
@@ -26,9 +27,7 @@ def graded_box(divisions):
 
 def twisted_ball(formulation, divisions=8, angle=0.4, friction=FRICTION, **driving):
     """A rigid ball pressed on a box and then twisted about the vertical through its centre; by default pressed by 0.1."""
-    model = fc.Model(graded_box(divisions), "3d")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("ZMIN", "xyz")
+    model = elastic_model(graded_box(divisions), "3d", ZMIN="xyz")
     rotation = {"angle": angle, "centre": (0.0, 0.0, RADIUS), "axis": (0.0, 0.0, 2.0), "ramp": PRESS_AND_TURN}
     model.add_obstacle(
         "ball", secondary="ZMAX", obstacle=fc.obstacles.Sphere((0.0, 0.0, RADIUS), RADIUS), rotation=rotation,
@@ -88,9 +87,7 @@ def spun_disc(
     """A rigid disc of radius 5 above a block, pressed, then spun and moved; `turned`: all of it by 90 degrees."""
     mesh = block((4.0, 2.0), (24, 8), element, (-2.0, -2.0))
     flip = np.array([[0.0, 1.0], [-1.0, 0.0]]) if turned else np.eye(2)
-    model = fc.Model(mesh.replace(points=mesh.points @ flip), "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("BOTTOM", "xy")
+    model = elastic_model(mesh.replace(points=mesh.points @ flip), "plane_strain", BOTTOM="xy")
     centre = np.array([0.0, 5.0]) @ flip
     along, down = np.array([motion[0], 0.0]) @ flip, np.array([0.0, motion[1]]) @ flip
     together = dict(zip("xy", (along + down).tolist(), strict=True))
@@ -162,9 +159,7 @@ def test_a_turn_about_a_far_centre_is_a_translation():
     far, way = 1e7, 0.3
     found = []
     for rotation in ({"angle": way / far, "centre": (0.0, far), "ramp": PRESS_AND_TURN}, None):
-        model = fc.Model(block((4.0, 2.0), (8, 4)), "plane_strain")
-        model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-        model.fix("BOTTOM", "xy")
+        model = elastic_model(block((4.0, 2.0), (8, 4)), "plane_strain", BOTTOM="xy")
         plane = fc.obstacles.HalfSpace((0.0, 2.0), (0.0, -1.0))
         if rotation is None:
             model.add_obstacle(
@@ -197,9 +192,7 @@ def test_a_turned_tool_presses_as_one_made_so(formulation):
     """Without friction only the last place counts: a tool turned by the analysis and one that is drawn turned."""
     found = []
     for made, turned in ((0.0, 0.12), (0.12, 0.0)):
-        model = fc.Model(block((4.0, 2.0), (20, 8), origin=(-2.0, 0.0)), "plane_strain")
-        model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-        model.fix("BOTTOM", "xy")
+        model = elastic_model(block((4.0, 2.0), (20, 8), origin=(-2.0, 0.0)), "plane_strain", BOTTOM="xy")
         rotation = {"angle": turned, "centre": (0.5, 3.0)}
         model.add_obstacle(
             "tool", secondary="TOP", obstacle=tool(made), rotation=rotation, motion={"y": -0.2}, formulation=formulation

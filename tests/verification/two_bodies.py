@@ -1,6 +1,7 @@
 """Pairs of small bodies that contact options are tried on: blocks, boxes, rings."""
 
 import numpy as np
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.mesh.generate import block, box, renamed, union
@@ -28,8 +29,7 @@ def boxes(element="hex8", lower=(2, 3, 2), upper=(2, 3, 2), apart=0.0):
 
 def held(mesh, kinematics="plane_strain", approach=0.02):
     """The lower body stands, the upper one goes down by `approach`; both slide along their left sides."""
-    model = fc.Model(mesh, kinematics)
-    model.add_material(fc.LinearElastic(E=YOUNG, nu=POISSON))
+    model = elastic_model(mesh, kinematics, E=YOUNG, nu=POISSON)
     if kinematics == "3d":
         for side in "LU":
             model.fix(f"{side}_XMIN", "x")

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 from scipy.sparse import bsr_array
 
 import fastcontact as fc
@@ -95,8 +96,7 @@ def test_assembly_and_recovery_give_the_same_bits_for_any_number_of_threads(thre
     random = np.random.default_rng(7)
     mesh = mesh.replace(points=mesh.points + 0.02 * random.random(mesh.points.shape))
     kinematics = "3d" if solid else "axisymmetric"
-    model = fc.Model(mesh, kinematics)
-    model.add_material(fc.LinearElastic(E=1.0, nu=0.3))
+    model = elastic_model(mesh, kinematics, E=1.0)
     moduli, material = model.material_numbers()
     u = random.random(mesh.points.shape)
     found = []
@@ -125,8 +125,7 @@ def test_every_node_belongs_to_one_part_of_a_nodal_average(threads):
 @pytest.mark.parametrize("batch", [0, 1000, 10**9])
 def test_nodal_stresses_are_the_average_whatever_is_computed_at_a_time(batch, monkeypatch):
     monkeypatch.setattr(recovery, "BATCH", batch)
-    model = fc.Model(fc.generate.block_on_block("quad4"), "plane_strain")
-    model.add_material(fc.LinearElastic(E=1.0, nu=0.3))
+    model = elastic_model(fc.generate.block_on_block("quad4"), "plane_strain", E=1.0)
     mesh, (moduli, material) = model.mesh, model.material_numbers()
     u = np.random.default_rng(3).random(mesh.points.shape)
     given = (mesh, "plane_strain", moduli, material, u)

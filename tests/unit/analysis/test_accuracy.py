@@ -149,8 +149,7 @@ def test_bodies_that_only_move_have_no_forces_to_balance(solver):
 @pytest.mark.parametrize("formulation", ["node_to_segment", "continuous", "mortar"])
 def test_a_body_that_slides_on_one_at_rest_has_no_forces_to_balance(formulation, solver):
     """What round-off of the one exerts on the other is no force, though nothing cancels it there."""
-    model = fc.Model(fc.generate.block_on_block(divisions_lower=(3, 2), divisions_upper=(4, 2)), "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model = elastic_model(fc.generate.block_on_block(divisions_lower=(3, 2), divisions_upper=(4, 2)), "plane_strain")
     model.fix("LOWER_BOTTOM", "xy")
     model.prescribe("UPPER_TOP", x=0.5, y=0.0)
     model.add_contact("c", secondary="CONT_UPPER", primary="CONT_LOWER", formulation=formulation, kind="bilateral")

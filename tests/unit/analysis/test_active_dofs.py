@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from models import elastic_model
 from scipy.sparse import csr_array
 from stepping import Stepping
 
@@ -18,9 +19,7 @@ def started(related=False, friction=0.0, name="direct"):
     if name not in linear.SOLVERS:
         pytest.skip(f"{name} is not installed")
     mesh = fc.generate.half_spheres("quad4", arc_sizes=(3.0, 6.0), radial_sizes=(3.0, 9.0), segments=3)
-    model = fc.Model(mesh, kinematics="axisymmetric")
-    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
-    model.fix("A1A2", "x")
+    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x")
     model.prescribe("A1B1", y=2.0)
     if related:
         model.couple("CONT2", "y")

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 
@@ -36,8 +37,7 @@ def pressed(kinematics, element, pieces, options, curvature=0.0):
     groups, side = dict(mesh.cell_groups), mesh.cell_groups[secondary]
     for i, (begin, end) in enumerate(zip(CUTS[pieces][:-1], CUTS[pieces][1:], strict=True)):
         groups[f"PIECE{i}"] = side[(middle[side] > begin) & (middle[side] < end)]
-    model = fc.Model(mesh.replace(cell_groups=groups), kinematics)
-    model.add_material(fc.LinearElastic(1000.0, 0.3))
+    model = elastic_model(mesh.replace(cell_groups=groups), kinematics)
     model.fix(bottom, "xyz"[: mesh.dim])
     along = {"3d": {"x": 0.004, "y": 0.001}, "plane_strain": {"x": 0.004}, "axisymmetric": {}}[kinematics]
     model.prescribe(top, **along, **{"xyz"[mesh.dim - 1]: -0.01})

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.analysis.floating_bodies import MAX_POSITIONS, FloatingBodies
@@ -98,10 +99,7 @@ def wedge(friction):
         blocks.append(
             fc.generate.renamed(block.replace(points=points), {name: f"{name}{i}" for name in block.group_names})
         )
-    model = fc.Model(fc.generate.union(*blocks), "plane_strain")
-    model.add_material(fc.LinearElastic(2e5, 0.3))
-    model.fix("LEFT0", "xy")
-    model.fix("RIGHT1", "xy")
+    model = elastic_model(fc.generate.union(*blocks), "plane_strain", E=2e5, LEFT0="xy", RIGHT1="xy")
     model.add_pressure("TOP2", 10.0)
     for name, secondary, primary in (("c1", "LEFT2", "RIGHT0"), ("c2", "RIGHT2", "LEFT1")):
         model.add_contact(name, secondary=secondary, primary=primary, friction=friction)

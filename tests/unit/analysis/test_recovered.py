@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.analysis.problem import prepare
@@ -15,10 +16,7 @@ def two_blocks(wide=2.0):
     """A small block on a wide one, whose sides have the prefixes U_ and L_."""
     parts = [block((wide, 0.5), (7, 2), origin=(0.0, -0.5)), block((1.0, 0.5), (4, 2))]
     mesh = union(*(renamed(m, {name: p + name for name in m.group_names}) for m, p in zip(parts, ("L_", "U_"))))
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(1000.0, 0.3))
-    model.fix("L_BOTTOM", "xy")
-    return model
+    return elastic_model(mesh, "plane_strain", L_BOTTOM="xy")
 
 
 @pytest.mark.filterwarnings("ignore:the largest", "ignore:.*across its radius")
@@ -91,9 +89,7 @@ def test_where_bodies_meet_first_does_not_depend_on_the_steps_before():
     """A ball that comes down at a slant meets the block where it is then, not where it was after the first step."""
     found = []
     for instants in ((0.7, 1.0), (0.1, 0.2, 0.6, 0.7, 1.0)):
-        model = fc.Model(box((4.0, 2.0, 1.0), (12, 6, 2), origin=(-1.0, -1.0, -1.0)), "3d")
-        model.add_material(fc.LinearElastic(1000.0, 0.3))
-        model.fix("ZMIN", "xyz")
+        model = elastic_model(box((4.0, 2.0, 1.0), (12, 6, 2), origin=(-1.0, -1.0, -1.0)), "3d", ZMIN="xyz")
         ball = fc.obstacles.Sphere((0.0, 0.0, 2.0624), 2.0)
         model.add_obstacle("ball", secondary="ZMAX", obstacle=ball, motion={"x": 1.0, "z": -0.1})
         found.append(fc.solve(model, fc.Ramp(instants))[-1].contact["ball"])

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.analysis.friction import eliminated
@@ -16,8 +17,7 @@ def light_contact_beside_a_large_force(shift):
         mesh = fc.generate.box((1.0, 1.0, 0.5), (k, k, k // 2), "hex8", (0.0, 0.0, z))
         return fc.generate.renamed(mesh, {group: name + group for group in mesh.group_names})
 
-    model = fc.Model(fc.generate.union(part(-0.5, 6, "L_"), part(0.0, 5, "U_"), part(5.0, 6, "FAR_")), "3d")
-    model.add_material(fc.LinearElastic(1.0, 0.3))
+    model = elastic_model(fc.generate.union(part(-0.5, 6, "L_"), part(0.0, 5, "U_"), part(5.0, 6, "FAR_")), "3d", E=1.0)
     model.fix("L_ZMIN", "xyz")
     model.prescribe("U_ZMAX", x=shift, y=0.0, z=-0.001)
     model.fix("FAR_XMIN", "xyz")

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.analysis.load_step import load_step
@@ -21,9 +22,7 @@ def stack(element, divisions, friction=0.3, whole_sides=False):
             nodes = mesh.points_of(f"B{level}_{side}")
             held = nodes if whole_sides else nodes[np.abs(mesh.points[nodes, 2] - 0.5 * level - 0.25) < 1e-9]
             mesh = mesh.replace(point_groups={**mesh.point_groups, f"{side} {level}": held})
-    model = fc.Model(mesh, "3d")
-    model.add_material(fc.LinearElastic(1.0, 0.3))
-    model.fix("B0_ZMIN", "xyz")
+    model = elastic_model(mesh, "3d", E=1.0, B0_ZMIN="xyz")
     model.prescribe(f"B{top}_ZMAX", x=0.01, y=0.0, z=-0.01)
     for level in range(1, top):
         model.fix(f"YMIN {level}", "y")

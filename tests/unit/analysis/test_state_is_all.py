@@ -36,8 +36,7 @@ def lying_block(**options):
 
 
 def sphere_on_block(element="hex8", **options):
-    model = fc.Model(fc.generate.sphere_on_block(element, size=25.0, contact_size=4.0), kinematics="3d")
-    model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
+    model = elastic_model(fc.generate.sphere_on_block(element, size=25.0, contact_size=4.0), "3d", E=20_000.0)
     model.fix("SYMMETRY_X", "x")
     model.fix("SYMMETRY_Z", "z")
     model.fix("BLOCK_BOTTOM", "y")

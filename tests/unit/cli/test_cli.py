@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.cli import main
@@ -429,9 +430,7 @@ def test_a_strict_run_tells_the_checks_that_fail(tmp_path, capsys):
 
 @pytest.mark.filterwarnings("ignore:contact 'ceiling' never closed")
 def test_the_contact_that_was_taken_is_told_where_there_are_two(tmp_path, capsys):
-    case = fc.Model(fc.generate.half_spheres(size=25.0), kinematics="axisymmetric")
-    case.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
-    case.fix("A1A2", "x")
+    case = elastic_model(fc.generate.half_spheres(size=25.0), "axisymmetric", E=20_000.0, A1A2="x")
     case.prescribe("A2B2", y=-2.0)
     case.prescribe("A1B1", y=2.0)
     case.add_contact("hertz", secondary="CONT1", primary="CONT2")

@@ -1,6 +1,7 @@
 """What a side gets against a rigid obstacle without asking: by its cells, and right on them."""
 
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.contact import multiplier_field
@@ -17,8 +18,7 @@ def pressed(element, **options):
     """Return the model of a block under a ball."""
     mesh = fc.generate.graded_block(element, width=10.0, contact_radius=2.5, contact_size=0.5, size=2.5)
     up = "xyz"[mesh.dim - 1]
-    model = fc.Model(mesh, "axisymmetric" if mesh.dim == 2 else "3d")
-    model.add_material(fc.LinearElastic(2e5, 0.3))
+    model = elastic_model(mesh, "axisymmetric" if mesh.dim == 2 else "3d", E=2e5)
     model.fix("BOTTOM", up)
     model.fix("SYMMETRY_X", "x")
     if mesh.dim == 3:

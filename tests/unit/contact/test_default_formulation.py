@@ -64,8 +64,7 @@ def test_what_matches_at_first_is_right_after_sliding(part, swapped):
         cells = 16 * level
         shoe = bent(element, (48.0, 50.0), (cells, 2 * level), (-0.4 * np.pi, -0.6 * np.pi))
         hollow = bent(element, (50.0, 54.0), (2 * cells, 4 * level), (-0.3 * np.pi, -0.7 * np.pi))
-        model = fc.Model(union(named(shoe, "SHOE"), named(hollow, "HOLLOW")), "plane_strain")
-        model.add_material(fc.LinearElastic(E, NU))
+        model = elastic_model(union(named(shoe, "SHOE"), named(hollow, "HOLLOW")), "plane_strain", E=E, nu=NU)
         model.fix("HOLLOW_TOP", "xy")
 
         def moved(X, axis):

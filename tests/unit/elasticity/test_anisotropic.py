@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 from test_assembly import SOLIDS as PLANE
 from test_assembly import patch as plane_patch
 from test_assembly import twin as plane_twin
@@ -191,6 +192,5 @@ def test_what_is_no_material_is_refused():
 )
 def test_contrast_of_a_material_is_that_of_change_of_volume_to_shear(nu, kinematics, expected):
     mesh = MESHES["hex8"]() if kinematics == "3d" else plane_patch("quad4")
-    model = fc.Model(mesh, kinematics=kinematics)
-    model.add_material(fc.LinearElastic(E=7.0, nu=nu))
+    model = elastic_model(mesh, kinematics, E=7.0, nu=nu)
     assert model.material_field().contrast == pytest.approx(expected)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from models import elastic_model
 from scipy.sparse import csr_array
 
 import fastcontact as fc
@@ -47,9 +48,7 @@ def everywhere(mesh):
 
 
 def model_on(mesh, kinematics):
-    model = fc.Model(mesh, kinematics)
-    model.add_material(fc.LinearElastic(1000.0, 0.3))
-    return model
+    return elastic_model(mesh, kinematics)
 
 
 def total(model):

@@ -5,6 +5,7 @@ import dataclasses
 import mechanics
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.model.fingerprint import different, fingerprint
@@ -31,9 +32,7 @@ def curved(mesh, kinematics):
 @pytest.mark.parametrize(("element", "tolerance"), KINDS)
 def test_a_bar_whose_modulus_grows_extends_by_the_integral_of_stress_over_modulus(element, tolerance):
     mesh = fc.generate.block((2.0, 0.25), (16, 2), element)
-    model = fc.Model(mesh, "plane_stress")
-    model.add_material(fc.LinearElastic(E=lambda x: 1000.0 * np.exp(0.7 * x[:, 0]), nu=0.0))
-    model.fix("LEFT", "x")
+    model = elastic_model(mesh, "plane_stress", E=lambda x: 1000.0 * np.exp(0.7 * x[:, 0]), nu=0.0, LEFT="x")
     model.fix("BOTTOM", "y")
     model.add_traction("RIGHT", x=3.0)
     exact = 3.0 / 1000.0 / 0.7 * (1.0 - np.exp(-1.4))
@@ -276,8 +275,7 @@ def test_all_solvers_agree_on_a_graded_hertz_contact(solver):
     mesh = fc.generate.half_spheres(size=6.0)
     forces = []
     for linear in ("cholmod" if solver == "direct" else "direct", solver):
-        model = fc.Model(mesh, "axisymmetric")
-        model.add_material(fc.LinearElastic(E=fc.Tabulated("y", [(-20.0, 10_000.0), (20.0, 40_000.0)]), nu=0.3))
+        model = elastic_model(mesh, "axisymmetric", E=fc.Tabulated("y", [(-20.0, 10_000.0), (20.0, 40_000.0)]))
         model.fix("A1A2", "x")
         model.prescribe("A2B2", y=-1.0)
         model.prescribe("A1B1", y=+1.0)
@@ -428,8 +426,7 @@ def test_the_contrast_of_materials_that_vary_is_that_of_their_cells():
     """Nearly incompressible, or soft in one direction: linear solvers are told, whether the constants vary or not."""
     found = {}
     for nu in (0.499, lambda points: np.full(len(points), 0.499)):
-        model = fc.Model(fc.generate.block(), "plane_strain")
-        model.add_material(fc.LinearElastic(1000.0, nu))
+        model = elastic_model(fc.generate.block(), "plane_strain", nu=nu)
         found[callable(nu)] = model.material_field().contrast
     assert found[False] == pytest.approx(0.499 / 0.002)
     assert found[True] == pytest.approx(found[False])

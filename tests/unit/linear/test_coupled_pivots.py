@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 from scipy.sparse import bsr_array, csr_array, diags_array
 
 import fastcontact as fc
@@ -121,8 +122,7 @@ def pressed(n, element="hex8", friction=0.0, **options):
         mesh = fc.generate.box((1.0, 1.0, 0.5), (k, k, k // 2), element, (0.0, 0.0, z))
         return fc.generate.renamed(mesh, {group: name + group for group in mesh.group_names})
 
-    model = fc.Model(fc.generate.union(part(-0.5, n, "L_"), part(0.0, n * 4 // 5, "U_")), "3d")
-    model.add_material(fc.LinearElastic(1.0, 0.3))
+    model = elastic_model(fc.generate.union(part(-0.5, n, "L_"), part(0.0, n * 4 // 5, "U_")), "3d", E=1.0)
     model.fix("L_ZMIN", "xyz")
     model.prescribe("U_ZMAX", x=0.002 if friction else 0.0, y=0.0, z=-0.01)
     model.add_contact(

@@ -5,6 +5,7 @@ import logging
 
 import numpy as np
 import pytest
+from models import elastic_model
 from scipy.sparse import bsr_array, csr_array, diags_array
 from stepping import Stepping
 
@@ -97,9 +98,7 @@ def test_auto_chooses_by_dimension_and_size():
 )  # fmt: skip
 def test_auto_looks_at_what_the_contact_asks_of_a_solver(options, solver, monkeypatch):
     monkeypatch.setattr(linear, "DIRECT_UP_TO", {2: 100, 3: 100})
-    model = fc.Model(fc.generate.block_on_block("quad4"), "plane_strain")
-    model.add_material(fc.LinearElastic(E=1.0, nu=0.3))
-    model.fix("LOWER_BOTTOM", "xy")
+    model = elastic_model(fc.generate.block_on_block("quad4"), "plane_strain", E=1.0, LOWER_BOTTOM="xy")
     model.prescribe("UPPER_TOP", x=0.0, y=-1e-3)
     model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", **options)
     assert Stepping(model, "auto", 1e-10, Criteria()).solver.name == solver

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 from pressed_blocks import pressed
 from scipy.sparse import bsr_array, csr_array, diags_array
 
@@ -138,8 +139,7 @@ def test_an_iterate_is_left_where_its_monitor_says_so_with_forces_of_all_equatio
 
 def on_wall(friction=0.0, n=8, **options):
     mesh = fc.generate.box((1.0, 1.0, 0.5), (n, n, n // 2), "hex8")
-    model = fc.Model(mesh, "3d")
-    model.add_material(fc.LinearElastic(1.0, 0.3))
+    model = elastic_model(mesh, "3d", E=1.0)
     model.prescribe("ZMAX", x=0.004 if friction else 0.0, y=0.0, z=-0.01)
     wall = fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
     model.add_obstacle("c", secondary="ZMIN", obstacle=wall, friction=friction, **options)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 from scipy.sparse import csc_array, csr_array
 from scipy.sparse.linalg import splu
 from stepping import Stepping
@@ -21,8 +22,7 @@ FACTORED = ["direct", "cholmod"]
 def supported(n=3):
     """The stiffness of a cube that stands on its bottom, and the unknowns of its top."""
     mesh = fc.generate.box((1.0, 1.0, 1.0), (n, n, n))
-    model = fc.Model(mesh, kinematics="3d")
-    model.add_material(fc.LinearElastic(E=7.0, nu=0.3))
+    model = elastic_model(mesh, "3d", E=7.0)
     fixed = np.repeat(mesh.points[:, 2] == 0.0, 3)
     top = np.flatnonzero(np.repeat(mesh.points[:, 2] == 1.0, 3))
     return supports_apart(stiffness(mesh, "3d", *model.material_numbers()), fixed)[0], top

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.elasticity.stiffness import stiffness
@@ -29,8 +30,7 @@ def joined(element, *origins, merged=True):
 
 def zero_energy(mesh):
     """The number of motions without energy, from the stiffness matrix."""
-    model = fc.Model(mesh, "3d" if mesh.dim == 3 else "plane_strain")
-    model.add_material(fc.LinearElastic(E=1.0, nu=0.3))
+    model = elastic_model(mesh, "3d" if mesh.dim == 3 else "plane_strain", E=1.0)
     K = stiffness(mesh, model.kinematics, *model.material_numbers()).toarray()
     values = np.linalg.eigvalsh(K)
     return int((values < 1e-10 * values[-1]).sum())
@@ -60,8 +60,7 @@ def test_motions_at_hinges_are_those_that_cost_no_energy(element, origins, parts
     kinematics = "3d" if mesh.dim == 3 else "plane_strain"
     motions = free_motions(mesh, kinematics, np.zeros(mesh.points.shape, bool))
     assert len(motions) == zero_energy(mesh)
-    model = fc.Model(mesh, kinematics)
-    model.add_material(fc.LinearElastic(E=1.0, nu=0.3))
+    model = elastic_model(mesh, kinematics, E=1.0)
     K = stiffness(mesh, kinematics, *model.material_numbers())
     assert np.abs(K @ motions.displacement).max() < 1e-12 * np.abs(K.diagonal()).max()
     assert np.linalg.matrix_rank(motions.displacement) == len(motions)

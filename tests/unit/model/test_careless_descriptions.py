@@ -32,9 +32,7 @@ def test_tension_is_tension_whichever_way_the_normal_points(normal):
 def test_a_section_cut_towards_the_other_side_is_in_tension_too():
     bar = fc.generate.box((1.0, 1.0, 2.0), (1, 1, 2), "hex8")
     bar = bar.with_facet_group("CUT", lambda x: abs(x[:, 2] - 1.0) < 1e-9, between=True)
-    model = fc.Model(fc.generate.cut(bar, "CUT", normal=(0.0, 0.0, -1.0)), "3d")
-    model.add_material(fc.LinearElastic(E=1.0, nu=0.0))
-    model.fix("ZMIN", "xyz")
+    model = elastic_model(fc.generate.cut(bar, "CUT", normal=(0.0, 0.0, -1.0)), "3d", E=1.0, nu=0.0, ZMIN="xyz")
     model.fix("ZMAX", "xyz")
     model.add_pretension("bolt", "CUT", force=0.1)
     assert fc.solve(model, 1)[-1].stress[:, 2] == pytest.approx(0.1)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.mesh.generate import block
@@ -9,8 +10,7 @@ from fastcontact.model.fingerprint import different, fingerprint
 
 
 def model(pressure=lambda points: 1.0 + points[:, 0], height=3.0, order=1, stiffness=2.0, mass=1.0):
-    found = fc.Model(block((2.0, 1.0), (6, 3), "quad4", origin=(-1.0, -1.0)), "plane_strain")
-    found.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    found = elastic_model(block((2.0, 1.0), (6, 3), "quad4", origin=(-1.0, -1.0)), "plane_strain")
     supports = [("BOTTOM", {"y": 0.0}), ("LEFT", {"x": 0.0})][::order]
     for group, values in supports:
         found.prescribe(group, **values)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.model import rigid_motions
@@ -29,9 +30,7 @@ def boxes(element="hex8", height=0.0):
 
 
 def model_of(mesh, kinematics="plane_strain"):
-    model = fc.Model(mesh, "3d" if mesh.dim == 3 else kinematics)
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    return model
+    return elastic_model(mesh, "3d" if mesh.dim == 3 else kinematics)
 
 
 @pytest.mark.parametrize("element", ["tri3", "quad4", "tri6", "quad8", "quad9"])

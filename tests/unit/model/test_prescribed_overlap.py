@@ -4,6 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.mesh.generate import block, block_on_block, box
@@ -14,9 +15,7 @@ FORMULATIONS = ["node_to_segment", "continuous", "mortar"]
 
 
 def model_of(mesh, kinematics="plane_strain"):
-    model = fc.Model(mesh, "3d" if mesh.dim == 3 else kinematics)
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    return model
+    return elastic_model(mesh, "3d" if mesh.dim == 3 else kinematics)
 
 
 def floor(dim, height=0.0):

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.cases.case import build_case
@@ -14,8 +15,7 @@ from fastcontact.model.fingerprint import different, fingerprint
 def bar(cut=True):
     mesh = fc.generate.block((1.0, 2.0), (2, 4))
     mesh = mesh.with_facet_group("CUT", lambda x: np.abs(x[:, 1] - 1.0) < 1e-9, between=True)
-    model = fc.Model(fc.generate.cut(mesh, "CUT") if cut else mesh, "plane_stress")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    model = elastic_model(fc.generate.cut(mesh, "CUT") if cut else mesh, "plane_stress")
     for end in ("TOP", "BOTTOM"):
         model.fix(end, "xy")
     return model

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from models import elastic_model
 from test_result_files import MESH, step_result
 
 import fastcontact as fc
@@ -17,9 +18,7 @@ def cube():
     mesh = box((1.0, 1.0, 1.0), (1, 1, 1), "hex8")
     corners = np.flatnonzero((mesh.points[:, 0] == 0.0) & (mesh.points[:, 1] == 0.0))
     mesh = mesh.with_groups(points={"line": corners, "none": []})
-    model = fc.Model(fc.generate.with_reference_points(mesh, {"HANDLE": (0.5, 0.5, 3.0)}), "3d")
-    model.add_material(fc.LinearElastic(E=1.0, nu=0.3))
-    return model
+    return elastic_model(fc.generate.with_reference_points(mesh, {"HANDLE": (0.5, 0.5, 3.0)}), "3d", E=1.0)
 
 
 def ring():

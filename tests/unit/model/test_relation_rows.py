@@ -4,6 +4,7 @@ import tomllib
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.cases.case import build_case
@@ -37,9 +38,7 @@ def sides(dim):
 
 
 def model_of(mesh):
-    model = fc.Model(mesh, "3d" if mesh.dim == 3 else "plane_strain")
-    model.add_material(fc.LinearElastic(E=E, nu=NU))
-    return model
+    return elastic_model(mesh, "3d" if mesh.dim == 3 else "plane_strain", E=E, nu=NU)
 
 
 def last(model, **options):

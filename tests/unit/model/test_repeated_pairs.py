@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.mesh.generate import block, block_on_block
@@ -25,9 +26,7 @@ def mesh():
 
 
 def model_of(mesh):
-    model = fc.Model(mesh, "3d" if mesh.dim == 3 else "plane_strain")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    return model
+    return elastic_model(mesh, "3d" if mesh.dim == 3 else "plane_strain")
 
 
 @pytest.mark.parametrize(

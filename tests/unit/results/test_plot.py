@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact import normal_stress
@@ -91,9 +92,7 @@ def test_a_plane_mesh_is_still_drawn_in_the_plane():
 
 
 def test_a_pressure_profile_in_space_is_over_the_distance_from_the_middle():
-    model = fc.Model(box((1.0, 1.0, 0.5), (5, 5, 2), "hex8", (-0.5, -0.5, -0.5)), "3d")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("ZMIN", "xyz")
+    model = elastic_model(box((1.0, 1.0, 0.5), (5, 5, 2), "hex8", (-0.5, -0.5, -0.5)), "3d", ZMIN="xyz")
     ball = fc.obstacles.Sphere((0.0, 0.0, 2.0), 2.0)
     model.add_obstacle("ball", secondary="ZMAX", obstacle=ball, motion={"z": -0.02})
     contact = fc.solve(model, fc.linear_ramp(1))[-1].contact["ball"]

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.cli import main
@@ -62,9 +63,7 @@ def test_without_a_picture_or_a_window_it_says_what_to_name(result, capsys):
 
 def test_no_axis_no_picture(root):
     mesh = fc.generate.block((1.0, 1.0), (2, 2), "quad4", origin=(1.0, 0.0))
-    model = fc.Model(mesh, "axisymmetric")
-    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
-    model.fix("BOTTOM", "xy")
+    model = elastic_model(mesh, "axisymmetric", BOTTOM="xy")
     model.add_obstacle(
         "floor", secondary="TOP", obstacle=fc.obstacles.HalfSpace((0.0, 1.0), (0.0, -1.0)), motion={"y": -0.01}
     )

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.mesh import elements
@@ -230,9 +231,7 @@ def test_vtk_sees_our_solids_as_they_are(tmp_path, name, suffix):
 @pytest.mark.parametrize("element", SOLIDS)
 def test_vtk_reads_results_of_a_solid(tmp_path, element):
     vtk = pytest.importorskip("vtk", reason="vtk is not installed")
-    model = fc.Model(box((2.0, 1.0, 1.0), (2, 1, 1), element), "3d")
-    model.add_material(fc.LinearElastic(200.0, 0.3))
-    model.fix("XMIN", "xyz")
+    model = elastic_model(box((2.0, 1.0, 1.0), (2, 1, 1), element), "3d", E=200.0, XMIN="xyz")
     model.prescribe("XMAX", x=1e-3, y=2e-3, z=-1e-3)
     path = tmp_path / "solid.vtkhdf"
     with fc.ResultWriter(path, model) as out:

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from models import elastic_model
 
-import fastcontact as fc
 from fastcontact.errors import MeshError
 from fastcontact.mesh.generate import crowned_blocks, punched_block, rings
 
@@ -14,8 +14,7 @@ QUADRANGLES = ("quad4", "quad8", "quad9")
 
 def area(mesh, group):
     """Area of a group of solid cells, from the stiffness's own quadrature: the weight of a unit body force."""
-    model = fc.Model(mesh, "plane_strain")
-    model.add_material(fc.LinearElastic(E=1.0, nu=0.0))
+    model = elastic_model(mesh, "plane_strain", E=1.0, nu=0.0)
     model.add_body_force(group, x=1.0)
     return next(iter(model.forces_by_ramp().values()))[:, 0].sum()
 
