@@ -104,13 +104,9 @@ def test_nothing_but_our_own_errors(name, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("make", "text"),
     [
-        (lambda: fc.LinearElastic(E="2e5", nu=0.3), "E of LinearElastic must be a number or .*, not the string '2e5'"),
-        (lambda: fc.linear_ramp("5"), "the argument steps of linear_ramp must be a whole number, not the string '5'"),
         (lambda: fc.open_results(None), "the argument path of open_results must be a string or a path, not None"),
-        (lambda: model().add_material({"E": 1}), "the argument material of Model.add_material must be a Material"),
         (lambda: fc.solve(model(), resume=[1, 2]), "the argument resume of solve must be a sequence of StepResults"),
         (lambda: model(False).add_contact(**SIDES, friction="0.3"), "friction of contact 'h' must be a number"),
-        (lambda: fc.generate.half_spheres(size="2"), "size of half_spheres must be a number or None, not the string '2'"),
         (lambda: fc.solve("model"), "the argument model of solve must be a Model, not the string 'model'"),
         (lambda: fc.Criteria(max_geometry_updates=2.5), "max_geometry_updates = 2.5 must be a whole number >= 0"),
         (lambda: fc.Criteria(geometry_updates=1.5), "geometry_updates = 1.5 must be None or a whole number >= 0"),
@@ -212,7 +208,7 @@ def test_masks_are_not_lost_without_a_word(what):
     MASKED[what](lambda values: np.ma.array(values, mask=False))
 
 
-@pytest.mark.parametrize("what", ["moduli", "table", "temperature", "modulus", "points", "ramp"])
+@pytest.mark.parametrize("what", ["table", "temperature", "points", "ramp"])
 def test_imaginary_parts_are_not_lost_without_a_word(what):
     with pytest.raises(fc.FastcontactError, match=r"must be|must hold"):
         MASKED[what](lambda values: np.asarray(values, float) + 1j)

@@ -153,20 +153,13 @@ def test_a_case_file_has_couplings_moments_and_liquids():
         (lambda m: m.add_coupling("REF", "REF"), "the group needs points, without the reference point itself"),
         (lambda m: m.add_coupling("REF", "LEFT", components="z"), "unknown component 'z'"),
         (lambda m: m.add_coupling("REF", "LEFT", kind="distributing", components="x"), "has all components"),
-        (
-            lambda m: m.add_coupling("REF", "HELD", kind="distributing"),
-            "'REF' with 'HELD': the points lie in one line",
-        ),
         (lambda m: m.add_moment("REF", x=1.0), "in the plane moments are about z"),
-        (lambda m: m.add_moment("HELD", z=1.0), "the moment on 'HELD': the points lie in one line or place"),
         (lambda m: m.add_moment("REF", z=np.nan), "the moment on 'REF' is nan"),
         (
             lambda m: m.add_hydrostatic_pressure("LEFT", weight=np.inf, level=1.0),
             "the weight of the hydrostatic pressure",
         ),
         (lambda m: m.add_hydrostatic_pressure("LEFT", weight=1.0, level=1.0, axis="z"), "unknown component 'z'"),
-        (lambda m: fc.generate.with_reference_points(m.mesh, {"REF": (0.0, 0.0)}), "already a group 'REF'"),
-        (lambda m: fc.generate.with_reference_points(m.mesh, {"NEW": (0.0, 0.0, 1.0)}), "must be 2 numbers"),
     ],
 )
 def test_what_is_refused(call, said):

@@ -150,7 +150,6 @@ def test_units_do_not_matter(length, pressure):
             r"obstacle 'ball': translation along y",
         ),
         ({"force": {"y": 0.0}}, fc.ModelError, r"not supported: obstacle 'ball': translation along y"),
-        ({"force": {"y": -9.0}, "motion": {"y": -1.0}}, fc.ModelError, r"'ball' is both moved and pushed along y"),
         ({"force": {"y": float("nan")}}, fc.ModelError, r"force y on obstacle 'ball'"),
         ({"force": {"z": -9.0}}, fc.ModelError, r"the force on obstacle 'ball'"),
     ],

@@ -140,11 +140,7 @@ def moved(mesh, by):
 
 
 @pytest.mark.parametrize(("options", "words"), [
-    ({"kind": "glued"}, "kind of contact 'pair' 'glued'.*bilateral.*tied"),
-    ({"kind": "tied", "friction": 0.3}, "contact 'pair' is tied, which knows no friction"),
     ({"kind": "bilateral", "friction": 0.3}, "contact 'pair' is bilateral, which knows no friction"),
-    ({"kind": "tied", "clearance": 0.1}, "is tied, which keeps the sides as they lie, exactly: leave out 'clearance'"),
-    ({"kind": "tied", "penalty": 1e3}, "leave out 'penalty'"),
 ])  # fmt: skip
 def test_what_contradicts_itself_is_refused(options, words):
     with pytest.raises(fc.ContactError, match=words):

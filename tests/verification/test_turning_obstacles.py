@@ -250,7 +250,6 @@ REFUSED = {
     "needs 'angle'": {"centre": (0.0, 0.0)},
     "in the plane it is about z": {"angle": 1.0, "centre": (0.0, 0.0), "axis": (0, 0, 1)},
     "did you mean 'centre'": {"angle": 1.0, "center": (0.0, 0.0)},
-    "must be 2 finite numbers": {"angle": 1.0, "centre": (0.0, 0.0, 0.0)},
     "not a finite number": {"angle": float("nan"), "centre": (0.0, 0.0)},
 }
 

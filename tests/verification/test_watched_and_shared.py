@@ -259,13 +259,11 @@ def test_one_vector_turns_all_forces(formulation, options):
     ({"normals": (0.0, -1.0)}, "must point out of the body of 'CONT_LOWER'"),
     ({"normals": (0.0, 0.0)}, "a vector of 2 numbers"),
     ({"normals": (0.0, 1.0, 0.0)}, "a vector of 2 numbers"),
-    ({"normals": "smooth"}, "unknown kind of normals 'smooth'"),
     ({"opposite": "edge"}, "lies opposite to 'edge'"),
     ({"slip": "none"}, "unknown kind of slip 'none'"),
     ({"search_distance": 0.0}, "search_distance = 0.0 of contact 'pair' must be positive; leave it out for any distance"),
     ({"kind": "gap_only", "penalty": 1.0}, "gap_only, which has no forces"),
     ({"kind": "gap_only", "friction": 1.0}, "gap_only, which knows no friction"),
-    ({"kind": "tied", "search_distance": 1.0}, "leave out 'search_distance'"),
     ({"tangential_penalty": 1.0}, "no friction that it could soften"),
     ({"tangential_penalty": -1.0, "friction": 0.1}, "tangential_penalty -1 of contact 'pair' must be positive"),
 ])  # fmt: skip

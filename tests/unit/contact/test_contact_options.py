@@ -86,7 +86,6 @@ def test_an_obstacle_takes_them_from_a_case_file():
     ("clearance = 0.1\nclearance_ramp = [[1, 0], [1, 1]]", "clearance_ramp of contact 'pair'.* ascending"),
     ('excluded = "NOWHERE"', "NOWHERE"),
     ('excluded = "LOWER_BOTTOM"', "has no nodes on the secondary side 'CONT_UPPER'"),
-    ("penalty = 0", "penalty = 0 of contact 'pair' must be positive"),
     ('penalty = "stiff"', "the penalty of contact 'pair' is 'stiff'"),
     ('kind = "glue"', "kind of contact 'pair' 'glue'.*bilateral.*tied"),
 ])  # fmt: skip

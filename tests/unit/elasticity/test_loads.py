@@ -250,10 +250,6 @@ def model():
 @pytest.mark.parametrize(
     ("method", "arguments", "message"),
     [
-        ("add_pressure", {"group": "TOPP", "value": 1.0}, r"'TOPP': did you mean 'TOP'"),
-        ("add_pressure", {"group": "BLOCK", "value": 1.0}, r"'BLOCK' holds no facets"),
-        ("add_pressure", {"group": "TOP_NODES", "value": 1.0}, r"'TOP_NODES' holds points only"),
-        ("add_pressure", {"group": "TOP", "value": float("nan")}, r"pressure on 'TOP' is nan"),
         ("add_pressure", {"group": "TOP", "value": "1.0"}, r"argument value of .* not the string '1.0'"),
         ("add_pressure", {"group": "TOP", "value": 1.0, "ramp": [(0, 0)]}, r"at least two points"),
         ("add_pressure", {"group": "TOP", "value": 1.0, "ramp": [(0, 0), (1, float("inf"))]}, r"not finite"),
@@ -265,11 +261,6 @@ def model():
         ("add_traction", {"group": "TOP"}, r"traction on 'TOP' has no component"),
         ("add_traction", {"group": "TOP", "z": 1.0}, r"component 'z'"),
         ("add_traction", {"group": "TOP", "x": float("inf")}, r"traction on 'TOP' is inf"),
-        ("add_body_force", {"groups": "TOP", "x": 1.0}, r"'TOP' holds no solid cells"),
-        ("add_body_force", {"groups": "BLOC", "x": 1.0}, r"'BLOC': did you mean 'BLOCK'"),
-        ("add_force", {"group": "NONE", "x": 1.0}, r"'NONE' is empty"),
-        ("add_force", {"group": "TOPP", "x": 1.0}, r"'TOPP': did you mean"),
-        ("add_force", {"group": "TOP_NODES", "x": 1.0, "distribute": True}, r"holds points only"),
         ("add_force", {"group": "TOP", "x": lambda x: x[:, 0]}, r"must be a number: a function of position is"),
         ("couple", {"group": "TOP_LEFT", "component": "y"}, r"holds 1 points"),
         ("couple", {"group": "TOP", "component": "z"}, r"component 'z'"),

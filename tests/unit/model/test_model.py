@@ -63,14 +63,8 @@ def test_bodies_that_overlap_without_contact_are_refused(spheres):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"formulation": "mortarr"}, "contact formulation 'mortarr'"),
         ({"projektion_tolerance": 1.0}, "did you mean 'projection_tolerance'"),
-        ({"formulation": "continuous", "n_gauss": 1}, "undetermined"),
         ({"formulation": "continuous", "integration": "gaus"}, "did you mean 'gauss'"),
-        ({"formulation": "continuous", "augmentation": 0.0}, "augmentation"),
-        ({"normals": "smooth"}, "kind of normals 'smooth'"),
-        ({"projection_tolerance": -1.0}, "must not be negative"),
-        ({"secondary": "SPHBAS"}, "holds no facets"),
     ],
 )
 def test_wrong_contact_options(model, options, message):
