@@ -37,7 +37,7 @@ import fastcontact as fc
 from fastcontact.cases.case import read_case
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT / "tests" / "kills"))
+sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "kills")]
 
 import kill_cases  # noqa: E402
 import killing  # noqa: E402

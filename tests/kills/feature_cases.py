@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from case_texts import COMING, CUBE, pressed
+
 # Two blocks, of which the upper one is pressed down and then pushed to and fro.
 BLOCKS = """
 kinematics = "{kinematics}"
@@ -58,42 +60,6 @@ coefficient = 1.5
 ambient = 20.0
 """
 CONDUCTS = LINEAR + "\nconductivity = 50.0\nexpansion = 12e-6"
-# A cube held by what comes and goes, in steps of a deck.
-DECK = """*Node
-1, 0., 0., 0.
-2, 1., 0., 0.
-3, 1., 1., 0.
-4, 0., 1., 0.
-5, 0., 0., 1.
-6, 1., 0., 1.
-7, 1., 1., 1.
-8, 0., 1., 1.
-*Element, type=C3D8, elset=one
-1, 1, 2, 3, 4, 5, 6, 7, 8
-*Nset, nset=x1
-2, 3, 6, 7
-*Material, name=steel
-*Elastic
-100000., 0.3
-*Solid Section, elset=one, material=steel
-"""
-HELD = "1, 1, 3\n2, 2, 3\n3, 3\n4, 1\n4, 3\n5, 1\n8, 1\n"
-
-
-def _step(lines: str, pressure: float) -> str:
-    return f"*Step\n*Static\n{lines}*Dload\n1, P2, {pressure}\n*End Step\n"
-
-
-SUPPORTS = (
-    DECK
-    + _step("*Boundary\n" + HELD, 100.0)
-    + _step("*Boundary, fixed\nx1, 1\n", 200.0)
-    + _step("*Boundary\nx1, 1, 1, 0.\n", 200.0)
-    + _step("*Boundary, op=new\n" + HELD, 200.0)
-    + _step("*Boundary\nx1, 1, 1, 0.0005\n", 200.0)
-    + _step("", 100.0)
-)
-
 CASES = {
     "plastic": _blocks(LINEAR + "\nyield_stress = 3.0\nhardening = [[0.0, 3.0], [0.1, 9.0]]\nkinematic = 20.0"),
     "plastic with friction": _blocks(LINEAR + "\nyield_stress = 3.0", "friction = 0.3", along=0.05),
@@ -118,7 +84,7 @@ CASES = {
     "friction ramp": _blocks(
         options="friction = 0.4\nfriction_ramp = [[0.0, 0.2], [0.5, 1.0], [1.0, 0.1]]", along=0.05
     ),
-    "temporary supports": SUPPORTS,
+    "temporary supports": CUBE + COMING + pressed("", 100.0),
 }
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import feature_cases
+from case_texts import spheres
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -46,33 +47,6 @@ friction = 0.3
 steps = 12
 """
 
-# So small that starting the program takes most of the time.
-SMALL = """
-title = "small spheres"
-kinematics = "axisymmetric"
-[mesh]
-generator = "half-spheres"
-element = "tri3"
-size = 4.0
-[[material]]
-E = 20000.0
-nu = 0.3
-[[support]]
-group = "A1A2"
-x = 0.0
-[[support]]
-group = "A2B2"
-y = -2.0
-[[support]]
-group = "A1B1"
-y = 2.0
-[contact.hertz]
-secondary = "CONT1"
-primary = "CONT2"
-[ramp]
-steps = 12
-"""
-
 
 @dataclass(frozen=True)
 class KilledCase:
@@ -89,5 +63,5 @@ def prepared(name: str, folder: Path) -> KilledCase:
     if name in feature_cases.CASES:
         return KilledCase(feature_cases.written(name, folder), 0.0)
     path = folder / f"{name}.toml"
-    path.write_text({"friction": RUBBING, "small": SMALL}[name], encoding="utf-8")
+    path.write_text({"friction": RUBBING, "small": spheres(4.0, 12)}[name], encoding="utf-8")
     return KilledCase(path, 1e-10 if name == "friction" else 1e-12)

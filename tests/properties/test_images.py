@@ -34,7 +34,7 @@ def motion(dim, turn, mirrored):
     return Q @ np.diag([-1.0 if mirrored else 1.0, *[1.0] * (dim - 1)])
 
 
-@examples(40)
+@examples(25)
 @given(
     recipe=recipes(kinematics=PLANE) | recipes(kinematics=PLANE, friction=True),
     angle=st.floats(-3.2, 3.2), mirrored=st.booleans(), shift=st.tuples(*[st.floats(-50, 50)] * 2), seed=SEEDS,
@@ -43,7 +43,7 @@ def test_rigid_motions_mirrors_and_numberings_in_the_plane(recipe, angle, mirror
     stays(recipe, Image(Q=motion(2, angle, mirrored), shift=shift, seed=seed))
 
 
-@examples(20)
+@examples(15)
 @given(
     recipe=recipes(kinematics=ROUND) | recipes(kinematics=ROUND, friction=True), shift=st.floats(-50, 50), seed=SEEDS
 )
@@ -61,7 +61,7 @@ def test_rigid_motions_mirrors_and_numberings_in_space(recipe, quaternion, mirro
     stays(recipe, Image(Q=motion(3, quaternion, mirrored), shift=shift, seed=seed))
 
 
-@examples(40)
+@examples(25)
 @given(recipe=recipes() | recipes(friction=True), length=st.floats(-9, 9), pressure=st.floats(-12, 12))
 def test_units(recipe, length, pressure):
     stays(recipe, Image(length=10.0**length, pressure=10.0**pressure))

@@ -93,7 +93,7 @@ def test_every_formulation_between_bodies(formulation, element):
 
 
 def test_axisymmetric_spheres():
-    mesh = fc.generate.half_spheres(size=5.0)
+    mesh = fc.generate.half_spheres(size=10.0)
 
     def make(E=20_000.0, nu=0.3, moved=1.0):
         model = fc.Model(mesh, kinematics="axisymmetric")
@@ -182,7 +182,7 @@ def test_pairing_that_is_kept_takes_one_solution():
 def test_rigid_obstacles_that_are_moved_and_pushed(kinematics, formulation):
     dim = 3 if kinematics == "3d" else 2
     up, top, bottom = ("z", "ZMAX", "ZMIN") if dim == 3 else ("y", "TOP", "BOTTOM")
-    mesh = fc.generate.box((10.0, 10.0, 5.0), (6, 6, 3)) if dim == 3 else fc.generate.block((10.0, 5.0), (16, 8))
+    mesh = fc.generate.box((10.0, 10.0, 5.0), (5, 5, 2)) if dim == 3 else fc.generate.block((10.0, 5.0), (10, 5))
     centre = {"plane_strain": (4.3, 13.0), "axisymmetric": (0.0, 13.0), "3d": (3.3, 4.1, 13.0)}[kinematics]
 
     def make(pushed=False, E=1000.0, nu=0.3, motion=1.0, force=1.0):

@@ -2,54 +2,14 @@
 
 import numpy as np
 import pytest
+from case_texts import HERTZ, UNITS, spheres
 
 import fastcontact as fc
 from fastcontact.cases.case import read_case
 
-GOOD = """
-title = "small"
-kinematics = "axisymmetric"
-units = { length = "mm", force = "N", pressure = "MPa" }
-[mesh]
-generator = "half-spheres"
-element = "tri3"
-size = 10.0
-[[material]]
-E = 20000.0
-nu = 0.3
-[[support]]
-group = "A1A2"
-x = 0.0
-[[support]]
-group = "A2B2"
-y = -2.0
-[[support]]
-group = "A1B1"
-y = 2.0
-[contact.hertz]
-secondary = "CONT1"
-primary = "CONT2"
-[ramp]
-steps = 2
-[solve]
-linear_solver = "direct"
-geometry_updates = 2
-[probes]
-C1 = "C1"
-[theory.hertz]
-kind = "hertz_point"
-E1 = 20000.0
-nu1 = 0.3
-R1 = 50.0
-E2 = 20000.0
-nu2 = 0.3
-R2 = 50.0
-approach = 4.0
-[[check]]
-quantity = "C1.stress.yy"
-theory = "hertz"
-tolerance = 0.05
-"""
+SOLVE = '[solve]\nlinear_solver = "direct"\ngeometry_updates = 2\n'
+CHECK = '[[check]]\nquantity = "C1.stress.yy"\ntheory = "hertz"\ntolerance = 0.05\n'
+GOOD = spheres(10.0, 2, UNITS) + SOLVE + HERTZ + CHECK
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from case_texts import HERTZ, UNITS, spheres
 from models import elastic_model
 
 import fastcontact as fc
@@ -14,51 +15,9 @@ from fastcontact.cli import main
 from fastcontact.cli._main import history_lines
 from fastcontact.results import write_arrays
 
-CASE = """
-title = "small spheres"
-kinematics = "axisymmetric"
-units = { length = "mm", force = "N", pressure = "MPa" }
-[mesh]
-generator = "half-spheres"
-element = "tri3"
-size = 6.0
-[[material]]
-E = 20000.0
-nu = 0.3
-[[support]]
-group = "A1A2"
-x = 0.0
-[[support]]
-group = "A2B2"
-y = -2.0
-[[support]]
-group = "A1B1"
-y = 2.0
-[contact.hertz]
-secondary = "CONT1"
-primary = "CONT2"
-[ramp]
-steps = 3
-[probes]
-C1 = "C1"
-[theory.hertz]
-kind = "hertz_point"
-E1 = 20000.0
-nu1 = 0.3
-R1 = 50.0
-E2 = 20000.0
-nu2 = 0.3
-R2 = 50.0
-approach = 4.0
-[theory.hertz.mesh_converged]
-kind = "finite_half_spheres"
-approach = 4.0
-[[check]]
-name = "pole"
-quantity = "C1.stress.yy"
-theory = "hertz"
-tolerance = 0.2
-"""
+CONVERGED = '[theory.hertz.mesh_converged]\nkind = "finite_half_spheres"\napproach = 4.0\n'
+CHECK = '[[check]]\nname = "pole"\nquantity = "C1.stress.yy"\ntheory = "hertz"\ntolerance = 0.2\n'
+CASE = spheres(6.0, 3, UNITS) + HERTZ + CONVERGED + CHECK
 
 
 @pytest.fixture(scope="module")

@@ -319,12 +319,12 @@ def of_session(leader):
     return found
 
 
-def test_the_end_of_a_study_by_sigterm(tmp_path):
+def test_the_end_of_a_study_by_sigterm(solved_case, tmp_path):
     """As a scheduler does it: no process stays, nothing but one line is said, what was finished is kept."""
     process = subprocess.Popen(
         [
-            sys.executable, "-m", "fastcontact", "sweep", "forma04a", "--set", "approach=1:4:400", "--workers", "2", "-q",
-            "--store", "store",
+            sys.executable, "-m", "fastcontact", "sweep", str(solved_case / "case.toml"), "--set", "approach=1:4:400",
+            "--workers", "2", "-q", "--store", "store",
         ],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True, cwd=tmp_path,
     )  # fmt: skip

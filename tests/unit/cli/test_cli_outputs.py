@@ -205,8 +205,7 @@ def test_a_device_that_is_full_is_told_in_one_line(command, files, monkeypatch, 
 @pytest.mark.parametrize(
     ("command", "unbuffered"),
     [
-        (["info", "old.vtkhdf"], True), (["profile", "old.vtkhdf"], False), (["cases"], True), (["--help"], False),
-        (["--version"], True), (["run", "--help"], False), (["mesh", "half-spheres", "-h"], True),
+        (["info", "old.vtkhdf"], True), (["profile", "old.vtkhdf"], False), (["--help"], False), (["--version"], True),
         (["--print-completion", "bash"], False),
     ],
 )  # fmt: skip

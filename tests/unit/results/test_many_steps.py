@@ -27,13 +27,13 @@ def test_a_step_writes_what_it_adds_and_little_more(
 
     monkeypatch.setattr(CommittedFile, "_put", counted)
     with ResultWriter(tmp_path / "run.vtkhdf", MESH, synchronise=synchronise) as out:
-        for number in range(240):
+        for number in range(150):
             written.append(0)
             out.write(nth_step(number))
             ends.append(out._committed.end)
         written.append(0)
-    added = (ends[239] - ends[79]) / 160
-    early, late = sum(written[80:160]) / 80, sum(written[160:240]) / 80
+    added = (ends[149] - ends[49]) / 100
+    early, late = sum(written[50:100]) / 50, sum(written[100:150]) / 50
     assert late < (4.0 if synchronise else 2.5) * added  # synchronised, changes go to the journal, too
     assert late < 1.1 * early
 
@@ -45,12 +45,12 @@ def test_indices_do_not_gather_in_memory(shared: int, tmp_path: Path, monkeypatc
     monkeypatch.setattr(writer, "INDICES", 1 << 13)
     path, kept = tmp_path / "run.vtkhdf", []
     with ResultWriter(path, MESH) as out:
-        for number in range(150):
+        for number in range(100):
             out.write(nth_step(number))
             kept.append(out._file.id.get_mdc_size()[2])
-    assert max(kept[100:]) <= max(kept[:50])
+    assert max(kept[60:]) <= max(kept[:40])
     with open_results(path) as results:
-        assert len(results) == 150
+        assert len(results) == 100
         for number, step in enumerate(results):
             assert_same(step, nth_step(number), f"step {number}")
 

@@ -1,27 +1,13 @@
 """A small deck to change: two cubes, the upper one pressed down."""
 
+from case_texts import square
+
 import fastcontact as fc
 
-NODES = """*Heading
+NODES = f"""*Heading
  two cubes
 *Node
-1, 0., 0., 0.
-2, 1., 0., 0.
-3, 1., 1., 0.
-4, 0., 1., 0.
-5, 0., 0., 1.
-6, 1., 0., 1.
-7, 1., 1., 1.
-8, 0., 1., 1.
-11, 0., 0., 1.
-12, 1., 0., 1.
-13, 1., 1., 1.
-14, 0., 1., 1.
-15, 0., 0., 2.
-16, 1., 0., 2.
-17, 1., 1., 2.
-18, 0., 1., 2.
-*Element, type=C3D8, elset=low
+{square(1, 0)}{square(5, 1)}{square(11, 1)}{square(15, 2)}*Element, type=C3D8, elset=low
 1, 1, 2, 3, 4, 5, 6, 7, 8
 *Element, type=C3D8, elset=up
 2, 11, 12, 13, 14, 15, 16, 17, 18

@@ -2,45 +2,12 @@
 
 import numpy as np
 import pytest
+from case_texts import COMING, CUBE, HELD, pressed
 from deck_text import CONTACT, MATERIAL, NODES, SUPPORTS, deck_of
 
 import fastcontact as fc
 
-# One cube, E = 1000, nu = 0.3, pressed by 100, then 200: stretched by 0.03 and 0.06 where nothing holds it.
-CUBE = """*Node
-1, 0., 0., 0.
-2, 1., 0., 0.
-3, 1., 1., 0.
-4, 0., 1., 0.
-5, 0., 0., 1.
-6, 1., 0., 1.
-7, 1., 1., 1.
-8, 0., 1., 1.
-*Element, type=C3D8, elset=one
-1, 1, 2, 3, 4, 5, 6, 7, 8
-*Nset, nset=x1
-2, 3, 6, 7
-*Nset, nset=all, generate
-1, 8
-*Material, name=steel
-*Elastic
-100000., 0.3
-*Solid Section, elset=one, material=steel
-"""
-HELD = "1, 1, 3\n2, 2, 3\n3, 3\n4, 1\n4, 3\n5, 1\n8, 1\n"
-
-
-def step(lines, pressure=100.0):
-    return f"*Step\n*Static\n{lines}*Dload\n1, P2, {pressure}\n*End Step\n"
-
-
-COMING = (
-    step("*Boundary\n" + HELD)
-    + step("*Boundary, fixed\nx1, 1\n", 200.0)  # no further stretch along x
-    + step("*Boundary\nx1, 1, 1, 0.\n", 200.0)  # back to where it was
-    + step("*Boundary, op=new\n" + HELD, 200.0)  # let go
-    + step("*Boundary\nx1, 1, 1, 0.0005\n", 200.0)  # and driven again
-)
+# Pressed by 100 and 200, the cube is stretched by 0.0003 and 0.0006 where nothing holds it.
 STRETCH = [0.0003, 0.0003, 0.0, 0.0006, 0.0005]
 
 
@@ -88,7 +55,7 @@ def test_an_auxiliary_support_is_taken_away(tmp_path):
 
 
 def test_a_body_that_nothing_holds_any_more(tmp_path):
-    deck = deck_of(tmp_path, CUBE + step("*Boundary\n" + HELD) + step("*Boundary, op=new\n1, 1, 3\n"))
+    deck = deck_of(tmp_path, CUBE + pressed("*Boundary\n" + HELD) + pressed("*Boundary, op=new\n1, 1, 3\n"))
     with pytest.raises(fc.ModelError, match=r"in the load steps after 1: .* rigid-body motions are not supported"):
         deck.solve()
 
@@ -98,8 +65,8 @@ def test_local_axes(tmp_path):
     for axes, stretch in (("0., 1., 0., -1., 0., 0.", 2), ("1., 0., 0., 0., 1., 0.", 1)):
         turned = f"*Transform, nset=x1, type=R\n{axes}\n"
         back = f"*Boundary\nx1, {stretch}\n"
-        first = step("*Boundary\n1, 1, 3\n4, 1\n4, 3\n5, 1\n8, 1\n2, 3\n3, 3\n")
-        deck = deck_of(tmp_path, CUBE + turned + first + step(back))
+        first = pressed("*Boundary\n1, 1, 3\n4, 1\n4, 3\n5, 1\n8, 1\n2, 3\n3, 3\n")
+        deck = deck_of(tmp_path, CUBE + turned + first + pressed(back))
         steps = deck.solve()
         x1 = deck.points_of("x1")
         assert steps[0].displacement[x1, 0] == pytest.approx(np.full(4, 0.0003))

@@ -1,24 +1,13 @@
 """Pretension sections of decks: a bar of two cubes, stretched by a force, then locked."""
 
 import pytest
+from case_texts import square
 from deck_text import CONTACT, WHOLE, deck_of
 
 import fastcontact as fc
 
-BAR = """*Node
-1, 0., 0., 0.
-2, 1., 0., 0.
-3, 1., 1., 0.
-4, 0., 1., 0.
-5, 0., 0., 1.
-6, 1., 0., 1.
-7, 1., 1., 1.
-8, 0., 1., 1.
-15, 0., 0., 2.
-16, 1., 0., 2.
-17, 1., 1., 2.
-18, 0., 1., 2.
-99, 0., 0., 9.
+BAR = f"""*Node
+{square(1, 0)}{square(5, 1)}{square(15, 2)}99, 0., 0., 9.
 *Element, type=C3D8, elset=bar
 1, 1, 2, 3, 4, 5, 6, 7, 8
 2, 5, 6, 7, 8, 15, 16, 17, 18

@@ -1,0 +1,82 @@
+"""Texts of decks and case files that tests of many rooms begin with."""
+
+
+def square(first, height):
+    """Return four lines of ``*Node``, numbered from `first`: the corners of the unit square at a whole height."""
+    corners = ((0, 0), (1, 0), (1, 1), (0, 1))
+    return "".join(f"{first + k}, {x}., {y}., {height}.\n" for k, (x, y) in enumerate(corners))
+
+
+# One cube, E = 100000, nu = 0.3.
+CUBE = f"""*Node
+{square(1, 0)}{square(5, 1)}*Element, type=C3D8, elset=one
+1, 1, 2, 3, 4, 5, 6, 7, 8
+*Nset, nset=x1
+2, 3, 6, 7
+*Nset, nset=all, generate
+1, 8
+*Material, name=steel
+*Elastic
+100000., 0.3
+*Solid Section, elset=one, material=steel
+"""
+HELD = "1, 1, 3\n2, 2, 3\n3, 3\n4, 1\n4, 3\n5, 1\n8, 1\n"
+
+
+def pressed(lines, pressure=100.0):
+    """Return a step of a deck that presses on the cube."""
+    return f"*Step\n*Static\n{lines}*Dload\n1, P2, {pressure}\n*End Step\n"
+
+
+# The cube pressed by 100, then 200; supports come and go.
+COMING = (
+    pressed("*Boundary\n" + HELD)
+    + pressed("*Boundary, fixed\nx1, 1\n", 200.0)  # no further stretch along x
+    + pressed("*Boundary\nx1, 1, 1, 0.\n", 200.0)  # back to where it was
+    + pressed("*Boundary, op=new\n" + HELD, 200.0)  # let go
+    + pressed("*Boundary\nx1, 1, 1, 0.0005\n", 200.0)  # and driven again
+)
+
+
+def spheres(size, steps, head=""):
+    """Return a case file: two half-spheres of linear triangles, pressed together by 4 mm."""
+    return f"""
+title = "small spheres"
+kinematics = "axisymmetric"
+{head}[mesh]
+generator = "half-spheres"
+element = "tri3"
+size = {size}
+[[material]]
+E = 20000.0
+nu = 0.3
+[[support]]
+group = "A1A2"
+x = 0.0
+[[support]]
+group = "A2B2"
+y = -2.0
+[[support]]
+group = "A1B1"
+y = 2.0
+[contact.hertz]
+secondary = "CONT1"
+primary = "CONT2"
+[ramp]
+steps = {steps}
+"""
+
+
+UNITS = 'units = { length = "mm", force = "N", pressure = "MPa" }\n'
+HERTZ = """[probes]
+C1 = "C1"
+[theory.hertz]
+kind = "hertz_point"
+E1 = 20000.0
+nu1 = 0.3
+R1 = 50.0
+E2 = 20000.0
+nu2 = 0.3
+R2 = 50.0
+approach = 4.0
+"""
