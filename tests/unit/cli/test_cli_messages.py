@@ -6,6 +6,7 @@ import sys
 
 import matplotlib as mpl
 import pytest
+from case_texts import spheres
 
 from fastcontact.cli import main
 
@@ -45,21 +46,7 @@ def test_characters_that_the_font_of_a_picture_lacks_are_told_in_a_line(solved_c
     assert picture.exists()
 
 
-CASE = """kinematics = "axisymmetric"
-
-[mesh]
-generator = "half-spheres"
-element = "tri3"
-size = 10.0
-
-[[material]]
-E = 20000.0
-nu = 0.3
-
-[contact.hertz]
-secondary = "CONT1"
-primary = "CONT2"
-"""
+CASE = spheres(10.0, 1)
 
 
 def test_a_case_file_is_told(tmp_path, capsys):
