@@ -10,11 +10,12 @@ CLOSE = {"plane": 1e-11, "friction": 1e-11, "small": 1e-9}
 
 
 @pytest.fixture(scope="module")
-def compiled():
-    return json.loads(finished(start("whole_runs.py", *CLOSE, NUMBA_DISABLE_JIT="0"))[0])
+def found():
+    """The answers of both modes, compiled and interpreted."""
+    return [json.loads(finished(start("whole_runs.py", *CLOSE, NUMBA_DISABLE_JIT=mode))[0]) for mode in "01"]
 
 
 @pytest.mark.parametrize("run", CLOSE)
-def test_interpreted_kernels_find_the_numbers_of_compiled_ones(run, compiled):
-    interpreted = json.loads(finished(start("whole_runs.py", run, NUMBA_DISABLE_JIT="1"))[0])
+def test_interpreted_kernels_find_the_numbers_of_compiled_ones(run, found):
+    compiled, interpreted = found
     assert interpreted[run]["sizes"] == pytest.approx(compiled[run]["sizes"], rel=CLOSE[run], abs=0.0)

@@ -251,12 +251,8 @@ WHEN = {
 }
 
 
-# By default every command when NumPy is imported, and one each later on; studies start workers of their own.
-BY_DEFAULT = [
-    ("run", "a kernel is compiled"),
-    ("sweep", "a kernel is compiled"),
-    ("converge", "the compiler is loaded"),
-]
+# By default every command when NumPy is imported, and a run and a study later on; studies start workers of their own.
+BY_DEFAULT = [("run", "a kernel is compiled"), ("sweep", "the compiler is loaded")]
 INTERRUPTED = [
     pytest.param(command, when, marks=() if "NumPy" in when or (command, when) in BY_DEFAULT else pytest.mark.slow)
     for command in COMMANDS
