@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import shutil
 import signal
@@ -86,6 +87,28 @@ def linear_solver(request: pytest.FixtureRequest):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(linear, "make", given)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def meshes_made_once():
+    """Make each mesh of a costly generator once for all tests of a process: meshes do not change."""
+
+    def once(make):
+        made = functools.lru_cache(maxsize=None, typed=True)(make)
+
+        @functools.wraps(make)
+        def find(*arguments, **options):
+            try:
+                return made(*arguments, **options)
+            except TypeError:  # lists and arrays are not kept; what is wrong is told anew
+                return make(*arguments, **options)
+
+        return find
+
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("half_spheres", "sphere_on_block", "cylinder_on_block", "rings", "quarter_disc", "graded_block"):
+            patch.setattr(fc.generate, name, once(getattr(fc.generate, name)))
         yield
 
 

@@ -3,9 +3,12 @@
 import fastcontact as fc
 
 
-def elastic_model(mesh, kinematics, E=1000.0, nu=0.3, **held):
-    """Return a model of one elastic material, with groups held along axes: ``elastic_model(mesh, "3d", ZMIN="xyz")``."""
-    model = fc.Model(mesh, kinematics)
+def elastic_model(mesh, kinematics=None, E=1000.0, nu=0.3, **held):
+    """Return a model of one elastic material, with groups held along axes: ``elastic_model(mesh, ZMIN="xyz")``.
+
+    Meshes of the plane are in plane strain unless told otherwise.
+    """
+    model = fc.Model(mesh, kinematics or ("3d" if mesh.dim == 3 else "plane_strain"))
     model.add_material(fc.LinearElastic(E=E, nu=nu))
     for group, axes in held.items():
         model.fix(group, axes)

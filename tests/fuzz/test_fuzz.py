@@ -18,7 +18,7 @@ def prepared(tmp_path_factory):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of memory and time as Linux knows them")
-@pytest.mark.parametrize("count", [40, pytest.param(1000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [60, pytest.param(1000, marks=pytest.mark.slow)])
 def test_damaged_files_are_read_or_refused_and_nothing_else(prepared, count):
     found = fuzz_run.run(list(range(count)), 1, prepared)
     assert not found.failures, found.table()

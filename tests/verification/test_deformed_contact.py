@@ -67,13 +67,11 @@ def test_the_width_of_a_contact_is_that_of_the_deformed_shape() -> None:
     assert max(contact.radius[0], 0.0) in (pytest.approx(grown, rel=1e-6), pytest.approx(0.5 * grown, rel=1e-6))
 
 
-@pytest.mark.parametrize(
-    ("element", "divisions", "formulation"), [("quad4", (40, 10), "node_to_segment"), ("quad8", (24, 6), None)]
-)
+@pytest.mark.parametrize(("element", "formulation"), [("quad4", "node_to_segment"), ("quad8", None)])
 @pytest.mark.filterwarnings("ignore:contact 'ball' has only")
-def test_a_ball_slides_over_a_rubber_block(element: str, divisions: tuple[int, int], formulation: str | None) -> None:
-    """Pressed in by a quarter of the height, then the block is drawn on by three nodes; friction of 0.5."""
-    mesh = fc.generate.block((4.0, 1.0), divisions, element=element, origin=(-2.0, 0.0))
+def test_a_ball_slides_over_a_rubber_block(element: str, formulation: str | None) -> None:
+    """Pressed in by a quarter of the height, then the block is drawn on by three facets; friction of 0.5."""
+    mesh = fc.generate.block((4.0, 1.0), (40, 10), element=element, origin=(-2.0, 0.0))
     model = fc.Model(mesh, "plane_strain", strain="finite")
     model.add_material(fc.NeoHookean(E=1.0, nu=0.4995))
     model.fix("BOTTOM", "y")

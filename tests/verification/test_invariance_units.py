@@ -66,6 +66,7 @@ def test_units_make_no_difference_in_the_plane(name, unit):
     stays(PLANE[name], IMAGES[unit], solved(PLANE[name], Image())[0])
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("solver", ["direct", "amg"])
 @pytest.mark.parametrize(("name", "unit"), [*in_units(SPACE, list(UNITS)[:2])])
 def test_units_make_no_difference_in_space(name, unit, solver):

@@ -47,10 +47,6 @@ def everywhere(mesh):
     return fc.Mesh(mesh.points, blocks, {"OUTSIDE": outside})
 
 
-def model_on(mesh, kinematics):
-    return elastic_model(mesh, kinematics)
-
-
 def total(model):
     """Nodal forces of all loads."""
     return sum(model.forces_by_ramp().values(), np.zeros(model.mesh.points.shape))
@@ -59,7 +55,7 @@ def total(model):
 @pytest.mark.parametrize("element", PLANE + SOLID)
 def test_uniform_pressure_all_around_has_no_resultant_and_no_moment(element):
     mesh = everywhere(block(element) if element in PLANE else box(element))
-    model = model_on(mesh, "plane_strain" if mesh.dim == 2 else "3d")
+    model = elastic_model(mesh, "plane_strain" if mesh.dim == 2 else "3d")
     model.add_pressure("OUTSIDE", 7.0)
     forces = total(model)
     assert np.abs(forces).max() > 0.1
@@ -73,7 +69,7 @@ def test_uniform_pressure_all_around_has_no_resultant_and_no_moment(element):
 def test_pressure_all_around_works_on_a_change_of_volume(element):
     """The work of a pressure on a uniform growth is minus pressure times change of volume, on curved facets too."""
     mesh = everywhere(block(element) if element in PLANE else box(element))
-    model = model_on(mesh, "plane_strain" if mesh.dim == 2 else "3d")
+    model = elastic_model(mesh, "plane_strain" if mesh.dim == 2 else "3d")
     model.add_pressure("OUTSIDE", 7.0)
     model.add_body_force(x=1.0)
     forces = model.loads[0].vector(mesh, model.kinematics)
@@ -84,7 +80,7 @@ def test_pressure_all_around_works_on_a_change_of_volume(element):
 @pytest.mark.parametrize("element", PLANE)
 def test_axisymmetric_pressure_is_over_the_full_circle(element):
     mesh = block(element, bend=False)
-    model = model_on(mesh, "axisymmetric")
+    model = elastic_model(mesh, "axisymmetric")
     model.add_pressure("TOP", 3.0)
     model.add_pressure("RIGHT", 2.0)
     forces = total(model)
@@ -97,7 +93,7 @@ def test_axisymmetric_pressure_is_over_the_full_circle(element):
 @pytest.mark.parametrize("element", SOLID)
 def test_forces_on_faces_in_3d(element):
     mesh = box(element, bend=False)
-    model = model_on(mesh, "3d")
+    model = elastic_model(mesh, "3d")
     model.add_pressure("ZMAX", 3.0)
     model.add_traction("XMIN", y=5.0)
     model.add_force("YMAX", x=11.0, z=13.0)
@@ -108,7 +104,7 @@ def test_forces_on_faces_in_3d(element):
 @pytest.mark.parametrize("kinematics", ["plane_strain", "axisymmetric"])
 def test_nodal_forces_of_curved_facets_against_fine_integration(element, kinematics):
     mesh = block(element)
-    model = model_on(mesh, kinematics)
+    model = elastic_model(mesh, kinematics)
     model.add_pressure("RIGHT", lambda x: 1.0 + x[:, 1])
     expected = np.zeros(mesh.points.shape)
     xi, weights = quadrature.gauss_line(40)
@@ -126,7 +122,7 @@ def test_nodal_forces_of_curved_facets_against_fine_integration(element, kinemat
 
 def test_a_traction_that_varies_has_the_right_moments():
     mesh = block("quad4", bend=False)
-    model = model_on(mesh, "plane_strain")
+    model = elastic_model(mesh, "plane_strain")
     model.add_traction("TOP", y=lambda x: x[:, 0] ** 2, x=-1.0)
     forces = total(model)
     assert forces[:, 0].sum() == pytest.approx(-2.0, rel=1e-13)
@@ -137,7 +133,7 @@ def test_a_traction_that_varies_has_the_right_moments():
 @pytest.mark.parametrize("element", PLANE)
 def test_body_force_by_group_and_over_the_full_circle(element):
     lower, upper = fc.generate.block_on_block(element), "UPPER"
-    model = model_on(lower, "axisymmetric")
+    model = elastic_model(lower, "axisymmetric")
     model.add_body_force(upper, y=-2.0)
     model.add_body_force(y=lambda x: x[:, 0])
     volume = np.pi * 10.0**2 * 5.0
@@ -150,14 +146,14 @@ def test_body_force_by_group_and_over_the_full_circle(element):
 def test_a_cell_in_two_groups_is_loaded_once():
     mesh = block("quad4", bend=False)
     mesh = mesh.with_groups(cells={"AGAIN": mesh.cell_groups["BLOCK"]})
-    model = model_on(mesh, "plane_strain")
+    model = elastic_model(mesh, "plane_strain")
     model.add_body_force(["BLOCK", "AGAIN"], x=1.0)
     assert total(model)[:, 0].sum() == pytest.approx(3.0, rel=1e-13)
 
 
 def test_a_total_force_is_split_consistently():
     mesh = fc.generate.block((3.0, 1.0), (1, 1), "quad8")
-    model = model_on(mesh, "plane_strain")
+    model = elastic_model(mesh, "plane_strain")
     model.add_force("TOP", y=-6.0)
     forces = total(model)[:, 1]
     ends = [mesh.point("TOP_LEFT"), mesh.point("TOP_RIGHT")]
@@ -169,7 +165,7 @@ def test_a_total_force_is_split_consistently():
 def test_the_group_decides_what_a_force_is():
     mesh = block("quad4", bend=False)
     mesh = mesh.with_groups(points={"NODES": mesh.points_of("TOP")})
-    model = model_on(mesh, "plane_strain")
+    model = elastic_model(mesh, "plane_strain")
     model.add_force("NODES", x=1.0)
     model.add_force("TOP", y=1.0)
     model.add_force("BOTTOM", y=1.0, distribute=False)
@@ -180,7 +176,7 @@ def test_the_group_decides_what_a_force_is():
 
 
 def test_loads_of_one_history_come_together():
-    model = model_on(block("quad4"), "plane_strain")
+    model = elastic_model(block("quad4"), "plane_strain")
     table = ((0.0, 0.0), (1.0, 2.0))
     model.add_pressure("TOP", 1.0)
     model.add_pressure("TOP", 2.0, ramp=table)
@@ -216,7 +212,7 @@ def test_eliminated_relations_hold(seed, n, m):
 
 def test_a_coupled_group_follows_one_node():
     mesh = block("quad4", bend=False)
-    model = model_on(mesh, "plane_strain")
+    model = elastic_model(mesh, "plane_strain")
     model.couple("TOP", "y")
     (relation,) = model.relations
     tie = eliminate(relation.rows, np.zeros(model.n_dofs, bool))
@@ -226,7 +222,7 @@ def test_a_coupled_group_follows_one_node():
 
 def test_coupling_to_a_support_prescribes_all():
     mesh = block("quad4", bend=False)
-    model = model_on(mesh, "plane_strain")
+    model = elastic_model(mesh, "plane_strain")
     model.couple("TOP", "y")
     model.prescribe("TOP_LEFT", y=0.25)
     fixed, values = model.prescribed()
@@ -242,7 +238,7 @@ def test_coupling_to_a_support_prescribes_all():
 def model():
     mesh = block("quad4", bend=False)
     mesh = mesh.with_groups(points={"NONE": [], "TOP_NODES": mesh.points_of("TOP")})
-    model = model_on(mesh, "plane_strain")
+    model = elastic_model(mesh, "plane_strain")
     model.fix("BOTTOM", "xy")
     return model
 
@@ -303,7 +299,7 @@ def test_a_pressure_inside_the_solid_is_refused():
     inner = np.flatnonzero(np.abs(mesh.points[:, 0] - 0.5) < 1e-12)
     lines = np.vstack([mesh.cells["line2"], inner])
     inside = fc.Mesh(mesh.points, {"quad4": mesh.cells["quad4"], "line2": lines}, {"INNER": [2 + len(lines) - 1]})
-    model = model_on(inside, "plane_strain")
+    model = elastic_model(inside, "plane_strain")
     with pytest.raises(fc.ModelError, match=r"1 of 1 facets of 'INNER' do not lie on the outside.*add_traction"):
         model.add_pressure("INNER", 1.0)
     model.add_traction("INNER", x=2.0)
@@ -313,7 +309,7 @@ def test_a_pressure_inside_the_solid_is_refused():
 def test_a_force_on_a_point_outside_all_solids_is_refused(model):
     mesh = model.mesh.replace(points=np.vstack([model.mesh.points, [[2.0, 5.0]]]))
     mesh = mesh.with_groups(points={"REFERENCE": [len(model.mesh.points)]})
-    lone = model_on(mesh, "plane_strain")
+    lone = elastic_model(mesh, "plane_strain")
     lone.fix("BOTTOM", "xy")
     lone.add_force("REFERENCE", y=-1.0)
     with pytest.raises(fc.ModelError, match=r"nodal force on 'REFERENCE' acts on 1 points"):
@@ -358,7 +354,7 @@ def test_supports_with_other_histories_clash(model):
 
 def test_motions_that_relations_stop_are_no_longer_free():
     mesh = block("quad4", bend=False)
-    model = model_on(mesh, "plane_strain")
+    model = elastic_model(mesh, "plane_strain")
     model.fix("BOTTOM_LEFT", "xy")
     with pytest.raises(fc.ModelError, match=r"1 rigid-body motion is not supported: body 'BLOCK'.*rotation"):
         model.check()
@@ -367,7 +363,7 @@ def test_motions_that_relations_stop_are_no_longer_free():
 
 
 def test_bodies_tied_by_relations_move_together():
-    model = model_on(fc.generate.block_on_block("quad4"), "plane_strain")
+    model = elastic_model(fc.generate.block_on_block("quad4"), "plane_strain")
     model.fix("LOWER_BOTTOM", "y")
     model.fix("LOWER_LEFT", "x")
     model.fix("UPPER_LEFT", "x")

@@ -29,14 +29,10 @@ def boxes(element="hex8", height=0.0):
     )
 
 
-def model_of(mesh, kinematics="plane_strain"):
-    return elastic_model(mesh, "3d" if mesh.dim == 3 else kinematics)
-
-
 @pytest.mark.parametrize("element", ["tri3", "quad4", "tri6", "quad8", "quad9"])
 def test_a_square_on_the_corner_of_another_is_refused(element):
     mesh = squares(element)
-    model = model_of(mesh)
+    model = elastic_model(mesh)
     model.fix("A_BOTTOM", "xy")
     node = int(np.flatnonzero((mesh.points == 1.0).all(axis=1))[0])
     pattern = (
@@ -51,7 +47,7 @@ def test_a_square_on_the_corner_of_another_is_refused(element):
 @pytest.mark.parametrize("element", ["tet4", "hex8", "wedge6", "tet10", "hex20"])
 @pytest.mark.parametrize(("height", "motions"), [(0.0, "1 rigid-body motion is"), (1.0, "3 rigid-body motions are")])
 def test_a_box_on_the_edge_or_corner_of_another_is_refused(element, height, motions):
-    model = model_of(boxes(element, height))
+    model = elastic_model(boxes(element, height))
     model.fix("A_YMIN", "xyz")
     with pytest.raises(
         fc.ModelError, match=rf"{motions} not supported: .*the part 'B_BOX' that hangs at point \d+ at \(1, 1, "
@@ -63,7 +59,7 @@ def test_a_box_on_the_edge_or_corner_of_another_is_refused(element, height, moti
 
 def test_both_parts_held_share_the_force_at_the_hinge():
     """A hinge passes forces on: what pulls one part is held by both supports."""
-    model = model_of(squares(n=4))
+    model = elastic_model(squares(n=4))
     model.fix("A_BOTTOM", "xy")
     model.fix("B_TOP", "x")
     model.add_body_force("B_BLOCK", y=-1.0)
@@ -72,7 +68,7 @@ def test_both_parts_held_share_the_force_at_the_hinge():
 
 
 def test_rings_in_axisymmetry_turn_about_no_node():
-    model = model_of(squares(), "axisymmetric")
+    model = elastic_model(squares(), "axisymmetric")
     model.fix("A_BOTTOM", "y")
     model.add_body_force("B_BLOCK", y=-1e-3)
     (step,) = fc.solve(model, fc.linear_ramp(1))
@@ -82,7 +78,7 @@ def test_rings_in_axisymmetry_turn_about_no_node():
 
 @pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
 def test_a_floor_holds_what_hangs_at_a_hinge(formulation):
-    model = model_of(squares(n=4))
+    model = elastic_model(squares(n=4))
     model.fix("A_BOTTOM", "xy")
     model.add_body_force("B_BLOCK", y=-1.0)
     floor = fc.obstacles.HalfSpace((0.0, 0.99), (0.0, 1.0))
@@ -94,7 +90,7 @@ def test_a_floor_holds_what_hangs_at_a_hinge(formulation):
 
 
 def test_a_load_away_from_the_floor_ends_with_the_name_of_the_part():
-    model = model_of(squares())
+    model = elastic_model(squares())
     model.fix("A_BOTTOM", "xy")
     model.add_body_force("B_BLOCK", y=1.0)
     floor = fc.obstacles.HalfSpace((0.0, 0.99), (0.0, 1.0))
@@ -104,11 +100,11 @@ def test_a_load_away_from_the_floor_ends_with_the_name_of_the_part():
 
 
 def test_relations_and_springs_stop_a_hinge():
-    model = model_of(squares())
+    model = elastic_model(squares())
     model.fix("A_BOTTOM", "xy")
     model.add_spring("B_TOP_RIGHT", x=1.0)
     model.check()
-    model = model_of(squares())
+    model = elastic_model(squares())
     model.fix("A_BOTTOM", "xy")
     model.relate([("B_TOP_RIGHT", "x", 1.0), ("A_TOP_LEFT", "x", -1.0)])
     model.check()
@@ -119,4 +115,4 @@ def test_a_mesh_that_falls_into_very_many_parts_is_refused_at_once(monkeypatch):
     with pytest.raises(
         fc.ModelError, match=r"falls into 2 parts .*first: point \d+ at \(1, 1\)\): let cells share whole"
     ):
-        model_of(squares()).check()
+        elastic_model(squares()).check()

@@ -14,10 +14,6 @@ from fastcontact.model.ramp import Ramp
 FORMULATIONS = ["node_to_segment", "continuous", "mortar"]
 
 
-def model_of(mesh, kinematics="plane_strain"):
-    return elastic_model(mesh, "3d" if mesh.dim == 3 else kinematics)
-
-
 def floor(dim, height=0.0):
     return fc.obstacles.HalfSpace((0.0,) * (dim - 1) + (height,), (0.0,) * (dim - 1) + (1.0,))
 
@@ -36,7 +32,7 @@ def told(model, ramp=None):
     ],
 )
 def test_a_side_pushed_into_a_floor_is_refused(mesh, kinematics, side, formulation):
-    model = model_of(mesh, kinematics)
+    model = elastic_model(mesh, kinematics)
     up = "yz"[mesh.dim - 2]
     model.prescribe(side, **{up: -0.1})
     model.fix("LEFT" if mesh.dim == 2 else "XMIN", "x")
@@ -53,7 +49,7 @@ def test_a_side_pushed_into_a_floor_is_refused(mesh, kinematics, side, formulati
 @pytest.mark.parametrize("sides", [("CONT_UPPER", "CONT_LOWER"), ("CONT_LOWER", "CONT_UPPER")])
 def test_both_sides_prescribed(sides, friction, formulation):
     def pressed(by):
-        model = model_of(block_on_block())
+        model = elastic_model(block_on_block())
         model.fix("CONT_LOWER", "xy")
         model.fix("CONT_UPPER", "x")
         model.prescribe("CONT_UPPER", y=-by)
@@ -70,7 +66,7 @@ def test_both_sides_prescribed(sides, friction, formulation):
 
 def shifted(by, mesh=None, **options):
     """A block moved by `by` into a wall at its left, by its top alone."""
-    model = model_of(mesh or block((1.0, 1.0), (3, 4)))
+    model = elastic_model(mesh or block((1.0, 1.0), (3, 4)))
     model.prescribe("TOP", x=-by, y=0.0)
     wall = fc.obstacles.HalfSpace((0.0, 0.0), (1.0, 0.0))
     model.add_obstacle("wall", secondary="LEFT", obstacle=wall, **options)
@@ -110,7 +106,7 @@ def test_the_worst_instant_counts():
 
 
 def test_an_obstacle_that_moves_into_held_nodes():
-    model = model_of(box((1.0, 1.0, 1.0), (2, 2, 2)))
+    model = elastic_model(box((1.0, 1.0, 1.0), (2, 2, 2)))
     model.fix("XMIN", "xyz")
     model.add_obstacle("plate", secondary="ZMIN", obstacle=floor(3), motion={"z": 0.05})
     model.check()
@@ -120,7 +116,7 @@ def test_an_obstacle_that_moves_into_held_nodes():
 
 
 def test_an_interference_between_nodes_that_are_held_on_both_sides():
-    model = model_of(block_on_block())
+    model = elastic_model(block_on_block())
     for group in ("LOWER_BOTTOM", "UPPER_TOP", "LOWER_LEFT", "UPPER_LEFT"):
         model.fix(group, "xy")
     model.add_contact("pair", secondary="CONT_LOWER", primary="CONT_UPPER", clearance=-0.02)
@@ -130,7 +126,7 @@ def test_an_interference_between_nodes_that_are_held_on_both_sides():
 
 @pytest.mark.parametrize("secondary", ["CONT_LOWER", "CONT_UPPER"])
 def test_a_tool_of_prescribed_nodes_is_right(secondary):
-    model = model_of(block_on_block())
+    model = elastic_model(block_on_block())
     model.fix("LOWER_BOTTOM", "xy")
     model.prescribe("UPPER", x=0.0, y=-0.02)
     primary = {"CONT_LOWER": "CONT_UPPER", "CONT_UPPER": "CONT_LOWER"}[secondary]
@@ -141,7 +137,7 @@ def test_a_tool_of_prescribed_nodes_is_right(secondary):
 
 def test_an_overlap_before_any_load_is_that_of_the_mesh():
     mesh = block((1.0, 1.0), (2, 2))
-    model = model_of(mesh)
+    model = elastic_model(mesh)
     model.fix("BOTTOM", "xy")
     model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor(2, 0.01))
     model.check()
@@ -151,7 +147,7 @@ def test_an_overlap_before_any_load_is_that_of_the_mesh():
 @pytest.mark.parametrize("kind", ["tied", "bilateral"])
 def test_supports_that_tear_what_is_tied(kind):
     def torn(by):
-        model = model_of(block_on_block())
+        model = elastic_model(block_on_block())
         model.fix("CONT_LOWER", "xy")
         model.fix("CONT_UPPER", "x")
         model.prescribe("CONT_UPPER", y=by)
@@ -164,7 +160,7 @@ def test_supports_that_tear_what_is_tied(kind):
 
 
 def test_tied_sides_may_not_be_shifted_along_each_other():
-    model = model_of(block_on_block())
+    model = elastic_model(block_on_block())
     model.fix("CONT_LOWER", "xy")
     model.fix("CONT_UPPER", "y")
     model.prescribe("CONT_UPPER", x=0.03)
@@ -174,7 +170,7 @@ def test_tied_sides_may_not_be_shifted_along_each_other():
 
 
 def test_relations_that_hold_nodes_inside_are_told_at_the_end():
-    model = model_of(block((1.0, 1.0), (2, 2)))
+    model = elastic_model(block((1.0, 1.0), (2, 2)))
     model.couple("BOTTOM", "y")
     model.prescribe("BOTTOM_LEFT", y=-0.1)
     model.fix("LEFT", "x")

@@ -38,7 +38,7 @@ def sides(dim):
 
 
 def model_of(mesh):
-    return elastic_model(mesh, "3d" if mesh.dim == 3 else "plane_strain", E=E, nu=NU)
+    return elastic_model(mesh, E=E, nu=NU)
 
 
 def last(model, **options):

@@ -25,10 +25,6 @@ def mesh():
     return parts(parts(block_on_block(), "CONT_UPPER"), "CONT_LOWER")
 
 
-def model_of(mesh):
-    return elastic_model(mesh, "3d" if mesh.dim == 3 else "plane_strain")
-
-
 @pytest.mark.parametrize(
     ("first", "second"),
     [
@@ -43,7 +39,7 @@ def model_of(mesh):
 )
 @pytest.mark.parametrize("formulation", ["node_to_segment", "continuous", "mortar"])
 def test_facets_of_an_earlier_pair_are_refused(mesh, first, second, formulation):
-    model = model_of(mesh)
+    model = elastic_model(mesh)
     model.add_contact("first", secondary=first[0], primary=first[1], formulation=formulation)
     with pytest.raises(
         fc.ContactError, match=r"contact 'second' joins .* that contact 'first' joins already: .*point \d+"
@@ -54,7 +50,7 @@ def test_facets_of_an_earlier_pair_are_refused(mesh, first, second, formulation)
 
 @pytest.mark.parametrize("swapped", [False, True])
 def test_both_groups_are_the_same(mesh, swapped):
-    model = model_of(mesh)
+    model = elastic_model(mesh)
     sides = ("CONT_UPPER", "CONT_LOWER")
     model.add_contact("first", secondary=sides[0], primary=sides[1])
     with pytest.raises(fc.ContactError, match="which contact 'first' joins already"):
@@ -68,21 +64,21 @@ def test_facets_that_stand_in_the_mesh_twice_are_the_same(mesh):
     assert list(mesh.cells)[-1] == "line2"
     copied = mesh.replace(cells=again)
     copied = copied.with_groups(cells={"COPY": range(before, before + len(mesh.cell_groups["CONT_UPPER"]))})
-    model = model_of(copied)
+    model = elastic_model(copied)
     model.add_contact("first", secondary="CONT_UPPER", primary="CONT_LOWER")
     with pytest.raises(fc.ContactError, match="contact 'second' joins"):
         model.add_contact("second", secondary="COPY", primary="CONT_LOWER")
 
 
 def test_one_side_may_meet_two_others(mesh):
-    model = model_of(mesh)
+    model = elastic_model(mesh)
     model.add_contact("left", secondary="CONT_UPPER", primary="CONT_LOWER_LEFT")
     model.add_contact("right", secondary="CONT_UPPER", primary="CONT_LOWER_RIGHT")
     assert len(model.contact) == 2
 
 
 def pressed_in_a_corner():
-    model = model_of(block((1.0, 1.0), (2, 2)))
+    model = elastic_model(block((1.0, 1.0), (2, 2)))
     floor = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
     model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor)
     return model
@@ -96,7 +92,7 @@ def test_one_side_may_meet_two_obstacles():
 
 
 def test_an_obstacle_and_a_pair_may_share_facets(mesh):
-    model = model_of(mesh)
+    model = elastic_model(mesh)
     model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER")
     model.add_obstacle("floor", secondary="CONT_UPPER", obstacle=fc.obstacles.HalfSpace((0.0, -5.0), (0.0, 1.0)))
     assert len(model.contact) == 2
@@ -107,7 +103,7 @@ def test_a_facet_that_stands_in_a_group_twice_is_loaded_once(mesh):
     copied = mesh.replace(cells={**mesh.cells, "line2": np.vstack([line2, line2[:, ::-1]])})
     top = copied.cell_groups["UPPER_TOP"]
     copied = copied.with_groups(cells={"TWICE": np.concatenate([top, top + len(line2)])})
-    model = model_of(copied)
+    model = elastic_model(copied)
     model.add_pressure("TWICE", 2.0)
     model.add_traction("TWICE", x=3.0)
     model.add_force("TWICE", y=5.0)
@@ -117,7 +113,7 @@ def test_a_facet_that_stands_in_a_group_twice_is_loaded_once(mesh):
 
 def test_a_load_that_supports_take_up_is_told(mesh):
     def lost(**force):
-        model = model_of(mesh)
+        model = elastic_model(mesh)
         model.fix("UPPER_TOP", "y")
         model.fix("UPPER_LEFT", "x")
         model.fix("LOWER_BOTTOM", "xy")
@@ -131,7 +127,7 @@ def test_a_load_that_supports_take_up_is_told(mesh):
 
 
 def split(mesh, formulation, first, second, **options):
-    model = model_of(mesh)
+    model = elastic_model(mesh)
     model.add_contact("first", secondary=first[0], primary=first[1], formulation=formulation)
     model.add_contact("second", secondary=second[0], primary=second[1], formulation=formulation, **options)
     return [text for text in model_warnings(model, fc.linear_ramp(1)) if "go on in each other" in text]
@@ -163,7 +159,7 @@ def test_splitting_does_no_harm_where_nodes_carry_forces(mesh):
 @pytest.mark.parametrize("formulation", ["node_to_segment", "mortar"])
 def test_one_pair_of_both_halves_has_the_pressure_of_the_press(mesh, formulation):
     """What the warning advises is right, and what is silent is right, too."""
-    model = model_of(mesh)
+    model = elastic_model(mesh)
     model.fix("LOWER_BOTTOM", "y")
     model.fix("LOWER_LEFT", "x")
     model.fix("UPPER_LEFT", "x")
@@ -174,7 +170,7 @@ def test_one_pair_of_both_halves_has_the_pressure_of_the_press(mesh, formulation
         matching = parts(
             parts(block_on_block(divisions_lower=(6, 2), divisions_upper=(6, 2)), "CONT_UPPER"), "CONT_LOWER"
         )
-        model = model_of(matching)
+        model = elastic_model(matching)
         model.fix("LOWER_BOTTOM", "y")
         model.fix("LOWER_LEFT", "x")
         model.fix("UPPER_LEFT", "x")
@@ -196,7 +192,7 @@ def test_pairs_share_the_force_of_a_common_node_by_area(solver, friction, swappe
     points = even.points.copy()
     points[:, 0] = points[:, 0] ** 2 / points[:, 0].max()
     mesh = parts(parts(fc.Mesh(points, even.cells, even.cell_groups, even.point_groups), "CONT_UPPER"), "CONT_LOWER")
-    model = model_of(mesh)
+    model = elastic_model(mesh)
     model.fix("LOWER_BOTTOM", "y")
     model.fix("LOWER_LEFT", "x")
     model.fix("UPPER_LEFT", "x")
