@@ -14,10 +14,6 @@ from fastcontact.contact.configuration import Configuration
 pytestmark = pytest.mark.pairwise
 
 
-def with_material(mesh):
-    return elastic_model(mesh, "3d")
-
-
 def blocks(n, formulation="node_to_segment"):
     """Return two cubes whose meshes do not match, pressed together."""
     m = round(0.7 * n)
@@ -28,7 +24,7 @@ def blocks(n, formulation="node_to_segment"):
             "HIGH": fc.generate.box((1.0, 1.0, 1.0), (m, m, m), origin=(0.0, 0.0, 1.0), name="HIGH"),
         }.items()
     ]
-    model = with_material(fc.generate.union(*parts))
+    model = elastic_model(fc.generate.union(*parts))
     model.fix("ZMIN_LOW", "xyz")
     model.prescribe("ZMAX_HIGH", x=0.0, y=0.0, z=-0.01)
     model.add_contact("c", secondary="ZMIN_HIGH", primary="ZMAX_LOW", formulation=formulation)
@@ -37,7 +33,7 @@ def blocks(n, formulation="node_to_segment"):
 
 def sphere(size, formulation="node_to_segment"):
     mesh = fc.generate.sphere_on_block("hex8", R=1.0, size=size, contact_size=size / 3, contact_radius=0.2)
-    model = with_material(mesh)
+    model = elastic_model(mesh)
     model.fix("SYMMETRY_X", "x")
     model.fix("SYMMETRY_Z", "z")
     model.fix("BLOCK_BOTTOM", "y")
@@ -144,6 +140,17 @@ INTERFACES = [
 ]
 
 
+def checked(make, *given, most, pairings=None, **options):
+    """Return the figures of a step of `bench robustness` that takes so many times the iterations of a linear solution."""
+    robustness = suite("subjects").load("robustness")
+    found = robustness.figures(getattr(robustness, make)(*given, **options))
+    assert not found["gave_up"]
+    assert pairings is None or found["pairings"] <= pairings
+    assert found["step"]["iterations"] <= most * found["linear"]["iterations"]
+    assert found["residual"] < 1e-6
+    return found
+
+
 @pytest.mark.filterwarnings("ignore:Young's moduli")
 @pytest.mark.parametrize(
     ("given", "most", "friction"),
@@ -154,43 +161,25 @@ INTERFACES = [
     ],
 )
 def test_iterations_under_whole_interfaces_are_a_few_times_those_without_contact(given, most, friction):
-    robustness = suite("subjects").load("robustness")
-    found = robustness.figures(robustness.blocks(**{"divisions": 12, **given, "friction": friction}))
-    assert not found["gave_up"]
+    found = checked("blocks", **{"divisions": 12, **given, "friction": friction}, most=most)
     assert found["sliding"] > 0 or not friction
-    assert found["step"]["iterations"] <= most * found["linear"]["iterations"]
-    assert found["residual"] < 1e-6
 
 
 @pytest.mark.filterwarnings("ignore:Young's moduli")
 @pytest.mark.parametrize("given", [{"curvature": 0.02}, {"nu": 0.499}])
 def test_iterations_beside_a_stiff_secondary_side_that_touches_in_part_or_is_nearly_incompressible(given):
-    robustness = suite("subjects").load("robustness")
-    found = robustness.figures(robustness.blocks(16, ratio=1e-3, **given))
-    assert not found["gave_up"]
-    assert found["step"]["iterations"] <= 4 * found["linear"]["iterations"]
-    assert found["residual"] < 1e-6
+    checked("blocks", 16, ratio=1e-3, **given, most=4)
 
 
 @pytest.mark.filterwarnings("ignore:Young's moduli")
 @pytest.mark.parametrize(("element", "most"), [("tet10", 7.0), ("hex20", 7.5)])
 def test_friction_beside_a_much_stiffer_secondary_side_is_not_solved_pairing_by_pairing(element, most):
-    robustness = suite("subjects").load("robustness")
-    found = robustness.figures(robustness.blocks(6, 0.3, ratio=1e-3, element=element))
-    assert not found["gave_up"]
-    assert found["pairings"] <= 18
-    assert found["step"]["iterations"] <= most * found["linear"]["iterations"]
-    assert found["residual"] < 1e-6
+    checked("blocks", 6, 0.3, ratio=1e-3, element=element, most=most, pairings=18)
 
 
 @pytest.mark.filterwarnings("ignore:Young's moduli")
 def test_warm_starts_go_on_to_what_is_right_for_what_is_soft():
-    robustness = suite("subjects").load("robustness")
-    found = robustness.figures(robustness.blocks(6, 0.3, element="tet10", ratio=1e-4))
-    assert not found["gave_up"]
-    assert found["pairings"] <= 20
-    assert found["step"]["iterations"] <= 22 * found["linear"]["iterations"]
-    assert found["residual"] < 1e-6
+    checked("blocks", 6, 0.3, element="tet10", ratio=1e-4, most=22, pairings=20)
 
 
 @pytest.mark.parametrize(
@@ -198,25 +187,14 @@ def test_warm_starts_go_on_to_what_is_right_for_what_is_soft():
     [pytest.param(0.49, 8, marks=pytest.mark.slow), (0.499, 8), pytest.param(0.4999, 9, marks=pytest.mark.slow)],
 )
 def test_friction_of_nearly_incompressible_bodies_is_paired_as_often_as_that_of_others(nu, most):
-    robustness = suite("subjects").load("robustness")
-    found = robustness.figures(robustness.blocks(12, 0.3, nu=nu))
-    assert not found["gave_up"]
-    assert found["pairings"] <= most
-    assert found["step"]["iterations"] <= 2.2 * found["linear"]["iterations"]
-    assert found["residual"] < 1e-6
+    checked("blocks", 12, 0.3, nu=nu, most=2.2, pairings=most)
 
 
 @pytest.mark.parametrize("ball", [False, True])
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_iterations_on_rigid_obstacles_are_a_few_times_those_without_contact(ball, friction):
-    robustness = suite("subjects").load("robustness")
-    found = robustness.figures(robustness.on_obstacle(12, friction, ball))
-    assert not found["gave_up"]
-    assert found["step"]["iterations"] <= 3.5 * found["linear"]["iterations"]
-    assert found["residual"] < 1e-6
+    checked("on_obstacle", 12, friction, ball, most=3.5)
 
 
 def test_signs_of_loose_solutions_do_not_change_the_active_set_to_and_fro():
-    robustness = suite("subjects").load("robustness")
-    found = robustness.figures(robustness.blocks(12, nu=0.499))
-    assert found["step"]["iterations"] <= 2.5 * found["linear"]["iterations"]
+    checked("blocks", 12, nu=0.499, most=2.5)
