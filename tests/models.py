@@ -1,5 +1,7 @@
 """Models that tests of many rooms begin with."""
 
+import numpy as np
+
 import fastcontact as fc
 
 
@@ -13,3 +15,18 @@ def elastic_model(mesh, kinematics=None, E=1000.0, nu=0.3, **held):
     for group, axes in held.items():
         model.fix(group, axes)
     return model
+
+
+class DenseCompliance:
+    """A compliance of contact given by its matrix."""
+
+    def __init__(self, C):
+        self.C = C
+
+    def block(self, rows):
+        return self.C[np.ix_(rows, rows)]
+
+    among = block
+
+    def apply(self, multiplier):
+        return self.C @ multiplier

@@ -6,27 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from models import DenseCompliance
 from scipy.sparse import bsr_array, csr_array
 
 from fastcontact.analysis import active_set
 from fastcontact.analysis.solution import Accuracy
 from fastcontact.contact.constraints import Constraints
 from fastcontact.linear import choice as linear
-
-
-class Dense:
-    """A compliance given as a matrix."""
-
-    def __init__(self, C):
-        self.C = C
-
-    def block(self, rows):
-        return self.C[np.ix_(rows, rows)]
-
-    among = block
-
-    def apply(self, multiplier):
-        return self.C @ multiplier
 
 
 def enumerate_solutions(K, f, B, gap0, C):
@@ -64,7 +50,7 @@ def test_every_start_ends_in_the_enumerated_solution(seed, soft, start):
     half = rng.normal(size=(5, 2))
     C = half @ half.T if soft else np.zeros((5, 5))
     begin = np.array([bool(start >> k & 1) for k in range(5)])
-    state = solve(K, f, B, gap0, Dense(C) if soft else None, begin)
+    state = solve(K, f, B, gap0, DenseCompliance(C) if soft else None, begin)
     assert state.settled
     assert state.multiplier == pytest.approx(enumerate_solutions(K, f, B, gap0, C), abs=1e-8)
     assert np.abs(K @ state.u - f - B.T @ state.multiplier).max() < 1e-9

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import DenseCompliance
 from scipy.sparse import csr_array
 
 from fastcontact.contact.constraints import Constraints, stacked
@@ -9,25 +10,12 @@ from fastcontact.contact.constraints import Constraints, stacked
 N_DOFS = 7
 
 
-class Dense:
-    """A compliance given by its matrix."""
-
-    def __init__(self, C):
-        self.C = C
-
-    def block(self, rows):
-        return self.C[np.ix_(rows, rows)]
-
-    def apply(self, multiplier):
-        return self.C @ multiplier
-
-
 def part(m, seed, compliance=False, tangents=0, **given):
     random = np.random.default_rng(seed)
     G = random.normal(size=(m, m))
     return Constraints(
         csr_array(random.normal(size=(m, N_DOFS))), random.normal(size=m), random.normal(size=(m, 3)),
-        Dense(G @ G.T) if compliance else None,
+        DenseCompliance(G @ G.T) if compliance else None,
         tuple(csr_array(random.normal(size=(m, N_DOFS))) for _ in range(tangents)),
         tuple(random.normal(size=(m, 3)) for _ in range(tangents)), **given,
     )  # fmt: skip

@@ -2,6 +2,34 @@
 
 from itertools import combinations
 
+import numpy as np
+
+from fastcontact.results.step import StepResult
+
+
+def step_of(mesh, values=None, displacement=None, stress=None, load_factor=1.0):
+    """Return a step with these von Mises stresses, displacements and stresses at the nodes; without forces."""
+    n, dim = mesh.points.shape
+    u = np.zeros((n, dim)) if displacement is None else displacement
+    stress = np.zeros((n, 4 if dim == 2 else 6)) if stress is None else stress
+    values = np.zeros(n) if values is None else values
+    return StepResult(1, load_factor, u, stress, values, values, np.zeros((n, dim)))
+
+
+def polygons_of(monkeypatch):
+    """Return a list of the polygons in space that matplotlib is given from now on."""
+    from mpl_toolkits.mplot3d import art3d
+
+    given = []
+
+    class Recorded(art3d.Poly3DCollection):
+        def __init__(self, verts, **options):
+            given.extend(np.asarray(polygon) for polygon in verts)
+            super().__init__(verts, **options)
+
+    monkeypatch.setattr(art3d, "Poly3DCollection", Recorded)
+    return given
+
 
 def texts(ax):
     """Return boxes (left, bottom, right, top) of what is written, by name, in parts of the picture; ticks by their axis."""

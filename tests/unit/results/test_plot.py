@@ -4,37 +4,19 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from matplotlib_pictures import polygons_of, step_of
 from models import elastic_model
 
 import fastcontact as fc
 from fastcontact import normal_stress
 from fastcontact.mesh.generate import block, box, union
-from fastcontact.results.step import StepResult
 
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 
 
-def step_of(mesh, von_mises, displacement=None):
-    n, dim = mesh.points.shape
-    u = np.zeros((n, dim)) if displacement is None else displacement
-    stress = np.zeros((n, 4 if dim == 2 else 6))
-    return StepResult(1, 1.0, u, stress, von_mises, von_mises, np.zeros((n, dim)))
-
-
 @pytest.fixture
 def polygons(monkeypatch):
-    """The polygons that were given to matplotlib in this test."""
-    from mpl_toolkits.mplot3d import art3d
-
-    given = []
-
-    class Recorded(art3d.Poly3DCollection):
-        def __init__(self, verts, **options):
-            given.extend(np.asarray(polygon) for polygon in verts)
-            super().__init__(verts, **options)
-
-    monkeypatch.setattr(art3d, "Poly3DCollection", Recorded)
-    return given
+    return polygons_of(monkeypatch)
 
 
 @pytest.mark.parametrize("element", ["hex8", "hex20", "tet4", "tet10", "wedge6", "pyramid5"])

@@ -10,6 +10,7 @@ import subprocess
 
 import numpy as np
 import pytest
+from matplotlib_pictures import polygons_of, step_of
 from models import elastic_model
 
 import fastcontact as fc
@@ -21,21 +22,12 @@ from fastcontact.results.plot.fields import field_of, names
 from fastcontact.results.plot.hiding import Screen
 from fastcontact.results.plot.patches import fill, outlines
 from fastcontact.results.plot.section import _cut_tetrahedra
-from fastcontact.results.step import StepResult
 
 pytestmark = pytest.mark.each_value
 
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 SOLIDS = sorted(name for name, kind in elements.ELEMENTS.items() if kind.dim == 3)
 PLANE = sorted(name for name, kind in elements.ELEMENTS.items() if kind.dim == 2)
-
-
-def step_of(mesh, *, stress=None, displacement=None, values=None):
-    n, dim = mesh.points.shape
-    u = np.zeros((n, dim)) if displacement is None else displacement
-    stress = np.zeros((n, 4 if dim == 2 else 6)) if stress is None else stress
-    values = np.zeros(n) if values is None else values
-    return StepResult(1, 1.0, u, stress, values, values, np.zeros((n, dim)))
 
 
 def label(ax):
@@ -164,16 +156,7 @@ def test_what_is_hidden_is_found_as_by_hand(seed):
 
 def test_lines_behind_a_body_are_not_drawn(monkeypatch):
     """A fine block stands on a coarse one: no stroke nor piece of the coarse one is drawn where the fine one hides it."""
-    from mpl_toolkits.mplot3d import art3d
-
-    given = []
-
-    class Recorded(art3d.Poly3DCollection):
-        def __init__(self, verts, **options):
-            given.extend(np.asarray(polygon) for polygon in verts)
-            super().__init__(verts, **options)
-
-    monkeypatch.setattr(art3d, "Poly3DCollection", Recorded)
+    given = polygons_of(monkeypatch)
     mesh = union(box((4.0, 4.0, 1.0), (1, 1, 1), "hex8"), box((1.0, 1.0, 1.0), (5, 5, 5), "hex8", (1.5, 1.5, 1.0)))
     fc.plot.deformed_shape(mesh, step_of(mesh, values=mesh.points[:, 2]), view=(60.0, -60.0))
     pieces = [p for p in given if len(p) == 3]

@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
-from matplotlib_pictures import frames_of, overlaps, texts
+from matplotlib_pictures import frames_of, overlaps, step_of, texts
 from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.mesh.generate import block, box
-from fastcontact.results.step import StepResult
 
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 # Of boxes: a cube, a beam along each axis, a plate, a tile.
@@ -15,17 +14,15 @@ SIZES = [(1, 1, 1), (60, 15, 20), (5, 60, 8), (4, 6, 70), (50, 40, 3), (0.03, 0.
 VIEWS = [(25.0, -60.0), (25.0, -120.0), (20.0, 120.0), (60.0, 10.0)]
 
 
-def step_of(mesh, displacement=None, load_factor=1.0):
-    n, dim = mesh.points.shape
-    u = np.zeros((n, dim)) if displacement is None else displacement
-    values = 1000.0 + mesh.points[:, 0]
-    return StepResult(1, load_factor, u, np.zeros((n, 4 if dim == 2 else 6)), values, values, np.zeros((n, dim)))
+def thousands(mesh, displacement=None, load_factor=1.0):
+    """Return a step of long numbers."""
+    return step_of(mesh, 1000.0 + mesh.points[:, 0], displacement, load_factor=load_factor)
 
 
 @pytest.mark.parametrize(("size", "view"), [(size, VIEWS[(i + j) % 4]) for i, size in enumerate(SIZES) for j in (0, 1)])
 def test_texts_of_a_solid_are_whole_and_apart(size, view):
     mesh = box(size, (2, 2, 2), "hex8")
-    ax = fc.plot.deformed_shape(mesh, step_of(mesh, 0.01 * mesh.points), view=view, units=fc.plot.UNITS)
+    ax = fc.plot.deformed_shape(mesh, thousands(mesh, 0.01 * mesh.points), view=view, units=fc.plot.UNITS)
     ax.figure.canvas.draw()
     assert overlaps(texts(ax), solid=True) == []
 
@@ -36,8 +33,8 @@ def test_texts_of_sections_and_plane_bodies_are_whole_and_apart(size, zoom):
     plane, solid = block(size, (4, 4)), box((size[0], 2.0, size[1]), (4, 2, 4), "hex8")
     zoom = zoom and zoom * min(size)
     for ax in (
-        fc.plot.deformed_shape(plane, step_of(plane), zoom=zoom, units=fc.plot.UNITS),
-        fc.plot.section(solid, step_of(solid), (0.0, 1.0, 0.0), (0.0, 1.0, 0.0), zoom=zoom, units=fc.plot.UNITS),
+        fc.plot.deformed_shape(plane, thousands(plane), zoom=zoom, units=fc.plot.UNITS),
+        fc.plot.section(solid, thousands(solid), (0.0, 1.0, 0.0), (0.0, 1.0, 0.0), zoom=zoom, units=fc.plot.UNITS),
     ):
         ax.figure.canvas.draw()
         assert overlaps(texts(ax)) == []
@@ -45,14 +42,14 @@ def test_texts_of_sections_and_plane_bodies_are_whole_and_apart(size, zoom):
 
 def test_a_section_says_how_displacements_are_scaled():
     mesh = box((1.0, 1.0, 1.0), (2, 2, 2), "hex8")
-    ax = fc.plot.section(mesh, step_of(mesh), (0.5, 0.5, 0.5), (0.0, 1.0, 0.0), scale=20.0)
+    ax = fc.plot.section(mesh, thousands(mesh), (0.5, 0.5, 0.5), (0.0, 1.0, 0.0), scale=20.0)
     assert ax.get_title().endswith("load factor 1, displacements x 20")
 
 
 @pytest.mark.parametrize("size", SIZES[:3], ids=str)
 def test_pictures_of_an_animation_are_whole_and_in_proportion(size, tmp_path, monkeypatch):
     mesh = box(size, (2, 2, 2), "hex8")
-    steps = [step_of(mesh, 0.3 * k * mesh.points * [1.0, 0.2, 0.0], float(k)) for k in (1, 2)]
+    steps = [thousands(mesh, 0.3 * k * mesh.points * [1.0, 0.2, 0.0], float(k)) for k in (1, 2)]
     seen = frames_of(monkeypatch, lambda: fc.plot.animate(mesh, steps, tmp_path / "a.gif", units=fc.plot.UNITS))
     assert len(seen) == 2
     for found in seen:
