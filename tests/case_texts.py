@@ -38,6 +38,24 @@ COMING = (
 )
 
 
+def of_block(tables, kinematics="plane_stress", material="E = 1000.0\nnu = 0.3", steps=1, **held):
+    """Return a case file of the mesh ``block.med``, of one material, with groups held along axes, and further tables."""
+    supports = "".join(
+        f'[[support]]\ngroup = "{group}"\n' + "".join(f"{axis} = 0.0\n" for axis in axes)
+        for group, axes in held.items()
+    )
+    return f"""
+kinematics = "{kinematics}"
+[mesh]
+file = "block.med"
+[[material]]
+{material}
+{supports}{tables}
+[ramp]
+steps = {steps}
+"""
+
+
 def spheres(size, steps, head=""):
     """Return a case file: two half-spheres of linear triangles, pressed together by 4 mm."""
     return f"""

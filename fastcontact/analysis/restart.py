@@ -95,7 +95,9 @@ def put_back(problem: Problem, step: StepResult, touched: frozenset[str]) -> Sta
 def _of_tractions(problem: Problem, pairs: Mapping[str, Any]) -> dict[str, tuple[Array, Array]]:
     """Return the elastic slips [length] by pair of files that hold tangential tractions instead, of pairs with a penalty."""
     slips = {}
-    for name, (positions, traction) in ((name, kept["traction"]) for name, kept in pairs.items() if kept.get("traction")):
+    for name, (positions, traction) in (
+        (name, kept["traction"]) for name, kept in pairs.items() if kept.get("traction")
+    ):
         stiffness = problem.pairs[name].options.tangential_penalty
         assert stiffness is not None
         slips[name] = positions, traction / stiffness(positions)[:, None]

@@ -1,5 +1,7 @@
 """Damaged files of every format, the first of those that `bench/fuzz.py` reads by the ten thousand."""
 
+import json
+import shutil
 import sys
 from collections import Counter
 
@@ -17,16 +19,29 @@ def prepared(tmp_path_factory):
     return folder
 
 
+@pytest.fixture
+def one_seed(prepared, tmp_path):
+    """A folder with one seed alone: workers, which read one of each format first, start soon."""
+    folder = tmp_path / "one"
+    (folder / "seeds").mkdir(parents=True)
+    (folder / "outside").mkdir()
+    names = json.loads((prepared / "seeds" / "seeds.json").read_text(encoding="utf-8"))
+    name = next(name for name, file in names.items() if file.endswith(".med"))
+    shutil.copy(prepared / "seeds" / names[name], folder / "seeds")
+    (folder / "seeds" / "seeds.json").write_text(json.dumps({name: names[name]}), encoding="utf-8")
+    return folder
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of memory and time as Linux knows them")
 @pytest.mark.parametrize("count", [60, pytest.param(1000, marks=pytest.mark.slow)])
 def test_damaged_files_are_read_or_refused_and_nothing_else(prepared, count):
+    """Within the limits of memory and time, beyond which the worker ends: that is a failure, too."""
     found = fuzz_run.run(list(range(count)), 1, prepared)
     assert not found.failures, found.table()
     total = sum(found.counts.values(), Counter())
     assert total.total() == count
     assert total["refused"] > count // 2
     assert total["read"] > count // 20
-    assert found.slowest[0] < 10
 
 
 @pytest.mark.parametrize(
@@ -72,7 +87,7 @@ def test_memory_that_is_wanted_behind_a_clear_error_is_seen(monkeypatch, tmp_pat
         pytest.param("path.parent.joinpath('mine').touch()", "read", marks=pytest.mark.slow),
     ],
 )  # fmt: skip
-def test_the_fuzzer_survives_and_tells_what_a_reader_does(monkeypatch, tmp_path, prepared, code, kind):
+def test_the_fuzzer_survives_and_tells_what_a_reader_does(monkeypatch, tmp_path, one_seed, code, kind):
     """A reader that does `code`, which a module in front of the true one brings into the worker."""
     fake = tmp_path / "fake"
     fake.mkdir()
@@ -89,5 +104,5 @@ def test_the_fuzzer_survives_and_tells_what_a_reader_does(monkeypatch, tmp_path,
     )
     monkeypatch.setenv("PYTHONPATH", str(fake))
     monkeypatch.setenv("FUZZ_SECONDS", "1")
-    found = fuzz_run.run([0], 1, prepared)
+    found = fuzz_run.run([0], 1, one_seed)
     assert list(found.counts.values()) == [Counter({kind: 1})]

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from case_texts import of_block
 from models import elastic_model
 from test_temperature import ALPHA, RISE, E, free, plane, solved
 from two_bodies import rings
@@ -184,23 +185,7 @@ def test_an_initial_gap_closes_by_a_swelling_block():
 
 
 # ----------------------------------------------------------------------------- case files, words, mistakes
-CASE = """
-kinematics = "{}"
-[mesh]
-file = "block.med"
-[[material]]
-E = 1000.0
-nu = 0.3
-[[support]]
-group = "LEFT"
-x = 0.0
-[[support]]
-group = "BOTTOM"
-y = 0.0
-{}
-[ramp]
-steps = 1
-"""
+CASE = of_block("{}", "{}", LEFT="x", BOTTOM="y")
 
 
 def case(tmp_path, text, kinematics="plane_stress"):

@@ -4,6 +4,7 @@ import h5py
 import meshio
 import numpy as np
 import pytest
+from case_texts import of_block
 
 import fastcontact as fc
 from fastcontact.cases.case import read_case
@@ -102,25 +103,8 @@ def test_cells_in_another_order_and_of_a_group(tmp_path):
     assert np.isfinite(points).all()
 
 
-CASE = """
-kinematics = "plane_stress"
-[mesh]
-file = "block.med"
-[[material]]
-E = {}
-nu = 0.0
-[[support]]
-group = "LEFT"
-x = 0.0
-[[support]]
-group = "BOTTOM"
-y = 0.0
-[[traction]]
-group = "RIGHT"
-x = 2.0
-[ramp]
-steps = 1
-"""
+PULLED = '[[traction]]\ngroup = "RIGHT"\nx = 2.0'
+CASE = of_block(PULLED, material="E = {}\nnu = 0.0", LEFT="x", BOTTOM="y")
 
 
 @pytest.fixture

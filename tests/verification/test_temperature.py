@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from case_texts import of_block
 from two_bodies import rings
 
 import fastcontact as fc
@@ -193,28 +194,11 @@ def test_an_expansion_that_shears_out_of_the_plane_is_refused():
 
 def test_a_temperature_in_a_case_file(tmp_path):
     fc.write_mesh(tmp_path / "block.med", fc.generate.block(divisions=(2, 2)))
-    (tmp_path / "case.toml").write_text("""
-kinematics = "plane_stress"
-[mesh]
-file = "block.med"
-[[material]]
-E = 1000.0
-nu = 0.0
-expansion = 1e-5
-[[support]]
-group = "BOTTOM"
-y = 0.0
-[[support]]
-group = "TOP"
-y = 0.0
-[[support]]
-group = "LEFT"
-x = 0.0
-[[temperature]]
-value = 120.0
-reference = 20.0
-[ramp]
-steps = 1
-""")
+    text = of_block(
+        "[[temperature]]\nvalue = 120.0\nreference = 20.0",
+        material="E = 1000.0\nnu = 0.0\nexpansion = 1e-5",
+        LEFT="x", BOTTOM="y", TOP="y",
+    )  # fmt: skip
+    (tmp_path / "case.toml").write_text(text)
     step = solved(read_case(tmp_path / "case.toml").model)
     np.testing.assert_allclose(step.stress[:, 1], -1.0, rtol=1e-9)

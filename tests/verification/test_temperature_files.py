@@ -4,6 +4,7 @@ import h5py
 import meshio
 import numpy as np
 import pytest
+from case_texts import of_block
 from test_temperature import ALPHA, E, free, plane
 
 import fastcontact as fc
@@ -174,25 +175,8 @@ def test_heated_spheres_close_their_gap_and_press_as_hertz_says():
 
 
 # ----------------------------------------------------------------------------- case files and mistakes
-CASE = """
-kinematics = "plane_stress"
-[mesh]
-file = "block.med"
-[[material]]
-E = 1000.0
-nu = 0.3
-expansion = 1.2e-5
-[[support]]
-group = "LEFT"
-x = 0.0
-[[support]]
-group = "BOTTOM"
-y = 0.0
-[[temperature]]
-{}
-[ramp]
-steps = 2
-"""
+MATERIAL = "E = 1000.0\nnu = 0.3\nexpansion = 1.2e-5"
+CASE = of_block("[[temperature]]\n{}", material=MATERIAL, steps=2, LEFT="x", BOTTOM="y")
 
 
 @pytest.fixture

@@ -2,26 +2,13 @@
 
 import numpy as np
 import pytest
+from case_texts import of_block
 
 import fastcontact as fc
 from fastcontact.cases.case import read_case
 
-CASE = """
-kinematics = "plane_strain"
-[mesh]
-file = "block.med"
-[[material]]
-{}
-[[support]]
-group = "BOTTOM"
-x = 0.0
-y = 0.0
-[[pressure]]
-group = "TOP"
-value = 1.0
-[ramp]
-steps = 1
-"""
+PRESSED = '[[pressure]]\ngroup = "TOP"\nvalue = 1.0'
+CASE = of_block(PRESSED, "plane_strain", material="{}", BOTTOM="xy")
 WOOD = "E = [10800, 700, 430]\nnu = [0.45, 0.51, 0.54]\nG = [620, 580, 26]\n"
 CONSTANTS = (10800, 700, 430), (0.45, 0.51, 0.54), (620, 580, 26)
 

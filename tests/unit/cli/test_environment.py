@@ -5,6 +5,7 @@ import subprocess
 import sys
 
 import pytest
+from case_texts import of_block
 
 import fastcontact as fc
 
@@ -53,20 +54,5 @@ def test_an_unknown_backend_and_no_docstrings(tmp_path):
     )
 
 
-CASE = """title = "a block"
-kinematics = "plane_strain"
-[mesh]
-file = "block.med"
-[[material]]
-E = 1.0
-nu = 0.3
-[[support]]
-group = "LEFT"
-x = 0.0
-y = 0.0
-[[pressure]]
-group = "RIGHT"
-value = 0.01
-[ramp]
-steps = 1
-"""
+PRESSED = '[[pressure]]\ngroup = "RIGHT"\nvalue = 0.01'
+CASE = of_block(PRESSED, "plane_strain", "E = 1.0\nnu = 0.3", LEFT="xy")

@@ -163,17 +163,6 @@ direction = [1.0, 1.0]
     np.testing.assert_allclose(np.abs(spring.rows.data), np.sqrt(0.5))
 
 
-@pytest.mark.parametrize(("arguments", "words"), [
-    ({"x": 1.0, "direction": [1.0, 0.0]}, "has a direction, but no axial or transverse stiffness"),
-    ({"axial": 1.0, "direction": [0.0, 0.0]}, "must be a vector of 2 numbers, not all zero"),
-    ({"axial": 1.0, "direction": [1.0, 0.0, 0.0]}, "must be a vector of 2 numbers, not all zero"),
-])  # fmt: skip
-def test_wrong_directions_are_refused(arguments, words):
-    model = fc.Model(fc.generate.block((WIDTH, HEIGHT), (1, 1)), "plane_strain")
-    with pytest.raises(fc.ModelError, match=words):
-        model.add_spring(0, **arguments)
-
-
 def test_a_far_end_without_a_body_may_be_fixed_or_is_told():
     mesh = fc.generate.block((WIDTH, HEIGHT), (1, 1))
     points = np.vstack([mesh.points, [[-1.0, 0.0]]])
@@ -208,28 +197,25 @@ def test_a_spring_shares_the_load_with_a_contact():
 
 
 @pytest.mark.parametrize(
-    ("arguments", "message"),
+    ("groups", "stiffness", "words"),
     [
-        (("NOWHERE",), "NOWHERE"),
-        (("BOTTOM",), "has no component"),
-        (("BOTTOM", None, "z"), "component"),
-        (("BOTTOM", "BLOCK", "axial"), "have 2 and 4 nodes: they are joined one by one"),
-        (("TOP_LEFT", "TOP_LEFT", "axial"), "both ends are point"),
+        ([0], {"x": 1.0, "direction": [1.0, 0.0]}, "has a direction, but no axial or transverse stiffness"),
+        ([0], {"axial": 1.0, "direction": [0.0, 0.0]}, "must be a vector of 2 numbers, not all zero"),
+        ([0], {"axial": 1.0, "direction": [1.0, 0.0, 0.0]}, "must be a vector of 2 numbers, not all zero"),
+        (["NOWHERE"], {}, "NOWHERE"),
+        (["BOTTOM"], {}, "has no component"),
+        (["BOTTOM"], {"z": 1.0}, "component"),
+        (["BOTTOM"], {"y": np.nan}, r"stiffness .*(positive|finite)"),
+        (["BOTTOM"], {"y": np.inf}, r"stiffness .*(positive|finite)"),
+        (["BOTTOM"], {"y": "stiff"}, "must be a number"),
+        (["BOTTOM", "BLOCK"], {"axial": 1.0}, "have 2 and 4 nodes: they are joined one by one"),
+        (["TOP_LEFT", "TOP_LEFT"], {"axial": 1.0}, "both ends are point"),
     ],
 )
-def test_messages(arguments, message):
+def test_springs_that_cannot_be(groups, stiffness, words):
     model = fc.Model(fc.generate.block((WIDTH, HEIGHT), (1, 1)), "plane_strain")
-    group, *rest = arguments
-    stiffness = {rest[1]: 1.0} if len(rest) == 2 else {}
-    with pytest.raises(fc.FastcontactError, match=message):
-        model.add_spring(group, *rest[:1], **stiffness)
-
-
-@pytest.mark.parametrize("value", [np.nan, np.inf, "stiff"])
-def test_stiffness_must_be_a_positive_number(value):
-    model = fc.Model(fc.generate.block((WIDTH, HEIGHT), (1, 1)), "plane_strain")
-    with pytest.raises(fc.ModelError, match=r"stiffness .*(positive|finite)|must be a number"):
-        model.add_spring("BOTTOM", y=value)
+    with pytest.raises(fc.ModelError, match=words):
+        model.add_spring(*groups, **stiffness)
 
 
 def test_case_files_know_springs():

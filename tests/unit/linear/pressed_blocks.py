@@ -5,7 +5,7 @@ import numpy as np
 import fastcontact as fc
 
 
-def pressed(element="hex8", friction=0.0, ratio=1.0, curvature=0.0, n=10, **options):
+def pressed(element="hex8", friction=0.0, ratio=1.0, curvature=0.0, n=10, along=0.01, **options):
     """Two blocks that do not match, pressed together, and with friction pushed along each other."""
 
     def part(z, k, name):
@@ -19,6 +19,6 @@ def pressed(element="hex8", friction=0.0, ratio=1.0, curvature=0.0, n=10, **opti
     model.add_material(fc.LinearElastic(ratio, 0.3), groups=["L_BOX"])
     model.add_material(fc.LinearElastic(1.0, 0.3), groups=["U_BOX"])
     model.fix("L_ZMIN", "xyz")
-    model.prescribe("U_ZMAX", x=0.01 if friction else 0.0, y=0.0, z=-0.01)
+    model.prescribe("U_ZMAX", x=along if friction else 0.0, y=0.0, z=-0.01)
     model.add_contact("c", secondary="U_ZMIN", primary="L_ZMAX", friction=friction, **options)
     return model

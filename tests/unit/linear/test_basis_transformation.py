@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.sparse import csr_array, eye_array, kron
-from test_coupled_pivots import pressed, solved
+from test_coupled_pivots import check_beside_dual, pressed, solved
 
 import fastcontact as fc
 from fastcontact.analysis.problem import prepare
@@ -171,15 +171,7 @@ def test_functions_of_corners_are_those_of_linear_facets(element, values):
 
 @pytest.mark.parametrize(("element", "friction"), [("tet10", 0.3), ("hex20", 0.3), ("hex27", 0.0), ("wedge15", 0.0)])
 def test_standard_multipliers_on_quadratic_facets_cost_multigrid_little_more_than_dual_ones(element, friction):
-    model = pressed(6, element, friction, multipliers="standard")
-    solver, found = solved(model, "amg")
-    assert not solver.gave_up
-    assert not solver.columns.asked
-    dual = solved(pressed(6, element, friction, multipliers="dual"), "amg")[0]
-    assert solver.counters.iterations <= 2.5 * dual.counters.iterations
-    factors = solved(model, "direct")[1]
-    assert found.pressure == pytest.approx(factors.pressure, abs=1e-5 * factors.pressure.max())
-    assert found.force == pytest.approx(factors.force, abs=1e-6 * np.abs(factors.force).max())
+    check_beside_dual(6, element, friction, 2.5)
 
 
 def test_tied_quadratic_facets_with_standard_multipliers_need_no_factors():

@@ -44,7 +44,7 @@ def test_our_own_column(tmp_path):
     text, figures = run(tmp_path, "forma04", "--only", "fastcontact")
     (found,) = figures["runs"]
     assert found["in_ours"] == 1.0
-    assert found["cpu_s"] > 0.1
+    assert found["cpu_s"] > 0.0
     assert found["peak_bytes"] > 5e7
     assert found["answer"]["force"] == pytest.approx(FORCE, rel=0.01)
     assert f"{found['cpu_s']:.2f}" in text
