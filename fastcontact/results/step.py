@@ -10,7 +10,7 @@ import numpy as np
 
 from fastcontact._tools.html_table import html_table
 from fastcontact.arrays import Array, Mask, Numbers
-from fastcontact.errors import unknown
+from fastcontact.errors import FastcontactError, unknown
 from fastcontact.results.material_stress import MaterialStress
 from fastcontact.results.units import with_unit
 
@@ -169,6 +169,10 @@ class ContactResult:
     units: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        if np.ndim(self.coordinates) != 2:
+            raise FastcontactError(
+                f"coordinates of a ContactResult must be an array (m, dim), not {type(self.coordinates).__name__}"
+            )
         dim = self.coordinates.shape[1]
         defaults = {  # places are those of a file from before they were measured from the middle
             "middle": np.zeros(dim),
@@ -337,6 +341,8 @@ class StepResult:
     units: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        if not isinstance(self.contact, Mapping):
+            raise FastcontactError(f"contact of a StepResult must be a dict, not {type(self.contact).__name__}")
         named = {name: replace(pair, units=self.units) for name, pair in self.contact.items()} if self.units else {}
         object.__setattr__(self, "contact", ContactsByName(named or self.contact))
 
