@@ -41,6 +41,10 @@ class Criteria:
         as often with nonlinear bodies. Those go on with parts of that size, and twice it after each that took few iterations.
         Parts of a step are steps of their own, so that friction slides along their path; only the instants of the ramp
         give a result, whose ``iterations["substeps"]`` lists the ends of its parts. 0: never.
+    friction_while_touching : float, optional
+        A step in which nodes that close in it do more than this fraction of the work of friction so far is cut in halves,
+        too, as often as one that does not converge: shear and work of friction depend on where nodes touch, which no step
+        knows of nodes that touch in it. By default steps are as long as they are asked for [-].
     """
 
     relative: float = 1e-6
@@ -51,6 +55,7 @@ class Criteria:
     max_geometry_updates: int = 60
     max_active_set_iterations: int = 200
     max_halvings: int = 4
+    friction_while_touching: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("relative", "geometry"):
@@ -69,6 +74,10 @@ class Criteria:
             raise ModelError(f"the convergence criterion absolute = {self.absolute} must be a force >= 0, or None")
         if self.max_halvings < 0 or int(self.max_halvings) != self.max_halvings:
             raise ModelError(f"max_halvings = {self.max_halvings} must be a whole number >= 0")
+        if self.friction_while_touching is not None and not 0 < self.friction_while_touching <= 1:
+            raise ModelError(
+                f"friction_while_touching = {self.friction_while_touching} must be a fraction, above 0, up to 1"
+            )
         if self.keep_pairing and self.geometry_updates:
             raise ModelError(
                 f"keep_pairing leaves no room for geometry_updates = {self.geometry_updates}: give one or the other"
