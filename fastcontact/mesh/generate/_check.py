@@ -104,8 +104,9 @@ def one_of(name: str, value: Any, known: Sequence[str]) -> str:
     return str(value)
 
 
-def unused(element: str, **arguments: Any) -> None:
-    """Raise MeshError if an argument that has no effect with `element` was given (is not None)."""
+def unused(element: str, *instead: str, **arguments: Any) -> None:
+    """Raise MeshError if an argument that has no effect with `element` was given (is not None); offer those that have one."""
+    remedy = f"use {', '.join(instead)}" if instead else "leave it out"
     for name, value in arguments.items():
         if value is not None:
-            raise MeshError(f"{name} = {repr(value)} means nothing to {element} meshes: leave it out")
+            raise MeshError(f"{name} = {repr(value)} means nothing to {element} meshes: {remedy}")

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_array, vstack
 
+from fastcontact._jit import ahead
 from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.contact.obstacles.rotation import Rotation
 from fastcontact.elasticity.initial_states import InitialState
@@ -94,6 +95,7 @@ class ModelBase:
             raise ModelError(f"kinematics '{kinematics}' do not fit a mesh in {mesh.dim} dimensions: use {fitting}")
         if not mesh.solids:
             raise ModelError(f"the mesh has no solid cells, only {', '.join(mesh.cells) or 'points'}")
+        ahead.expect([f"{mesh.dim}d"])
         check_cells(mesh)
         if kinematics == "axisymmetric":
             radius = mesh.points[:, 0].min()
