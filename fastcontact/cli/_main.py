@@ -77,7 +77,7 @@ class PrintVersion(argparse.Action):
 
 
 def parser(command: str | None = None) -> argparse.ArgumentParser:
-    """Return the parser with every sub-command of this package, with arguments only for `command` if it is one of them."""
+    """Return the parser of `command`, or of every sub-command of this package if it is none of them."""
     top = Parser(prog="fastcontact", description="Elastic contact by finite elements, fast.")
     top.add_argument("--version", action=PrintVersion, nargs=0, help="show program's version number and exit")
     top.add_argument(
@@ -86,13 +86,12 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
     )  # fmt: skip
     commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
     names = [name for _, name, _ in pkgutil.iter_modules([os.path.dirname(__file__)]) if not name.startswith("_")]
-    for name in names:
+    for name in [command] if command in names else names:
         module = importlib.import_module(f"{__package__}.{name}")
         sub = commands.add_parser(name, help=module.HELP, description=module.HELP)
-        if command not in names or command == name:  # those of some commands take long to collect
-            module.arguments(sub)
-            sub.set_defaults(run=module.run)
-            add_loudness(sub, default=False)
+        module.arguments(sub)
+        sub.set_defaults(run=module.run)
+        add_loudness(sub, default=False)
     return top
 
 

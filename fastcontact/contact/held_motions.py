@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
-from scipy.spatial.distance import cdist
 
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION, TINY
@@ -100,7 +99,7 @@ def alike(projectors: Array, places: Array) -> list[tuple[Array, Mask]]:
         seeds = seeds[rank[seeds] == least]
         seeds = seeds if least == 1 else seeds[:1]  # of several directions any are taken
         axis = np.linalg.eigh(rest[seeds])[1][:, :, -1]
-        away = np.where(np.abs(axis @ axis.T) >= TOGETHER, np.maximum(cdist(places[seeds], places[seeds]), TINY), 0.0)
+        away = np.where(np.abs(axis @ axis.T) >= TOGETHER, _distances(places[seeds], places[seeds]), 0.0)
         order, before = breadth_first_order(minimum_spanning_tree(csr_array(away)), 0, directed=False)
         for child in order[1:]:  # one sign for all, passed on from the nearest
             axis[child] *= np.sign(axis[child] @ axis[before[child]])
@@ -117,8 +116,14 @@ def _from_nearest(directions: Array, origin: Array, places: Array) -> Array:
     """Return unit means (n, dim) of `directions` (k, dim) at `origin` (k, dim), by their distance to `places`."""
     if (directions @ directions[0] > 1.0 - ROUND_OFF).all():
         return np.tile(directions[0], (len(places), 1))
-    away = np.maximum(cdist(places, origin), TINY)
+    away = _distances(places, origin)
     return _unit((away.min(axis=1, keepdims=True) / away) ** NEAREST @ directions)
+
+
+def _distances(one: Array, other: Array) -> Array:
+    from scipy.spatial.distance import cdist
+
+    return np.maximum(cdist(one, other), TINY)
 
 
 def _unit(vectors: Array) -> Array:

@@ -266,12 +266,13 @@ def supports_apart(K: bsr_array, fixed: Mask, diagonal: Array | None = None) -> 
     kept = np.where(diagonal > 0, diagonal, diagonal.max(initial=1.0))
     supported = fixed.reshape(-1, K.blocksize[0])
     given = K.indptr, K.indices, K.data, supported, supported.any(axis=1), kept
-    parts, count = parallel.portions(len(supported)), np.empty(K.shape[0], np.int32)
-    parallel.shared(lambda part: system_kernels.count_taken(*given, *part, count), parts)
-    start = np.concatenate([[0], np.cumsum(count)]).astype(np.int32)
+    parts, start = parallel.portions(len(supported)), np.zeros(K.shape[0] + 1, np.int32)
+    columns, taken = np.empty(0, np.int32), np.empty(0)
+    parallel.shared(lambda part: system_kernels.take_out(*given, *part, start, columns, taken, False), parts)
+    np.cumsum(start, out=start)
     columns, taken = np.empty(start[-1], np.int32), np.empty(start[-1])
     if len(taken):
-        parallel.shared(lambda part: system_kernels.take_out(*given, *part, start, columns, taken), parts)
+        parallel.shared(lambda part: system_kernels.take_out(*given, *part, start, columns, taken, True), parts)
     return K, csr_array((taken, columns, start), shape=K.shape)
 
 

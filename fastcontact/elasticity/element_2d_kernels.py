@@ -153,9 +153,9 @@ def largest_rotation(points, cells, N, dN, displacement):
     """
     n_cells, n_nodes = cells.shape
     gradient = np.empty((n_nodes, 2))
-    largest, number = 0.0, -1
+    largest, number, first = 0.0, -1, np.int64(0)  # of a literal, the map would be compiled once more
     for c in range(n_cells):
-        _map(points, cells[c], N, dN, 0, gradient)
+        _map(points, cells[c], N, dN, first, gradient)
         curl = 0.0
         for a in range(n_nodes):
             p = cells[c, a]

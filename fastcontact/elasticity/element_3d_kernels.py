@@ -283,10 +283,10 @@ def largest_rotation(points, cells, N, dN, displacement):
     """
     n_cells, n_nodes = cells.shape
     slopes, x, gradient = transposed(dN), np.empty((3, n_nodes)), np.empty((3, n_nodes))
-    largest, number = 0.0, -1
+    largest, number, first = 0.0, -1, np.int64(0)  # of a literal, the map would be compiled once more
     for c in range(n_cells):
         _gather(points, cells, c, x)
-        map_3d(x, slopes, 0, gradient)
+        map_3d(x, slopes, first, gradient)
         around_x = around_y = around_z = 0.0
         for a in range(n_nodes):
             p = cells[c, a]

@@ -16,25 +16,7 @@ def _near(i, indptr, indices, supported_nodes):
 
 
 @kernel
-def count_taken(indptr, indices, data, supported, supported_nodes, kept, low, high, count):
-    """Fill `count` (n,) with the numbers that `take_out` moves from each row of block rows `low` to ``high - 1``."""
-    size = data.shape[1]
-    for i in range(low, high):
-        near = _near(i, indptr, indices, supported_nodes)
-        for a in range(size):
-            row, taken = size * i + a, 0
-            for k in range(indptr[i] if near else indptr[i + 1], indptr[i + 1]):
-                j = indices[k]
-                for b in range(size):
-                    if supported[i, a] or supported[j, b]:
-                        stays = kept[row] if size * j + b == row else 0.0
-                        if data[k, a, b] != stays:
-                            taken += 1
-            count[row] = taken
-
-
-@kernel
-def take_out(indptr, indices, data, supported, supported_nodes, kept, low, high, start, columns, taken):
+def take_out(indptr, indices, data, supported, supported_nodes, kept, low, high, start, columns, taken, moves):
     """Move rows and columns of supports from `data` to (start, columns, taken), compressed rows of single numbers.
 
     Parameters
@@ -46,24 +28,28 @@ def take_out(indptr, indices, data, supported, supported_nodes, kept, low, high,
     low, high : int
         Block rows `low` to ``high - 1`` are looked at.
     start : (n + 1,)
-        Where rows begin, see `count_taken`.
+        Where rows begin; unless the kernel `moves` numbers, it fills ``start[row + 1]`` with how many there are.
     columns, taken : (n_taken,)
-        Filled.
+        Filled if it `moves` numbers.
+    moves : bool
     """
     size = data.shape[1]
     for i in range(low, high):
         near = _near(i, indptr, indices, supported_nodes)
         for a in range(size):
             row = size * i + a
-            at = start[row]
+            at = start[row] if moves else 0
             for k in range(indptr[i] if near else indptr[i + 1], indptr[i + 1]):
                 j = indices[k]
                 for b in range(size):
                     if supported[i, a] or supported[j, b]:
                         stays = kept[row] if size * j + b == row else 0.0
                         if data[k, a, b] != stays:
-                            columns[at], taken[at], data[k, a, b] = size * j + b, data[k, a, b] - stays, stays
+                            if moves:
+                                columns[at], taken[at], data[k, a, b] = size * j + b, data[k, a, b] - stays, stays
                             at += 1
+            if not moves:
+                start[row + 1] = at
 
 
 @kernel

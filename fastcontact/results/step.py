@@ -191,6 +191,8 @@ class ContactResult:
     def shown(self) -> dict[str, str]:
         """What reprs and tables tell, as texts: force, largest pressure, closed nodes, contact radius."""
         low, high = self.radius
+        inside, outside = (with_unit(f"{end:.4g}", self.units, "length") for end in (low, high))
+        radius = f"{low:.4g} to {outside}" if np.isfinite(high) else f"{inside}, to its end"
         force = with_unit(f"{float(np.linalg.norm(self.force)):.6g}", self.units, "force")
         around = (
             with_unit(f", normal {self.normal_force:.6g}", self.units, "force") + " all round" if self.cancels else ""
@@ -199,9 +201,7 @@ class ContactResult:
             "force": force + around,
             "largest pressure": with_unit(f"{self.pressure_max:.6g}", self.units, "pressure"),
             "closed": f"{int(self.active.sum())} of {len(self.points)} nodes",
-            "contact radius": with_unit(f"{low:.4g} to {high:.4g}", self.units, "length")
-            if np.isfinite(low)
-            else "none",
+            "contact radius": radius if np.isfinite(low) else "none",
         }
 
     def __repr__(self) -> str:

@@ -25,6 +25,7 @@ from fastcontact.model.model import Model
 from fastcontact.results.conversions import data_frame
 from fastcontact.results.phases import phases
 from fastcontact.results.step import StepResult
+from fastcontact.round_off import ROUND_OFF
 
 if TYPE_CHECKING:
     import pandas
@@ -146,8 +147,8 @@ class Modes(Shapes):
         return ("mode", *round_the_ring, "frequency", *masses)
 
     def _rows(self, numbers: str) -> list[tuple[str, ...]]:
-        rows = []
-        for k, (f, masses) in enumerate(zip(self.frequencies, self.effective_mass)):
+        rows, masses_shown = [], np.where(self.effective_mass > ROUND_OFF * self.mass, self.effective_mass, 0.0)
+        for k, (f, masses) in enumerate(zip(self.frequencies, masses_shown)):
             round_the_ring: tuple[str, ...] = ()
             if self.nodal_diameters is not None and self.twins is not None:
                 twin = "" if self.twins[k] == k else str(self.twins[k] + 1)

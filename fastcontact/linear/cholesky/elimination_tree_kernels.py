@@ -127,19 +127,19 @@ def supernodes(
     """
     n, top = len(parent), -1
     entries = np.empty(n, np.int64)
-    for j in range(n):
-        same = j > 0 and parent[j - 1] == j and count[j - 1] == count[j] + 1 and given[j - 1] == given[j]
+    for j in range(n + 1):
+        same = 0 < j < n and parent[j - 1] == j and count[j - 1] == count[j] + 1 and given[j - 1] == given[j]
         if not same:
             if top >= 0:
                 top = _joined(parent, given, widths, shares, first, below, entries, top, j)
             top += 1
-            first[top], entries[top] = j, 0
-        entries[top] += count[j]
-        below[top] = count[j] - 1
-    if n:
-        top = _joined(parent, given, widths, shares, first, below, entries, top, n)
-    first[top + 1] = n
-    return top + 1
+            first[top] = j
+            if j < n:
+                entries[top] = 0
+        if j < n:
+            entries[top] += count[j]
+            below[top] = count[j] - 1
+    return top
 
 
 @inlined_kernel

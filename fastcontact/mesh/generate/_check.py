@@ -98,8 +98,9 @@ def one_of(name: str, value: str, known: Sequence[str]) -> str:
     return value
 
 
-def unused(element: str, instead: str = "", **arguments: Any) -> None:
-    """Raise MeshError if an argument without effect with `element` was given (is not None), `instead` of which others are."""
+def unused(element: str, *instead: str, **arguments: Any) -> None:
+    """Raise MeshError if an argument that has no effect with `element` was given (is not None); offer those that have one."""
+    remedy = f"use {', '.join(instead)}" if instead else "leave it out"
     for name, value in arguments.items():
         if value is not None:
-            raise MeshError(f"{name} = {repr(value)} means nothing to {element} meshes: leave it out{instead}")
+            raise MeshError(f"{name} = {repr(value)} means nothing to {element} meshes: {remedy}")

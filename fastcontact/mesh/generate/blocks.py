@@ -30,7 +30,7 @@ def block(
     name: str = "BLOCK",
     distortion: float = 0.0,
 ) -> Mesh:
-    """Rectangle in equal cells.
+    """Rectangle in equal cells; in space see `box`.
 
     Groups of cells: `name` (all of it), BOTTOM, RIGHT, TOP, LEFT. Groups of points: BOTTOM_LEFT, BOTTOM_RIGHT,
     TOP_RIGHT, TOP_LEFT.

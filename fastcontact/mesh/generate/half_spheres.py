@@ -113,12 +113,11 @@ def quarter_disc(
     one_of("body", body, ("lower", "upper"))
     R = positive("R", R)
     if element in TRIANGLES:
-        instead = ", size, contact_size and contact_radius are theirs"
-        unused(element, instead, arc_sizes=arc_sizes, segments=segments, radial_sizes=radial_sizes)
+        unused(element, "size", "contact_size", arc_sizes=arc_sizes, segments=segments, radial_sizes=radial_sizes)
         linear = _of_triangles(R, _spacing(R, size, contact_size, contact_radius))
     else:
-        instead = ", arc_sizes, radial_sizes and segments are theirs"
-        unused(element, instead, size=size, contact_size=contact_size, contact_radius=contact_radius)
+        sizes = {"size": size, "contact_size": contact_size, "contact_radius": contact_radius}
+        unused(element, "arc_sizes", "radial_sizes", "segments", **sizes)
         linear = _of_quadrangles(R, arc_sizes, segments, radial_sizes)
     disc = in_element(linear, element, [Circle((0.0, -R), R, group) for group in ("CONT1", "D1B1")])
     return disc if body == "lower" else mirrored(disc, "y", rename=_UPPER)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_array, vstack
 
+from fastcontact._jit import ahead
 from fastcontact._tools.argument_types import finite_vector, typed
 from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.contact.obstacles.rotation import Rotation
@@ -95,6 +96,7 @@ class ModelBase:
             raise ModelError(f"kinematics '{kinematics}' do not fit a mesh in {mesh.dim} dimensions: use {fitting}")
         if not mesh.solids:
             raise ModelError(f"the mesh has no solid cells, only {', '.join(mesh.cells) or 'points'}")
+        ahead.expect([f"{mesh.dim}d"])
         check_cells(mesh)
         if kinematics == "axisymmetric":
             radius = mesh.points[:, 0].min()

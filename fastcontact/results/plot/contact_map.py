@@ -117,7 +117,9 @@ def _panels(axes: Sequence[Any] | None, both: bool) -> list[Any]:
         if len(given) < 1 + both:
             raise FastcontactError(f"this contact has shear: it takes two axes, and {len(given)} are given")
         return given[: 1 + both]
-    return list(new_panels(1, 1 + both, (9.6 if both else 5.6, 4.6))[0])
+    panels = list(new_panels(1, 1 + both, (9.6 if both else 5.6, 4.6))[0])
+    panels[0].figure.set_layout_engine("compressed")  # a narrow map stands in the middle, beside its colours
+    return panels
 
 
 def _facets(mesh: Mesh, contact: ContactResult) -> dict[str, Indices]:
