@@ -10,8 +10,9 @@ import numpy as np
 
 from fastcontact._jit.decorators import kernel
 from fastcontact.elasticity.constitutive_kernels import add_second_derivative, cofactor, determinant, respond
+from fastcontact.elasticity.element_2d_kernels import TWO_PI, owned
+from fastcontact.mesh.jacobian_kernels import at_nodes, gradients, inverse_jacobian
 
-TWO_PI = 2.0 * np.pi
 # Newton iterations for the strain across plane stress, and when they end, relative to the modulus.
 THROUGH, ENOUGH = 50, 1e-13
 # What `linearise` returns beside the number of a cell.
@@ -19,29 +20,17 @@ INVERTED, NO_PLANE_STRESS = 1, 2
 
 
 @kernel
-def _gradients(points, cell, N, dN, weights, axisymmetric, gradient, hoop, volume):
+def _gradients(x, N, dN, weights, axisymmetric, J, inverse, gradient, hoop, volume):
     """Fill shape derivatives `gradient` (n_q, n_nodes, dim), N / r in `hoop` (n_q, n_nodes), weights `volume` (n_q,)."""
-    n_q, n_nodes, dim = dN.shape
-    jacobian, cofactors = np.zeros((3, 3)), np.empty((3, 3))
-    jacobian[2, 2] = 1.0
-    for q in range(n_q):
-        for i in range(dim):
-            for j in range(dim):
-                jacobian[i, j] = 0.0
-                for a in range(n_nodes):
-                    jacobian[i, j] += points[cell[a], i] * dN[q, a, j]
-        det = determinant(jacobian)
-        cofactor(jacobian, cofactors)
-        volume[q], radius = weights[q] * det, 0.0
-        for a in range(n_nodes):
-            radius += N[q, a] * points[cell[a], 0]
-            for i in range(dim):
-                gradient[q, a, i] = 0.0
-                for j in range(dim):
-                    gradient[q, a, i] += cofactors[i, j] * dN[q, a, j] / det
+    for q in range(N.shape[0]):
+        volume[q] = weights[q] * inverse_jacobian(x, dN, q, J, inverse)
+        gradients(dN, q, inverse, gradient[q])
         if axisymmetric:
+            radius = 0.0
+            for a in range(x.shape[0]):
+                radius += N[q, a] * x[a, 0]
             volume[q] *= TWO_PI * radius
-            for a in range(n_nodes):
+            for a in range(x.shape[0]):
                 hoop[q, a] = N[q, a] / radius
 
 
@@ -186,19 +175,17 @@ def linearise(
     n_cells, n_nodes = cells.shape
     n_q, dim, m = N.shape[0], points.shape[1], polynomials.shape[1]
     gradient, hoop, volume = np.empty((n_q, n_nodes, dim)), np.zeros((n_q, n_nodes)), np.empty(n_q)
+    x, jacobian, inverse = np.empty((n_nodes, dim)), np.empty((dim, dim)), np.empty((dim, dim))
     F, J, G = np.empty((n_q, 3, 3)), np.empty(n_q), np.empty((3, 3))
     P, A, product = np.empty((3, 3)), np.empty((9, 9)), np.empty((9, dim))
     local, forces = np.empty((n_nodes, n_nodes, dim, dim)), np.empty((n_nodes, dim))
     mass, projection, dilatation = np.empty((m, m)), np.empty((m, n_nodes * dim)), np.empty(m)
     history, mine = np.empty(9), np.empty(n_nodes, np.bool_)
     for c in range(n_cells):
-        involved = False
-        for a in range(n_nodes):
-            mine[a] = owner[cells[c, a]] == part
-            involved = involved or mine[a]
-        if not involved:
+        if not owned(cells, c, owner, part, mine):
             continue
-        _gradients(points, cells[c], N, dN, weights, axisymmetric, gradient, hoop, volume)
+        at_nodes(points, cells, c, x)
+        _gradients(x, N, dN, weights, axisymmetric, jacobian, inverse, gradient, hoop, volume)
         whole = bulk[material[c, 0], 0]
         local[:], forces[:], mass[:], projection[:], dilatation[:] = 0.0, 0.0, 0.0, 0.0, 0.0
         for q in range(n_q):

@@ -54,7 +54,7 @@ def add_second_derivative(F, factor, A):
 
 
 @kernel
-def _voigt(i, j):
+def voigt(i, j):
     """Return the number of a component in the order xx, yy, zz, xy, yz, xz."""
     if i == j:
         return i
@@ -69,10 +69,10 @@ def _hooke(D, strain, stress):
     energy = 0.0
     for i in range(3):
         for j in range(3):
-            row, value = _voigt(i, j), 0.0
+            row, value = voigt(i, j), 0.0
             for k in range(3):
                 for m in range(3):
-                    value += D[row, _voigt(k, m)] * strain[k, m]
+                    value += D[row, voigt(k, m)] * strain[k, m]
             stress[i, j] = value
             energy += 0.5 * value * strain[i, j]
     return energy
@@ -86,7 +86,7 @@ def _linear(D, F, P, A):
         strain[i, i] -= 1.0
     for row in range(9):
         for column in range(9):
-            A[row, column] = D[_voigt(row // 3, row % 3), _voigt(column // 3, column % 3)]
+            A[row, column] = D[voigt(row // 3, row % 3), voigt(column // 3, column % 3)]
     return _hooke(D, strain, P)
 
 
@@ -115,7 +115,7 @@ def _plastic(constants, F, old, new, P, A):
     for i in range(3):
         strain[i, i] -= third
         for j in range(3):
-            xi[i, j] = 2.0 * mu * strain[i, j] - (2.0 * mu + 2.0 / 3.0 * kinematic) * old[_voigt(i, j)]
+            xi[i, j] = 2.0 * mu * strain[i, j] - (2.0 * mu + 2.0 / 3.0 * kinematic) * old[voigt(i, j)]
             square += xi[i, j] ** 2
     trial = np.sqrt(1.5 * square)
     p, work, remaining = old[6], old[7], trial
@@ -134,7 +134,7 @@ def _plastic(constants, F, old, new, P, A):
     before = after = energy = 0.0
     for i in range(3):
         for j in range(3):
-            c = _voigt(i, j)
+            c = voigt(i, j)
             before += old[c] ** 2
             new[c] = old[c] + flow * xi[i, j]
             after += new[c] ** 2
@@ -193,7 +193,7 @@ def _saint_venant(D, F, P, A):
     energy = _hooke(D, strain, S)
     for row in range(9):
         for column in range(9):
-            C[row, column] = D[_voigt(row // 3, row % 3), _voigt(column // 3, column % 3)]
+            C[row, column] = D[voigt(row // 3, row % 3), voigt(column // 3, column % 3)]
     _pushed(F, S, C, P, A)
     return energy
 

@@ -15,62 +15,42 @@ import numpy as np
 
 from fastcontact._jit.decorators import kernel
 from fastcontact.elasticity.element_2d_kernels import TWO_PI, owned
-from fastcontact.elasticity.element_3d_kernels import map_3d
-from fastcontact.mesh.jacobian_kernels import transposed
+from fastcontact.mesh.jacobian_kernels import at_nodes, gradients, inverse_jacobian
 
 
 @kernel
-def _plane(x, N, dN, q, axisymmetric, d):
-    """Fill `d` (n_nodes * 2,) with the dilatation of unit displacements of the nodes `x` (2, n_nodes); return the measure."""
-    j00 = j01 = j10 = j11 = radius = 0.0
-    for a in range(x.shape[1]):
-        j00 += dN[q, a, 0] * x[0, a]
-        j01 += dN[q, a, 0] * x[1, a]
-        j10 += dN[q, a, 1] * x[0, a]
-        j11 += dN[q, a, 1] * x[1, a]
-        radius += N[q, a] * x[0, a]
-    det = j00 * j11 - j01 * j10
-    for a in range(x.shape[1]):
-        d[2 * a] = (j11 * dN[q, a, 0] - j01 * dN[q, a, 1]) / det
-        d[2 * a + 1] = (j00 * dN[q, a, 1] - j10 * dN[q, a, 0]) / det
+def _measure(x, N, dN, q, axisymmetric, J, inverse, gradient):
+    """Fill `gradient` (n_nodes, dim) with the dilatation of unit displacements of the nodes `x` (n_nodes, dim).
+
+    Returns the measure of the point; `J` and `inverse` (dim, dim) are overwritten.
+    """
+    measure = inverse_jacobian(x, dN, q, J, inverse)
+    gradients(dN, q, inverse, gradient)
     if not axisymmetric:
-        return det
-    for a in range(x.shape[1]):
-        d[2 * a] += N[q, a] / radius
-    return det * TWO_PI * radius
+        return measure
+    radius = 0.0
+    for a in range(x.shape[0]):
+        radius += N[q, a] * x[a, 0]
+    for a in range(x.shape[0]):
+        gradient[a, 0] += N[q, a] / radius
+    return measure * TWO_PI * radius
 
 
 @kernel
-def _solid(x, slopes, q, gradient, d):
-    """Fill `d` (n_nodes * 3,) with the dilatation of unit displacements of the nodes `x` (3, n_nodes); return det J."""
-    det = map_3d(x, slopes, q, gradient)
-    for a in range(x.shape[1]):
-        for i in range(3):
-            d[3 * a + i] = gradient[i, a]
-    return det
-
-
-@kernel
-def _measure(x, N, dN, slopes, q, axisymmetric, gradient, d):
-    """Fill `d` (n_nodes * dim,) as above in the dimension of `x` (dim, n_nodes); return the measure."""
-    if x.shape[0] == 2:
-        return _plane(x, N, dN, q, axisymmetric, d)
-    return _solid(x, slopes, q, gradient, d)
-
-
-@kernel
-def _integrate(x, N, dN, slopes, weights, basis, axisymmetric, gradient, d, mass, g):
-    """Fill `mass` (m, m) and `g` (m, n_nodes * dim) for the cell with the nodes `x` (dim, n_nodes)."""
+def _integrate(x, N, dN, weights, basis, axisymmetric, J, inverse, gradient, mass, g):
+    """Fill `mass` (m, m) and `g` (m, n_nodes * dim) for the cell with the nodes `x` (n_nodes, dim)."""
     mass[:] = 0.0
     g[:] = 0.0
+    dim = x.shape[1]
     for q in range(weights.shape[0]):
-        measure = weights[q] * _measure(x, N, dN, slopes, q, axisymmetric, gradient, d)
+        measure = weights[q] * _measure(x, N, dN, q, axisymmetric, J, inverse, gradient)
         for m in range(basis.shape[1]):
             factor = measure * basis[q, m]
             for n in range(m + 1):
                 mass[m, n] += factor * basis[q, n]
-            for k in range(d.shape[0]):
-                g[m, k] += factor * d[k]
+            for a in range(x.shape[0]):
+                for i in range(dim):
+                    g[m, dim * a + i] += factor * gradient[a, i]
 
 
 @kernel
@@ -90,6 +70,15 @@ def reduce(mass, g):
 
 
 @kernel
+def back_substitute(L, y):
+    """Replace `y` (m,) by L^-T y, with the lower triangle of L (m, m)."""
+    for m in range(len(y) - 1, -1, -1):
+        for k in range(m + 1, len(y)):
+            y[m] -= L[k, m] * y[k]
+        y[m] /= L[m, m]
+
+
+@kernel
 def add_stiffness(points, cells, N, dN, weights, basis, bulk, material, axisymmetric, slots, owner, part, data):
     """Add the stiffness of the projected dilatation to `data` (n_blocks, dim, dim), in the rows of a part's nodes.
 
@@ -97,18 +86,16 @@ def add_stiffness(points, cells, N, dN, weights, basis, bulk, material, axisymme
     """
     n_cells, n_nodes = cells.shape
     dim, size = points.shape[1], basis.shape[1]
-    slopes, x, gradient = transposed(dN), np.empty((dim, n_nodes)), np.empty((dim, n_nodes))
-    d = np.empty(n_nodes * dim)
+    x, gradient = np.empty((n_nodes, dim)), np.empty((n_nodes, dim))
+    J, inverse = np.empty((dim, dim)), np.empty((dim, dim))
     mass, g = np.empty((size, size)), np.empty((size, n_nodes * dim))
     row, mine = np.empty(n_nodes * dim), np.empty(n_nodes, np.bool_)
     for c in range(n_cells):
         mean, rest = bulk[material[c], 0], bulk[material[c], 1]
         if mean == 0.0 or not owned(cells, c, owner, part, mine):
             continue
-        for a in range(n_nodes):
-            for i in range(dim):
-                x[i, a] = points[cells[c, a], i]
-        _integrate(x, N, dN, slopes, weights, basis, axisymmetric, gradient, d, mass, g)
+        at_nodes(points, cells, c, x)
+        _integrate(x, N, dN, weights, basis, axisymmetric, J, inverse, gradient, mass, g)
         reduce(mass, g)
         for a in range(n_nodes):
             if not mine[a]:
@@ -132,25 +119,23 @@ def add_pressure(points, cells, N, dN, weights, basis, bulk, material, axisymmet
     """
     n_cells, n_nodes = cells.shape
     dim, size = points.shape[1], basis.shape[1]
-    slopes, x, gradient = transposed(dN), np.empty((dim, n_nodes)), np.empty((dim, n_nodes))
-    d = np.empty(n_nodes * dim)
-    mass, g = np.empty((size, size)), np.empty((size, 1))
-    value, u = np.empty(size), np.empty(n_nodes * dim)
+    x, u, gradient = np.empty((n_nodes, dim)), np.empty((n_nodes, dim)), np.empty((n_nodes, dim))
+    J, inverse = np.empty((dim, dim)), np.empty((dim, dim))
+    mass, g, value = np.empty((size, size)), np.empty((size, 1)), np.empty(size)
     for c in range(n_cells):
         mean, rest = bulk[material[c], 0], bulk[material[c], 1]
         if mean == 0.0:
             continue
-        for a in range(n_nodes):
-            for i in range(dim):
-                x[i, a] = points[cells[c, a], i]
-                u[dim * a + i] = displacement[cells[c, a], i]
+        at_nodes(points, cells, c, x)
+        at_nodes(displacement, cells, c, u)
         mass[:] = 0.0
         g[:] = 0.0
         for q in range(weights.shape[0]):
-            measure = weights[q] * _measure(x, N, dN, slopes, q, axisymmetric, gradient, d)
+            measure = weights[q] * _measure(x, N, dN, q, axisymmetric, J, inverse, gradient)
             dilatation = 0.0
-            for k in range(d.shape[0]):
-                dilatation += d[k] * u[k]
+            for a in range(n_nodes):
+                for i in range(dim):
+                    dilatation += gradient[a, i] * u[a, i]
             for m in range(size):
                 factor = measure * basis[q, m]
                 for n in range(m + 1):
@@ -159,10 +144,7 @@ def add_pressure(points, cells, N, dN, weights, basis, bulk, material, axisymmet
         reduce(mass, g)
         for m in range(size):
             value[m] = g[m, 0] * (mean if m == 0 else rest)
-        for m in range(size - 1, -1, -1):  # the transposed factor
-            for k in range(m + 1, size):
-                value[m] -= mass[k, m] * value[k]
-            value[m] /= mass[m, m]
+        back_substitute(mass, value)
         for k in range(at.shape[0]):
             pressure = 0.0
             for m in range(size):

@@ -43,8 +43,8 @@ def owned(cells, c, owner, part, mine):
 
 
 @kernel
-def _general_cell(points, cell, N, dN, weights, D, axisymmetric, gradient, local):
-    """Fill `local` (n_nodes, n_nodes, 2, 2), zero before, for any moduli; return whether the Jacobian is positive."""
+def _cell(points, cell, N, dN, weights, D, axisymmetric, gradient, local):
+    """Fill `local` (n_nodes, n_nodes, 2, 2), zero before, for moduli D (4, 4); return whether the Jacobian is positive."""
     n_nodes = cell.shape[0]
     for q in range(weights.shape[0]):
         det, radius = _map(points, cell, N, dN, q, gradient)
@@ -71,13 +71,12 @@ def _general_cell(points, cell, N, dN, weights, D, axisymmetric, gradient, local
 
 
 @kernel
-def add_stiffness(points, cells, N, dN, weights, moduli, special, material, axisymmetric, slots, owner, part, data):
+def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, axisymmetric, slots, owner, part, data):
     """Add element stiffness blocks to `data` (n_blocks, 2, 2), in the rows of nodes with ``owner[node] == part``.
 
     `data` is written in place at `slots`. Threads share the nodes; each adds to its rows in the order of the cells.
-    Returns the number of the first cell with a Jacobian that is not positive, or -1. Where ``special`` (n_materials,) holds,
-    only the terms of the moduli that couple normal strains with each other and shear with itself are used (isotropy, or
-    orthotropy along x, y).
+    Returns the number of the first cell with a Jacobian that is not positive, or -1. `isotropic` has no effect here: the
+    loops of both dimensions have the same arguments.
     """
     n_cells, n_nodes = cells.shape
     gradient = np.empty((n_nodes, 2))
@@ -86,35 +85,9 @@ def add_stiffness(points, cells, N, dN, weights, moduli, special, material, axis
     for c in range(n_cells):
         if not owned(cells, c, owner, part, mine):
             continue
-        D = moduli[material[c]]
-        shear = D[3, 3]
         local[:] = 0.0
-        if not special[material[c]] and not _general_cell(
-            points, cells[c], N, dN, weights, D, axisymmetric, gradient, local
-        ):
+        if not _cell(points, cells[c], N, dN, weights, moduli[material[c]], axisymmetric, gradient, local):
             return c
-        for q in range(weights.shape[0] if special[material[c]] else 0):
-            det, radius = _map(points, cells[c], N, dN, q, gradient)
-            if not det > 0.0:
-                return c
-            weight = weights[q] * det
-            if axisymmetric:
-                weight *= TWO_PI * radius
-            for b in range(n_nodes):
-                bx, by = weight * gradient[b, 0], weight * gradient[b, 1]
-                bh = weight * N[q, b] / radius if axisymmetric else 0.0
-                # Stress of unit displacements of node b: along x, then along y.
-                xx_x = D[0, 0] * bx + D[0, 2] * bh
-                yy_x = D[1, 0] * bx + D[1, 2] * bh
-                zz_x = D[2, 0] * bx + D[2, 2] * bh
-                xx_y, yy_y, zz_y = D[0, 1] * by, D[1, 1] * by, D[2, 1] * by
-                for a in range(b + 1):
-                    ax, ay = gradient[a, 0], gradient[a, 1]
-                    ah = N[q, a] / radius if axisymmetric else 0.0
-                    local[a, b, 0, 0] += ax * xx_x + ah * zz_x + shear * ay * by
-                    local[a, b, 0, 1] += ax * xx_y + ah * zz_y + shear * ay * bx
-                    local[a, b, 1, 0] += ay * yy_x + shear * ax * by
-                    local[a, b, 1, 1] += ay * yy_y + shear * ax * bx
         for b in range(n_nodes):
             local[b, b, 1, 0] = local[b, b, 0, 1]  # equal but for round-off; K is symmetric to the last bit
             for a in range(b + 1):

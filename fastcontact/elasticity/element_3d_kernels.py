@@ -10,6 +10,7 @@ have the same arguments.
 import numpy as np
 
 from fastcontact._jit.decorators import inlined_kernel, kernel
+from fastcontact.elasticity.constitutive_kernels import voigt
 from fastcontact.elasticity.element_2d_kernels import owned
 from fastcontact.mesh.jacobian_kernels import jacobian_3d, transposed
 
@@ -41,22 +42,12 @@ def map_3d(x, slopes, q, gradient):
 
 
 @kernel
-def _component(i, j):
-    """Return the number of a stress component in the order xx, yy, zz, xy, yz, xz."""
-    if i == j:
-        return i
-    if i + j == 1:
-        return 3
-    return 4 if i + j == 3 else 5
-
-
-@kernel
 def _tensor(D, tensor):
     """Fill `tensor` (9, 9) with moduli (6, 6): row 3 i + j, column 3 k + l holds D_ikjl, for K_ij = D_ikjl g_kl."""
     for row in range(9):
         for column in range(9):
             i, j, k, n = row // 3, row % 3, column // 3, column % 3
-            tensor[row, column] = D[_component(i, k), _component(j, n)]
+            tensor[row, column] = D[voigt(i, k), voigt(j, n)]
 
 
 @kernel
@@ -195,12 +186,12 @@ def _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, mine, gra
 
 
 @kernel
-def add_stiffness(points, cells, N, dN, weights, moduli, special, material, axisymmetric, slots, owner, part, data):
+def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, axisymmetric, slots, owner, part, data):
     """Add element stiffness blocks to `data` (n_blocks, 3, 3), in the rows of nodes with ``owner[node] == part``.
 
     `data` is written in place at `slots`. Threads share the nodes; each adds to its rows in the order of the cells.
     Returns the number of the first cell with a Jacobian that is not positive, or -1. The products of gradients are
-    integrated first; the moduli of the cell come in once at the end. Where ``special`` (n_materials,) holds these are Lame's
+    integrated first; the moduli of the cell come in once at the end. Where ``isotropic`` (n_materials,) holds these are Lame's
     constants, ``D[0, 1]`` and ``D[3, 3]``.
     """
     n_cells, n_nodes = cells.shape
@@ -215,15 +206,14 @@ def add_stiffness(points, cells, N, dN, weights, moduli, special, material, axis
         if not owned(cells, c, owner, part, mine):
             continue
         coupling, shear = moduli[material[c], 0, 1], moduli[material[c], 3, 3]
-        isotropic = special[material[c]]
-        if n_nodes == 4 and isotropic:
+        if n_nodes == 4 and isotropic[material[c]]:
             if not _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, mine, corners, flat):
                 return c
             continue
         _gather(points, cells, c, x)
         if not _integrate_products(x, slopes, weights, gradient, g):
             return c
-        if isotropic:
+        if isotropic[material[c]]:
             _add_isotropic(g, coupling, shear, slots, c, mine, flat)
         else:
             _tensor(moduli[material[c]], tensor)

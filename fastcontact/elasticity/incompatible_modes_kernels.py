@@ -14,34 +14,9 @@ B: static condensation eliminates the modes by a = -own^-1 mixed u, and take (L^
 import numpy as np
 
 from fastcontact._jit.decorators import kernel
-from fastcontact.elasticity.dilatation_kernels import reduce
+from fastcontact.elasticity.dilatation_kernels import back_substitute, reduce
 from fastcontact.elasticity.element_2d_kernels import owned
-
-
-@kernel
-def _derivatives(x, dN, q, J, inverse):
-    """Fill `inverse` (dim, dim) with the inverse Jacobian of the nodes `x` (n_nodes, dim); return det J."""
-    dim = x.shape[1]
-    J[:] = 0.0
-    for a in range(x.shape[0]):
-        for k in range(dim):
-            for i in range(dim):
-                J[k, i] += dN[q, a, k] * x[a, i]
-    if dim == 2:
-        det = J[0, 0] * J[1, 1] - J[0, 1] * J[1, 0]
-        inverse[0, 0], inverse[0, 1] = J[1, 1] / det, -J[0, 1] / det
-        inverse[1, 0], inverse[1, 1] = -J[1, 0] / det, J[0, 0] / det
-        return det
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        for m in range(3):
-            n, r = (m + 1) % 3, (m + 2) % 3
-            inverse[i, m] = J[n, j] * J[r, k] - J[n, k] * J[r, j]
-    det = J[0, 0] * inverse[0, 0] + J[0, 1] * inverse[1, 0] + J[0, 2] * inverse[2, 0]
-    for i in range(3):
-        for m in range(3):
-            inverse[i, m] /= det
-    return det
+from fastcontact.mesh.jacobian_kernels import at_nodes, gradients, inverse_jacobian
 
 
 @kernel
@@ -68,12 +43,12 @@ def _integrate(x, dN, xi, weights, middle, pairs, moduli, numbers, own, mixed):
     dim, n_modes = x.shape[1], own.shape[0]
     J, inverse, at_middle = np.empty((dim, dim)), np.empty((dim, dim)), np.empty((dim, dim))
     M, S = np.empty((moduli.shape[1], n_modes)), np.empty((moduli.shape[1], n_modes))
-    gradient = np.empty(dim)
-    whole = _derivatives(x, middle, 0, J, at_middle)
+    gradient = np.empty(x.shape)
+    whole = inverse_jacobian(x, middle, 0, J, at_middle)
     own[:] = 0.0
     mixed[:] = 0.0
     for q in range(weights.shape[0]):
-        det = _derivatives(x, dN, q, J, inverse)
+        det = inverse_jacobian(x, dN, q, J, inverse)
         _modes(xi, q, at_middle, whole / det, pairs, M)
         D = moduli[numbers[q % numbers.shape[0]]]
         for c in range(M.shape[0]):
@@ -89,15 +64,12 @@ def _integrate(x, dN, xi, weights, middle, pairs, moduli, numbers, own, mixed):
                 if M[c, m] != 0.0:
                     for n in range(m + 1):
                         own[m, n] += M[c, m] * S[c, n]
+        gradients(dN, q, inverse, gradient)
         for a in range(x.shape[0]):
-            for i in range(dim):
-                gradient[i] = 0.0
-                for k in range(dim):
-                    gradient[i] += dN[q, a, k] * inverse[i, k]
             for i in range(dim):
                 for j in range(dim):
                     for m in range(n_modes):
-                        mixed[m, dim * a + i] += S[pairs[i, j], m] * gradient[j]
+                        mixed[m, dim * a + i] += S[pairs[i, j], m] * gradient[a, j]
 
 
 @kernel
@@ -116,9 +88,7 @@ def subtract_stiffness(
     for c in range(n_cells):
         if not bends[material[c, 0]] or not owned(cells, c, owner, part, mine):
             continue
-        for a in range(n_nodes):
-            for i in range(dim):
-                x[a, i] = points[cells[c, a], i]
+        at_nodes(points, cells, c, x)
         _integrate(x, dN, xi, weights, middle, pairs, moduli, material[c], own, mixed)
         reduce(own, mixed)
         for a in range(n_nodes):
@@ -147,37 +117,32 @@ def add_stress(
     n_cells, n_nodes = cells.shape
     dim, size = points.shape[1], moduli.shape[1]
     n_modes = 4 if dim == 2 else 13
-    x, u = np.empty((n_nodes, dim)), np.empty(n_nodes * dim)
+    x, u = np.empty((n_nodes, dim)), np.empty((n_nodes, dim))
     own, mixed, force = np.empty((n_modes, n_modes)), np.empty((n_modes, n_nodes * dim)), np.empty((n_modes, 1))
     J, inverse, at_middle = np.empty((dim, dim)), np.empty((dim, dim)), np.empty((dim, dim))
     M, strain = np.empty((size, n_modes)), np.empty(size)
     for c in range(n_cells):
         if not bends[material[c, 0]]:
             continue
-        for a in range(n_nodes):
-            for i in range(dim):
-                x[a, i] = points[cells[c, a], i]
-                u[dim * a + i] = displacement[cells[c, a], i]
+        at_nodes(points, cells, c, x)
+        at_nodes(displacement, cells, c, u)
         _integrate(x, dN, xi, weights, middle, pairs, moduli, material[c], own, mixed)
-        whole = _derivatives(x, middle, 0, J, at_middle)
+        whole = inverse_jacobian(x, middle, 0, J, at_middle)
         for m in range(n_modes):
             force[m, 0] = 0.0
             for k in range(n_nodes * dim):
-                force[m, 0] -= mixed[m, k] * u[k]
+                force[m, 0] -= mixed[m, k] * u[k // dim, k % dim]
         if lost.shape[0]:
             for q in range(weights.shape[0]):
-                det = _derivatives(x, dN, q, J, inverse)
+                det = inverse_jacobian(x, dN, q, J, inverse)
                 _modes(xi, q, at_middle, whole / det, pairs, M)
                 for e in range(size):
                     for m in range(n_modes):
                         force[m, 0] += det * weights[q] * M[e, m] * lost[c, q, e]
         reduce(own, force)
-        for m in range(n_modes - 1, -1, -1):  # the transposed factor
-            for k in range(m + 1, n_modes):
-                force[m, 0] -= own[k, m] * force[k, 0]
-            force[m, 0] /= own[m, m]
+        back_substitute(own, force[:, 0])
         for k in range(at.shape[0]):
-            det = _derivatives(x, slopes, k, J, inverse)
+            det = inverse_jacobian(x, slopes, k, J, inverse)
             _modes(at, k, at_middle, whole / det, pairs, M)
             for e in range(size):
                 strain[e] = 0.0

@@ -123,12 +123,12 @@ def stiffness(
     """
     pattern = pattern or sparsity(mesh)
     data = np.zeros((len(pattern.indices), mesh.dim, mesh.dim))
-    special = of_special_form(moduli)
+    isotropic = is_isotropic(moduli)
     for name, block in mesh.solids.items():
         split = dilatation.split(name, moduli, averaged)
         add = _Addition(mesh, name, kinematics == "axisymmetric", material[name], pattern, data)
         bends = incompatible_modes.asked(name, averaged)
-        add_part = partial(add.part, moduli=moduli, special=special, split=split, bends=bends)
+        add_part = partial(add.part, moduli=moduli, isotropic=isotropic, split=split, bends=bends)
         parts_done = parallel.shared(add_part, range(add.n_parts))
         bad = min((number for number in parts_done if number >= 0), default=-1)
         if bad >= 0:
@@ -140,22 +140,19 @@ def stiffness(
     return bsr_array((data, pattern.indices, pattern.indptr), shape=(size, size))
 
 
-def of_special_form(moduli: Array) -> Mask:
-    """Return for which moduli (n_materials,) the element loops have a shorter form, but for round-off.
-
-    In the plane those without coupling of normal strains with shear, in 3D those of isotropic materials.
+def is_isotropic(moduli: Array) -> Mask:
+    """Return which moduli (n_materials,) are isotropic but for round-off: element loops in 3D have a shorter form for these.
 
     Parameters
     ----------
     moduli : ndarray (n_materials, 4, 4), in 3D (n_materials, 6, 6)
         [pressure]
     """
-    if moduli.shape[1] == 4:
-        return np.asarray((moduli[:, :3, 3] == 0.0).all(axis=1) & (moduli[:, 3, :3] == 0.0).all(axis=1))
+    shear, size = moduli[:, 3, 3, None], moduli.shape[1]
     isotropic = np.zeros_like(moduli)
     isotropic[:, :3, :3] = moduli[:, 0, 1, None, None]
-    isotropic[:, range(3), range(3)] += 2.0 * moduli[:, 3, 3, None]
-    isotropic[:, range(3, 6), range(3, 6)] = moduli[:, 3, 3, None]
+    isotropic[:, range(3), range(3)] += 2.0 * shear
+    isotropic[:, range(3, size), range(3, size)] = shear
     return np.asarray(np.abs(moduli - isotropic).max(axis=(1, 2)) <= 1e-14 * np.abs(moduli[:, 0, 0]))
 
 
@@ -196,7 +193,7 @@ class _Addition:
         return len(self._parts)
 
     def part(
-        self, number: int, moduli: Array, special: dilatation.Mask, split: dilatation.Split | None,
+        self, number: int, moduli: Array, isotropic: dilatation.Mask, split: dilatation.Split | None,
         bends: Mask | None,
     ) -> int:  # fmt: skip
         """Add the rows of a part; return the number of the first cell with a Jacobian that is not positive, or -1."""
@@ -205,7 +202,7 @@ class _Addition:
         target = self._axisymmetric, slots, self._owner, number, self._data
         for tables, numbers in _passes(self._tables, material):
             bad = element_kernels.loops(self._points.shape[1]).add_stiffness(
-                self._points, cells, *tables, moduli if split is None else split.moduli, special, numbers, *target
+                self._points, cells, *tables, moduli if split is None else split.moduli, isotropic, numbers, *target
             )
             if bad >= 0:
                 return int(bad) + rows.start

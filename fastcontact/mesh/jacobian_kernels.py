@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Jacobians of cells in space, and the tables of slopes that they are computed from."""
+"""Jacobians of cells, and the tables of slopes that those in space are computed from."""
 
 import numpy as np
 
@@ -34,3 +34,52 @@ def jacobian_3d(x, slopes, q):
         j21 += t * x[1, a]
         j22 += t * x[2, a]
     return j00, j01, j02, j10, j11, j12, j20, j21, j22
+
+
+@kernel
+def at_nodes(values, cells, c, x):
+    """Fill `x` (n_nodes, dim) with the vectors of `values` (n_points, dim) at the nodes of cell `c`."""
+    for a in range(cells.shape[1]):
+        for i in range(values.shape[1]):
+            x[a, i] = values[cells[c, a], i]
+
+
+@kernel
+def inverse_jacobian(x, dN, q, J, inverse):
+    """Fill `inverse` (dim, dim) with the derivatives dxi_k / dx_i at [i, k], of the nodes `x` (n_nodes, dim); return det J.
+
+    `dN` (n_q, n_nodes, dim) are shape derivatives, `J` (dim, dim) is overwritten; in two or three dimensions.
+    """
+    dim = x.shape[1]
+    for k in range(dim):
+        for i in range(dim):
+            value = 0.0
+            for a in range(x.shape[0]):
+                value += dN[q, a, k] * x[a, i]
+            J[k, i] = value
+    if dim == 2:
+        det = J[0, 0] * J[1, 1] - J[0, 1] * J[1, 0]
+        inverse[0, 0], inverse[0, 1] = J[1, 1] / det, -J[0, 1] / det
+        inverse[1, 0], inverse[1, 1] = -J[1, 0] / det, J[0, 0] / det
+        return det
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        for m in range(3):
+            n, r = (m + 1) % 3, (m + 2) % 3
+            inverse[i, m] = J[n, j] * J[r, k] - J[n, k] * J[r, j]
+    det = J[0, 0] * inverse[0, 0] + J[0, 1] * inverse[1, 0] + J[0, 2] * inverse[2, 0]
+    for i in range(3):
+        for m in range(3):
+            inverse[i, m] /= det
+    return det
+
+
+@kernel
+def gradients(dN, q, inverse, gradient):
+    """Fill `gradient` (n_nodes, dim) with the derivatives of shape functions in x, by the inverse Jacobian (dim, dim)."""
+    for a in range(dN.shape[1]):
+        for i in range(inverse.shape[0]):
+            value = 0.0
+            for k in range(inverse.shape[0]):
+                value += dN[q, a, k] * inverse[i, k]
+            gradient[a, i] = value
