@@ -12,10 +12,11 @@ from dataclasses import replace
 import numpy as np
 from scipy.sparse import csr_array, diags_array
 
-from fastcontact.arrays import Array, Numbers
+from fastcontact.arrays import Array
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.pairing import Pairing, normals
 from fastcontact.contact.surface import Surface
+from fastcontact.linear.sparse_rows import nodal_rows
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
@@ -40,7 +41,7 @@ def with_arms(constraints: Constraints, pairing: Pairing, primary: Surface, poin
     rows = []
     for tangent, direction in zip(constraints.tangents, constraints.directions, strict=True):
         slope = np.einsum("mkd,md->mk", along, direction)
-        lever = _rows(slope[:, :, None] * normal[:, None, :], facing.nodes, points.size)
+        lever = nodal_rows(facing.nodes, slope[:, :, None] * normal[:, None, :], points.size)
         arm, left = np.asarray(lever @ rotations), np.asarray(tangent @ rotations)
         square = np.maximum((arm**2).sum(axis=1), 1e-300)
         length = (arm * left).sum(axis=1) / square
@@ -56,12 +57,3 @@ def _rotations(points: Array) -> Array:
     if points.shape[1] == 2:
         return np.column_stack([-x[:, 1], x[:, 0]]).reshape(-1, 1)
     return np.stack([np.cross(axis, x).ravel() for axis in np.eye(3)], axis=1)
-
-
-def _rows(values: Array, nodes: Numbers, n_dofs: int) -> csr_array:
-    """Return a matrix (m, n_dofs) of the `values` (m, k, dim) at the components of `nodes` (m, k)."""
-    m, k, dim = values.shape
-    columns = nodes[:, :, None].astype(np.intp) * dim + np.arange(dim)
-    rows = csr_array((values.ravel(), columns.ravel(), k * dim * np.arange(m + 1)), shape=(m, n_dofs))
-    rows.sum_duplicates()
-    return rows

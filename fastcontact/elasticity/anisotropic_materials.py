@@ -144,11 +144,6 @@ class Orthotropic(Material):
         """The constants, for messages."""
         return ", ".join(f"{name} = ({', '.join(f'{v:g}' for v in getattr(self, name))})" for name in ("E", "nu", "G"))
 
-    @property
-    def local_compliance(self) -> Array:
-        """Compliance (6, 6) [1 / pressure] in the material's axes."""
-        return np.asarray(self.compliances(self)[0])
-
     def compliances(self, constants: Any) -> Array:
         """Return compliances (n, 6, 6) [1 / pressure] in the material's axes, of constants that may be arrays (n,)."""
         given = np.broadcast_arrays(*map(np.atleast_1d, (*constants.E, *constants.nu, *constants.G)))
@@ -240,14 +235,9 @@ class Anisotropic(Material):
         """The diagonal of the moduli, for messages."""
         return f"D with the diagonal ({', '.join(f'{self.D[i][i]:g}' for i in range(6))})"
 
-    @property
-    def local_compliance(self) -> Array:
-        """Compliance (6, 6) [1 / pressure] in the material's axes."""
-        return np.asarray(np.linalg.inv(np.array(self.D)))
-
     def compliances(self, constants: Any) -> Array:
         """Return the compliance (1, 6, 6) [1 / pressure], which does not vary."""
-        return self.local_compliance[None]
+        return np.asarray(np.linalg.inv(np.array(self.D)[None]))
 
     def admissible(self, constants: Any) -> Any:
         """Return True: the moduli, which do not vary, are checked already."""
@@ -268,8 +258,8 @@ def _take_rest(material: Orthotropic | Anisotropic) -> None:
     check_conductivity(material.conductivity, 3)
     for name in ("expansion", "conductivity"):
         if isinstance(given := getattr(material, name), tuple):
-            own = tuple(v if isinstance(v, Varying) else float(v) for v in given)
-            object.__setattr__(material, name, own)
+            along = tuple(v if isinstance(v, Varying) else float(v) for v in given)
+            object.__setattr__(material, name, along)
 
 
 def _axes(axes: Any) -> Any:

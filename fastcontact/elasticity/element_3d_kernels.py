@@ -191,8 +191,8 @@ def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, ax
 
     `data` is written in place at `slots`. Threads share the nodes; each adds to its rows in the order of the cells.
     Returns the number of the first cell with a Jacobian that is not positive, or -1. The products of gradients are
-    integrated first; the moduli of the cell come in once at the end. Where ``isotropic`` (n_materials,) holds these are Lame's
-    constants, ``D[0, 1]`` and ``D[3, 3]``.
+    integrated first; the moduli of the cell come in once at the end. Where ``isotropic`` (n_materials,) holds, these are
+    Lame's constants, ``D[0, 1]`` and ``D[3, 3]``.
     """
     n_cells, n_nodes = cells.shape
     slopes, x, gradient = transposed(dN), np.empty((3, n_nodes)), np.empty((3, n_nodes))

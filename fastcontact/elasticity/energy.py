@@ -36,6 +36,15 @@ def cell_volumes(corners: Array, N: Array, dN: Array, axisymmetric: bool) -> Arr
     return np.asarray(volume)
 
 
+def gradients_at(corners: Array, dN: Array) -> tuple[Array, Array]:
+    """Return the gradients (n_cells, n_q, n_nodes, dim) of shape functions [1 / length], and det J (n_cells, n_q).
+
+    From the nodes of the cells, `corners` (n_cells, n_nodes, dim) [length], and derivatives `dN` (n_q, n_nodes, dim) [-].
+    """
+    slopes = np.einsum("qak,cad->cqdk", dN, corners, optimize=True)
+    return np.einsum("qak,cqkd->cqad", dN, np.linalg.inv(slopes), optimize=True), np.linalg.det(slopes)
+
+
 def integration_rule(element: Element, n_points: int | None = None) -> quadrature.Rule:
     """Return a product rule on the reference cell, by default with three points more along each direction than its order."""
     return quadrature.product_rule(element.linear, element.order + 3 if n_points is None else n_points)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fastcontact.arrays import Array, Indices, Numbers
-from fastcontact.elasticity.loads import DensityField, Table, VolumeLoad, add_density, cell_points
+from fastcontact.elasticity.loads import DensityField, Table, VolumeLoad, add_density, cell_points, solid_rows
 from fastcontact.elasticity.materials import Material
 from fastcontact.elasticity.varying_constants import Varying
 from fastcontact.errors import ModelError
@@ -61,7 +61,7 @@ class InertiaLoad(VolumeLoad):
             Only `inertia_loads` need them.
         """
         forces, missing = np.zeros((mesh.n_points, mesh.dim)), 0
-        for element, rows in self.rows(mesh):
+        for element, rows in solid_rows(mesh, self.groups).items():
             cells = mesh.cells[element][rows]
             x, N, volume = cell_points(mesh, element, cells, kinematics)
             densities = np.full(volume.shape, np.nan) if density is None else density.at(element, rows, N)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact.arrays import Array, Indices
-from fastcontact.elasticity.loads import LARGEST, Table, check_number
+from fastcontact.elasticity.loads import LARGEST, Table, check_number, listed
 from fastcontact.elasticity.material_axes import Axes, checked_axes, frames, rotations
 from fastcontact.elasticity.varying_constants import Cells, Varying, positions, wrapped
 from fastcontact.errors import ModelError
@@ -52,8 +52,7 @@ class InitialState:
     @property
     def name(self) -> str:
         """What it is and where, for messages."""
-        where = ", ".join(f"'{group}'" for group in self.groups) if self.groups is not None else "all solid cells"
-        return f"the initial {self.kind} of {where}"
+        return f"the initial {self.kind} of {listed(self.groups)}"
 
     def values(self, name: str, rows: Indices, N: Array) -> Array:
         """Return components (n_rows, n, n_components) [pressure] or [-] along the axes of the mesh, in cells of an element.
@@ -96,8 +95,7 @@ def initial_state(
     ramp: Table | None,
 ) -> InitialState:  # fmt: skip
     """Return the initial state of `kind` that is given by the names of its components; ModelError if it cannot be."""
-    where = ", ".join(f"'{group}'" for group in groups) if groups is not None else "all solid cells"
-    label = f"the initial {kind} of {where}"
+    label = f"the initial {kind} of {listed(groups)}"
     components: dict[int, Any] = {}
     for number, component in enumerate(COMPONENTS):
         value = wrapped(given.get(component))

@@ -11,7 +11,7 @@ the load]; `Components` are values by the number of their axis.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
 from typing import Any, ClassVar, Protocol
@@ -56,6 +56,7 @@ class Load:
     CONSTANT: ClassVar[bool] = False  # values are numbers, not functions of position
     group: str
     components: Components
+    value: Value  # of loads that have no components
     ramp: Table | None
 
     @property
@@ -70,8 +71,8 @@ class Load:
 
     @property
     def values(self) -> list[Value]:
-        """Values of all components."""
-        return list(self.components.values())
+        """Values of all components, or the only value."""
+        return [self.value] if hasattr(self, "value") else list(self.components.values())
 
     def check(self, mesh: Mesh, kinematics: str) -> None:
         """Raise MeshError or ModelError if the load cannot act on this mesh."""
@@ -108,11 +109,6 @@ class Pressure(Load):
     group: str
     value: Value
     ramp: Table | None = None
-
-    @property
-    def values(self) -> list[Value]:
-        """The pressure alone."""
-        return [self.value]
 
     def _check_place(self, mesh: Mesh, kinematics: str) -> None:
         for element, block in facets_of(mesh, self.group).items():
@@ -161,35 +157,20 @@ class VolumeLoad(Load):
     @property
     def name(self) -> str:
         """As for other loads."""
-        where = ", ".join(f"'{group}'" for group in self.groups) if self.groups is not None else EVERYWHERE
-        return f"{self.KIND} on {where}"
+        return f"{self.KIND} on {listed(self.groups)}"
 
     @property
     def places(self) -> tuple[str, ...]:
         """Names of its groups."""
         return (EVERYWHERE,) if self.groups is None else self.groups
 
-    def rows(self, mesh: Mesh) -> Iterator[tuple[str, Indices]]:
-        """Yield each element and the numbers (n,) of the solid cells on which the load acts."""
-        if self.groups is None:
-            yield from ((element, np.arange(len(block))) for element, block in mesh.solids.items())
-            return
-        numbers = np.unique(np.concatenate([mesh.cell_groups[group] for group in self.groups]))
-        for element, rows in mesh.split(numbers).items():
-            if element in mesh.solids:
-                yield element, rows
-
     def cells(self, mesh: Mesh) -> Iterator[tuple[str, Numbers]]:
         """Yield each element and the solid cells (n_cells, n_nodes) on which the load acts."""
-        for element, rows in self.rows(mesh):
+        for element, rows in solid_rows(mesh, self.groups).items():
             yield element, mesh.cells[element][rows]
 
     def _check_place(self, mesh: Mesh, kinematics: str) -> None:
-        for group in self.groups or ():
-            if not mesh.cells_of(group, dim=mesh.dim):
-                raise ModelError(
-                    f"group '{group}' holds no solid cells: no {self.KIND.removeprefix('the ')} can act on it"
-                )
+        check_solids(mesh, self.groups, f": no {self.KIND.removeprefix('the ')} can act on it")
 
 
 @dataclass(frozen=True)
@@ -217,8 +198,7 @@ class NodalForce(Load):
     ramp: Table | None = None
 
     def _check_place(self, mesh: Mesh, kinematics: str) -> None:
-        if not len(mesh.points_of(self.group)):
-            raise ModelError(f"group '{self.group}' is empty: no force can act on it")
+        check_points(mesh, self.group, "no force can act on it")
         if kinematics == "axisymmetric" and 0 in self.components:
             on_axis = np.intersect1d(mesh.points_of(self.group), axis_nodes(mesh))
             if len(on_axis):
@@ -259,6 +239,39 @@ class TotalForce(Load):
             area += float(measure.sum())
         for axis, value in self.components.items():
             forces[:, axis] = shares[:, 0] * (value / area)
+
+
+def listed(groups: Sequence[str] | None) -> str:
+    """Return groups of solid cells in words, for messages; None stands for all."""
+    return EVERYWHERE if groups is None else ", ".join(f"'{group}'" for group in groups)
+
+
+def solid_rows(mesh: Mesh, groups: Sequence[str] | None) -> dict[str, Indices]:
+    """Return by element the numbers (n,) of the solid cells of groups, or of all."""
+    if groups is None:
+        return {name: np.arange(len(block)) for name, block in mesh.solids.items()}
+    rows = mesh.split(np.unique(np.concatenate([mesh.cell_groups[group] for group in groups])))
+    return {name: rows[name] for name in mesh.solids if name in rows}
+
+
+def solid_points(mesh: Mesh, groups: Sequence[str] | None) -> Indices:
+    """Return the points of the solid cells of groups, or of all, ascending."""
+    return np.unique(
+        np.concatenate([mesh.cells[name][rows].ravel() for name, rows in solid_rows(mesh, groups).items()])
+    )
+
+
+def check_solids(mesh: Mesh, groups: Sequence[str] | None, otherwise: str) -> None:
+    """Raise ModelError that ends with `otherwise` if one of the groups holds no solid cells."""
+    for group in groups or ():
+        if not mesh.cells_of(group, dim=mesh.dim):
+            raise ModelError(f"group '{group}' holds no solid cells{otherwise}")
+
+
+def check_points(mesh: Mesh, group: str, otherwise: str) -> None:
+    """Raise ModelError that ends with `otherwise` if a group holds no points."""
+    if not len(mesh.points_of(group)):
+        raise ModelError(f"group '{group}' is empty: {otherwise}")
 
 
 def facets_of(mesh: Mesh, group: str) -> dict[str, Numbers]:

@@ -10,7 +10,8 @@ from scipy.sparse import bsr_array
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.cell_stress import CellStress
-from fastcontact.elasticity.energy import cell_volumes, integration_rule
+from fastcontact.elasticity.energy import cell_volumes, gradients_at, integration_rule
+from fastcontact.elasticity.incompatible_modes import PAIRS
 from fastcontact.elasticity.loads import DensityField
 from fastcontact.elasticity.stiffness import Sparsity, sparsity
 from fastcontact.errors import ModelError
@@ -19,8 +20,6 @@ from fastcontact.mesh.mesh import Mesh
 
 # Numbers of local matrices that are formed at a time.
 AT_ONCE = 2_000_000
-# The components of symmetric tensors in the order of stresses.
-_TENSOR = {2: [[0, 3], [3, 1]], 3: [[0, 3, 5], [3, 1, 4], [5, 4, 2]]}
 
 
 def mass(mesh: Mesh, kinematics: str, density: DensityField) -> bsr_array:
@@ -73,10 +72,9 @@ def stress_stiffness(mesh: Mesh, stresses: CellStress, material: Mapping[str, An
         N, dN, _ = element.tables
         corners = mesh.points[cells]
         stress = stresses.at(name, xi, cells, material[name][rows], rows)
-        slopes = np.einsum("qak,cad->cqdk", dN, corners, optimize=True)
-        gradient = np.einsum("qak,cqkd->cqad", dN, np.linalg.inv(slopes), optimize=True)
+        gradient, _ = gradients_at(corners, dN)
         weighted = cell_volumes(corners, N, dN, axisymmetric)[..., None] * weights[:, None] * stress
-        tensor = weighted[..., np.array(_TENSOR[mesh.dim])]
+        tensor = weighted[..., PAIRS[mesh.dim]]
         every = np.einsum("cqai,cqij,cqbj->cab", gradient, tensor, gradient, optimize=True)
         out = np.repeat(every[..., None], mesh.dim, axis=3)
         if axisymmetric:

@@ -82,7 +82,7 @@ class Material:
     @property
     def local_compliance(self) -> Array:
         """Compliance (6, 6) [1 / pressure] in the material's axes: strains 11, 22, 33, 2*12, 2*23, 2*13 of stresses."""
-        raise NotImplementedError
+        return np.asarray(self.compliances(self)[0])
 
     @property
     def described(self) -> str:
@@ -220,11 +220,8 @@ class Material:
         size = 6 if kinematics == "3d" else 4
         if self.expansion is None:
             return np.full((len(points), size), np.nan)
-        given, along = (self if constants is None else constants).expansion, np.empty((len(points), 3))
-        for axis in range(3):
-            along[:, axis] = given[axis] if isinstance(given, tuple) else given
-        axes = self._frames(points, kinematics, constants)
-        tensor = np.einsum("nai,na,naj->nij", axes, along, axes)
+        given = (self if constants is None else constants).expansion
+        along, tensor = self._along_axes(given, points, kinematics, constants)
         strain = np.stack([tensor[:, i, j] * (1.0 if i == j else 2.0) for i, j in PAIRS], axis=1)
         if np.abs(strain[:, size:]).max(initial=0.0) > ROUND_OFF * np.abs(along).max(initial=0.0):
             raise ModelError(
@@ -239,19 +236,23 @@ class Material:
 
         `constants` are those of `constants_at` there. ModelError if axes that leave the plane turn heat out of it.
         """
-        given, along, dim = constants.conductivity, np.empty((len(points), 3)), points.shape[1]
-        for axis in range(3):
-            along[:, axis] = given[axis] if isinstance(given, tuple) else given
+        given, dim = constants.conductivity, points.shape[1]
         if not isinstance(given, tuple):
-            return np.asarray(along[:, :1, None] * np.eye(dim))
-        axes = self._frames(points, kinematics, constants)
-        tensor = np.einsum("nai,na,naj->nij", axes, along, axes)
+            return np.broadcast_to(given, len(points))[:, None, None] * np.eye(dim)
+        along, tensor = self._along_axes(given, points, kinematics, constants)
         if np.abs(tensor[:, :dim, dim:]).max(initial=0.0) > ROUND_OFF * along.max(initial=0.0):
             raise ModelError(
                 f"the conductivity of the material with {self.described} turns heat out of the plane: turn one axis along z, "
                 "or use a mesh in 3D"
             )
         return np.asarray(tensor[:, :dim, :dim])
+
+    def _along_axes(self, given: Any, points: Array, kinematics: str, constants: Any) -> tuple[Array, Array]:
+        """Return numbers (n, 3) along the material's axes, one or three `given`, and the tensors (n, 3, 3) that they make."""
+        along, axes = np.empty((len(points), 3)), self._frames(points, kinematics, constants)
+        for axis in range(3):
+            along[:, axis] = given[axis] if isinstance(given, tuple) else given
+        return along, np.einsum("nai,na,naj->nij", axes, along, axes)
 
     def _frames(self, points: Array, kinematics: str, constants: Any) -> Array:
         """Return the axes (n, 3, 3) at `points` (n, dim), those of cells from `constants` [-]."""
@@ -272,8 +273,8 @@ class Material:
                 f"the material with {self.described} couples strains in the plane with shear out of it, by its constants or "
                 f"by its axes: {kinematics} has no such shear; turn one axis along z, or use a mesh in 3D"
             )
-        compliance[:, :4, 4:] = 0.0 if kinematics != "3d" else compliance[:, :4, 4:]
-        compliance[:, 4:, :4] = 0.0 if kinematics != "3d" else compliance[:, 4:, :4]
+        if kinematics != "3d":
+            compliance[:, :4, 4:] = compliance[:, 4:, :4] = 0.0
         return compliance
 
 
@@ -414,11 +415,6 @@ class LinearElastic(Material):
         if not isinstance(self.nu, Varying):
             return self.nu
         return 0.0 if self.nu.cells is None else self.nu.range[1]
-
-    @property
-    def local_compliance(self) -> Array:
-        """Compliance (6, 6) [1 / pressure]."""
-        return np.asarray(self.compliances(self)[0])
 
     def compliances(self, constants: Any) -> Array:
         """Return compliances (n, 6, 6) [1 / pressure] of constants that may be arrays (n,)."""

@@ -13,6 +13,7 @@ from fastcontact.arrays import Array, Numbers
 from fastcontact.elasticity import body_kernels, dilatation
 from fastcontact.elasticity.constitutive_kernels import LINEAR, SAINT_VENANT
 from fastcontact.elasticity.dilatation import REMAINDER
+from fastcontact.elasticity.energy import gradients_at
 from fastcontact.elasticity.material_field import MaterialField, material_field
 from fastcontact.elasticity.materials import LinearElastic, Material
 from fastcontact.elasticity.nonlinear_materials import ElasticPlastic, NonlinearElastic
@@ -133,12 +134,8 @@ class NonlinearBodies:
                 polynomials = polynomials[:, :1].copy() if elements.get(name).dilatation == 0 else polynomials
             owner, parts = pattern.owners(mesh, name)
             new, cauchy = np.empty_like(before[name]), np.empty((*before[name].shape[:2], 6 if dim == 3 else 4))
-            energies, numbers, slots, old = (
-                np.zeros((len(cells), 2)),
-                self._cells[name],
-                pattern.slots[name],
-                before[name],
-            )
+            energies, numbers = np.zeros((len(cells), 2)), self._cells[name]
+            slots, old = pattern.slots[name], before[name]
 
             def part(number: int) -> tuple[int, int]:
                 rows = slice(*parts[number])  # noqa: B023
@@ -203,11 +200,10 @@ class NonlinearBodies:
         N, dN, weights = elements.get(name).tables
         nodes, dim = self.mesh.cells[name][cells], self.mesh.dim
         points, u = self.mesh.points[nodes], displacement[nodes]
-        jacobian = np.einsum("qaj,cai->cqij", dN, points)
-        volume, to_reference = weights * np.linalg.det(jacobian), np.linalg.inv(jacobian)
-        F = np.zeros((*to_reference.shape[:2], 3, 3))
+        gradient, determinant = gradients_at(points, dN)
+        volume, F = weights * determinant, np.zeros((*determinant.shape, 3, 3))
         F[..., range(3), range(3)] = 1.0
-        F[..., :dim, :dim] += np.einsum("qak,cai,cqkj->cqij", dN, u, to_reference)
+        F[..., :dim, :dim] += np.einsum("cai,cqaj->cqij", u, gradient)
         if self.kinematics == "axisymmetric":
             radius = points[:, :, 0] @ N.T
             F[..., 2, 2] += (u[:, :, 0] @ N.T) / radius

@@ -8,7 +8,6 @@ the law begins with.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -148,11 +147,18 @@ class Hyperelastic(NonlinearElastic):
 
     strain = "finite"
 
-    def _check_positive(self, mu: float, bulk: float, how: str) -> None:
-        """Raise ModelError if the shear or the bulk modulus at the beginning, `how` it is found, is not positive."""
+    def _set(self, mu: float, how: str, constants: dict[str, Any]) -> None:
+        """Set the constants, those of the law and of `LinearElastic`.
+
+        ModelError if the bulk modulus, or the shear modulus `mu` at the beginning, `how` it is found, is not positive.
+        """
+        for name, value in {**constants, "incompatible_modes": False}.items():
+            object.__setattr__(self, name, value)
+        bulk = constants["bulk"]
         if not (0.0 < mu < math.inf):
             raise ModelError(f"the shear modulus {how} = {mu:g} of {type(self).__name__} must be positive")
         check_positive("the bulk modulus", bulk)
+        self._begins_with(mu, bulk)
 
 
 @typed(ModelError)
@@ -191,17 +197,13 @@ class Polynomial(Hyperelastic):
 
     _coefficients: tuple[float, float, float, float]
 
-    def _set(self, coefficients: Sequence[float], bulk: float, options: dict[str, Any]) -> None:
-        for name, value in {"volumetric": "auto", "density": None, "expansion": None, **options}.items():
-            object.__setattr__(self, name, value)
-        object.__setattr__(self, "incompatible_modes", False)
-        if not all(map(math.isfinite, coefficients)):
+    def _take(self, coefficients: dict[str, float], constants: dict[str, Any]) -> None:
+        """Set the `coefficients` by name, those that are missing being zero, and the other constants."""
+        if not all(map(math.isfinite, coefficients.values())):
             raise ModelError(f"the constants of {type(self).__name__} must be finite numbers")
-        mu = 2.0 * (coefficients[0] + coefficients[1])
-        self._check_positive(mu, bulk, "2 (C10 + C01)" if coefficients[1] else "2 C10")
-        object.__setattr__(self, "bulk", float(bulk))
-        object.__setattr__(self, "_coefficients", tuple(map(float, coefficients)))
-        self._begins_with(mu, bulk)
+        C10, C01, C20, C30 = (float(coefficients.get(name, 0.0)) for name in ("C10", "C01", "C20", "C30"))
+        object.__setattr__(self, "_coefficients", (C10, C01, C20, C30))
+        self._set(2.0 * (C10 + C01), "2 (C10 + C01)" if C01 else "2 C10", {**coefficients, **constants})
 
     @property
     def constants(self) -> list[float]:
@@ -238,9 +240,8 @@ class MooneyRivlin(Polynomial):
     def __init__(
         self, C10: float, C01: float, bulk: float, *, volumetric: str = "auto", density: Any = None, expansion: Any = None
     ) -> None:  # fmt: skip
-        object.__setattr__(self, "C10", C10)
-        object.__setattr__(self, "C01", C01)
-        self._set((C10, C01, 0.0, 0.0), bulk, {"volumetric": volumetric, "density": density, "expansion": expansion})
+        rest = {"bulk": float(bulk), "volumetric": volumetric, "density": density, "expansion": expansion}
+        self._take({"C10": C10, "C01": C01}, rest)
 
 
 @typed(ModelError)
@@ -274,9 +275,8 @@ class Yeoh(Polynomial):
         self, C10: float, C20: float, C30: float, bulk: float, *, volumetric: str = "auto", density: Any = None,
         expansion: Any = None,
     ) -> None:  # fmt: skip
-        for name, value in (("C10", C10), ("C20", C20), ("C30", C30)):
-            object.__setattr__(self, name, value)
-        self._set((C10, 0.0, C20, C30), bulk, {"volumetric": volumetric, "density": density, "expansion": expansion})
+        rest = {"bulk": float(bulk), "volumetric": volumetric, "density": density, "expansion": expansion}
+        self._take({"C10": C10, "C20": C20, "C30": C30}, rest)
 
 
 @typed(ModelError)
@@ -318,12 +318,8 @@ class Ogden(Hyperelastic):
             raise ModelError(f"Ogden has {len(terms[0])} mu and {len(terms[1])} alpha: give as many of both")
         if not all(map(math.isfinite, terms[0] + terms[1])) or 0.0 in terms[1]:
             raise ModelError("mu and alpha of Ogden must be finite, and no alpha zero")
-        given = {"mu": terms[0], "alpha": terms[1], "bulk": bulk, "incompatible_modes": False}
-        given |= {"volumetric": volumetric, "density": density, "expansion": expansion}
-        for name, value in given.items():
-            object.__setattr__(self, name, value)
-        self._check_positive(sum(terms[0]), bulk, "(the sum of mu)")
-        self._begins_with(sum(terms[0]), bulk)
+        rest = {"bulk": bulk, "volumetric": volumetric, "density": density, "expansion": expansion}
+        self._set(sum(terms[0]), "(the sum of mu)", {"mu": terms[0], "alpha": terms[1], **rest})
 
     @property
     def constants(self) -> list[float]:

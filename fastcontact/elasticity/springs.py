@@ -15,6 +15,7 @@ from scipy.sparse import bsr_array, csr_array, diags_array, vstack
 
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
+from fastcontact.linear.sparse_rows import nodal_rows
 
 # Ratio of the stiffness of a spring between nodes to that of the bodies there: warned about, and refused.
 STIFF, STIFFEST = 1e5, 1e12
@@ -59,8 +60,7 @@ def grounded(
     Along every axis of `stiffness` [force / length], and `along` or across the unit vector `direction` (dim,) [-].
     """
     directions, values = _frame(stiffness, along or {}, direction, dim)
-    dofs = np.tile(nodes.astype(np.intp)[:, None] * dim + np.arange(dim), (len(values), 1))
-    rows = _rows(np.repeat(directions, len(nodes), axis=0), dofs, n_dofs)
+    rows = nodal_rows(np.tile(nodes, len(values))[:, None], np.repeat(directions, len(nodes), axis=0)[:, None], n_dofs)
     return Springs(name, rows, np.repeat(values, len(nodes)), True)
 
 
@@ -87,9 +87,10 @@ def between(
     if along and direction is None:
         direction = _line(name, points, first, second)
     directions, values = _frame(stiffness, along, direction, dim)
-    dofs = np.array([first, second])[:, None] * dim + np.arange(dim)
-    entries = np.concatenate([-directions, directions], axis=1)
-    return Springs(name, _rows(entries, np.tile(dofs.ravel(), (len(values), 1)), points.size), values, False)
+    rows = nodal_rows(
+        np.tile([first, second], (len(values), 1)), np.stack([-directions, directions], axis=1), points.size
+    )
+    return Springs(name, rows, values, False)
 
 
 def joined(
@@ -136,15 +137,6 @@ def _frame(
         directions += [vector for vector, kind in zip(frame, kinds, strict=True) if kind in along]
         values += [along[kind] for kind in kinds if kind in along]
     return np.array(directions), np.array(values, float)
-
-
-def _rows(entries: Array, dofs: NDArray[np.integer], n_dofs: int) -> csr_array:
-    """Return a matrix (m, n_dofs) from the `entries` (m, k) of its rows at `dofs` (m, k)."""
-    m, k = entries.shape
-    rows = csr_array((entries.ravel(), dofs.ravel(), k * np.arange(m + 1)), shape=(m, n_dofs))
-    rows.eliminate_zeros()
-    rows.sort_indices()
-    return rows
 
 
 def stacked(springs: Sequence[Springs], n_dofs: int) -> csr_array:

@@ -9,7 +9,17 @@ from typing import Any
 import numpy as np
 
 from fastcontact.arrays import Array
-from fastcontact.elasticity.loads import EVERYWHERE, Table, Value, check_number, check_value, evaluated
+from fastcontact.elasticity.loads import (
+    EVERYWHERE,
+    Table,
+    Value,
+    check_number,
+    check_solids,
+    check_value,
+    evaluated,
+    listed,
+    solid_points,
+)
 from fastcontact.errors import ModelError
 from fastcontact.mesh.mesh import Mesh
 
@@ -45,8 +55,7 @@ class Temperature:
     @property
     def name(self) -> str:
         """Where it is given, for messages."""
-        where = ", ".join(f"'{group}'" for group in self.groups) if self.groups is not None else EVERYWHERE
-        return f"the temperature of {where}"
+        return f"the temperature of {listed(self.groups)}"
 
     @property
     def places(self) -> tuple[str, ...]:
@@ -55,9 +64,7 @@ class Temperature:
 
     def check(self, mesh: Mesh) -> None:
         """Raise MeshError or ModelError if a group, the value or the reference cannot be."""
-        for group in self.groups or ():
-            if not mesh.cells_of(group, dim=mesh.dim):
-                raise ModelError(f"group '{group}' holds no solid cells: it has no temperature")
+        check_solids(mesh, self.groups, ": it has no temperature")
         check_number(f"the reference of {self.name}", self.reference)
         if not isinstance(self.value, np.ndarray):
             check_value(self.name, self.value)
@@ -71,11 +78,7 @@ class Temperature:
 
     def rise(self, mesh: Mesh) -> Array:
         """Return the rise over the reference (n_points,) at multiplier 1, zero at points of other cells [temperature]."""
-        if self.groups is None:
-            blocks = list(mesh.solids.values())
-        else:
-            blocks = [block for group in self.groups for block in mesh.cells_of(group, dim=mesh.dim).values()]
-        points = np.unique(np.concatenate([block.ravel() for block in blocks]))
+        points = solid_points(mesh, self.groups)
         rise = np.zeros(mesh.n_points)
         if isinstance(self.value, np.ndarray):
             rise[points] = self.value[points] - self.reference

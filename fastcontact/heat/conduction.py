@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Indices, Numbers
-from fastcontact.elasticity.energy import cell_volumes, integration_rule
+from fastcontact.elasticity.energy import cell_volumes, gradients_at, integration_rule
 from fastcontact.elasticity.materials import Material
 from fastcontact.elasticity.stiffness import sparsity
 from fastcontact.elasticity.varying_constants import positions
@@ -86,8 +86,7 @@ class Conduction:
         mesh, (xi, weights) = self.mesh, integration_rule(elements.get(name))
         N, dN = elements.get(name).shape(xi), elements.get(name).gradient(xi)
         nodes = mesh.cells[name][rows]
-        slopes = np.einsum("qak,cad->cqdk", dN, mesh.points[nodes], optimize=True)
-        gradient = np.einsum("qak,cqkd->cqad", dN, np.linalg.inv(slopes), optimize=True)
+        gradient, _ = gradients_at(mesh.points[nodes], dN)
         volume = cell_volumes(mesh.points[nodes], N, dN, self.kinematics == "axisymmetric") * weights
         k, number = np.zeros((*volume.shape, mesh.dim, mesh.dim)), self.number[name][rows]
         for index in np.unique(number):

@@ -20,6 +20,7 @@ from fastcontact.elasticity.loads import (
     VolumeLoad,
     add_density,
     cell_points,
+    check_points,
     evaluated,
     facet_points,
     facets_of,
@@ -37,25 +38,12 @@ class FixedTemperature(Load):
     value: Value
     ramp: Table | None = None
 
-    @property
-    def values(self) -> list[Value]:
-        """The temperature alone."""
-        return [self.value]
-
     def _check_place(self, mesh: Mesh, kinematics: str) -> None:
-        if not len(mesh.points_of(self.group)):
-            raise ModelError(f"group '{self.group}' is empty: no temperature can be prescribed on it")
+        check_points(mesh, self.group, "no temperature can be prescribed on it")
 
 
 class Heating(Load):
     """A load of heat that does not depend on the temperature."""
-
-    value: Value
-
-    @property
-    def values(self) -> list[Value]:
-        """Its value alone."""
-        return [self.value]
 
     def power(self, mesh: Mesh, kinematics: str) -> Array:
         """Return the powers (n_points,) of the nodes at multiplier 1, positive into the body [power]."""
@@ -105,8 +93,7 @@ class NodalHeat(Heating):
     ramp: Table | None = None
 
     def _check_place(self, mesh: Mesh, kinematics: str) -> None:
-        if not len(mesh.points_of(self.group)):
-            raise ModelError(f"group '{self.group}' is empty: nothing can heat it")
+        check_points(mesh, self.group, "nothing can heat it")
 
     def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
         nodes = mesh.points_of(self.group)

@@ -1,11 +1,22 @@
-"""Row scaling and selection of sparse matrices without matrix products."""
+"""Rows of sparse matrices: from nodal values, scaled, and selected, without matrix products."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from fastcontact.arrays import AnyArray, Indices
+from fastcontact.arrays import AnyArray, Array, Indices
+
+
+def nodal_rows(nodes: NDArray[np.integer], values: Array, n_dofs: int) -> csr_array:
+    """Return rows (m, n_dofs) with the `values` (m, k, dim) at the components of `nodes` (m, k)."""
+    m, k, dim = values.shape
+    columns = nodes[:, :, None].astype(np.intp) * dim + np.arange(dim)
+    rows = csr_array((values.flatten(), columns.ravel(), k * dim * np.arange(m + 1)), shape=(m, n_dofs))
+    rows.sum_duplicates()
+    rows.eliminate_zeros()
+    return rows
 
 
 def scaled(matrix: csr_array, factor: AnyArray) -> csr_array:

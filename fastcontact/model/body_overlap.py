@@ -6,13 +6,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fastcontact.arrays import Array, Indices
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.search.closest import closest_of_kinds
 from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import bodies, outer_facets
 from fastcontact.model import body_overlap_kernels
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 # Points nearer to a surface than this, relative to the size of the model, lie on it.
 ON_SURFACE = 1e-10
@@ -45,9 +46,9 @@ def depths(mesh: Mesh, kinematics: str, coordinates: Array) -> Iterator[tuple[in
     outer = outer_facets(mesh)
     sides = [{name: facets[body[facets[:, 0]] == number] for name, facets in outer.items()} for number in range(count)]
     nodes = [np.unique(np.concatenate([facets.ravel() for facets in side.values()])) for side in sides]
-    own = np.zeros(mesh.n_points)
+    stray = np.zeros(mesh.n_points)
     for name, facets in outer.items():
-        np.maximum.at(own, facets, _strays(name, coordinates[facets])[:, None])
+        np.maximum.at(stray, facets, _strays(name, coordinates[facets])[:, None])
     for number, other in ((a, b) for a in range(count) for b in range(count) if a != b):
         low, high = coordinates[nodes[other]].min(axis=0), coordinates[nodes[other]].max(axis=0)
         near = nodes[number]
@@ -56,12 +57,13 @@ def depths(mesh: Mesh, kinematics: str, coordinates: Array) -> Iterator[tuple[in
             continue
         kinds = [(name, coordinates[facets]) for name, facets in sides[other].items() if len(facets)]
         corners = [block for _, block in kinds]
-        if mesh.dim == 3:
-            depth, facet = _depths_in_space(coordinates[near], corners)
-        else:
-            depth, facet = _depths_in_plane(coordinates[near], corners, kinematics == "axisymmetric")
+        taken = None
+        if kinematics == "axisymmetric":
+            size = max(float(np.abs(block).max()) for block in corners)
+            taken = [(np.abs(block[:, :, 0]) > LENGTH_ROUND_OFF * size).any(axis=1) for block in corners]
+        depth, facet = _depths(coordinates[near], corners, taken)
         play = np.concatenate([_strays(name, block) for name, block in kinds])[facet]
-        yield number, other, near, np.where(depth <= play + own[near], 0.0, depth)
+        yield number, other, near, np.where(depth <= play + stray[near], 0.0, depth)
 
 
 def _strays(name: str, corners: Array) -> Array:
@@ -81,47 +83,32 @@ def _strays(name: str, corners: Array) -> Array:
     return np.asarray((rise**2 / length).max(axis=1))
 
 
-def _depths_in_plane(points: Array, kinds: list[Array], axisymmetric: bool) -> tuple[Array, Indices]:
-    """Return how deep each of `points` (n, 2) lies in the closed curves of facets (m, 2 or 3, 2), 0 outside.
+def _depths(points: Array, kinds: list[Array], taken: list[Mask] | None = None) -> tuple[Array, Indices]:
+    """Return how deep each of `points` (n, dim) lies in the closed surface of facets (m, n_nodes, dim), 0 outside.
 
-    Also the closest facet (n,), counted through the kinds, of those inside.
+    Also the closest facet (n,), counted through the kinds. Distances are those to the facets that are `taken`, by default
+    all. Where the closest point lies inside a facet, its normal tells in from out. Where it lies on an end, an edge or a
+    corner the normals around may disagree, and the winding number of the surface tells.
     """
-    depth, size = np.zeros(len(points)), max(float(np.abs(corners).max()) for corners in kinds)
-    crossed = np.zeros(len(points), np.int64)
-    for corners in kinds:
-        body_overlap_kernels.count_crossings(points, np.ascontiguousarray(corners), crossed)
-    inside = crossed % 2 == 1
-    facet = np.zeros(len(points), np.intp)
-    if inside.any():
-        off_axis = [
-            (np.abs(corners[:, :, 0]) > 1e-9 * size).any(axis=1) if axisymmetric else np.ones(len(corners), bool)
-            for corners in kinds
-        ]
-        away = [corners[kept] for corners, kept in zip(kinds, off_axis, strict=True)]
-        closest = closest_of_kinds(points[inside], [corners for corners in away if len(corners)])
-        depth[inside] = closest.distance
-        facet[inside] = np.flatnonzero(np.concatenate(off_axis))[closest.facet]
-    return np.where(depth > ON_SURFACE * size, depth, 0.0), facet
-
-
-def _depths_in_space(points: Array, kinds: list[Array]) -> tuple[Array, Indices]:
-    """Return how deep each of `points` (n, 3) lies in the closed surface of facets (m, n_nodes, 3), 0 outside.
-
-    Also the closest facet (n,), counted through the kinds.
-
-    Where the closest point lies inside a facet, its normal tells in from out. Where it lies on an edge or a corner the
-    normals around may disagree, and the winding number of the surface tells.
-    """
-    closest = closest_of_kinds(points, kinds)
+    taken = [np.ones(len(corners), bool) for corners in kinds] if taken is None else taken
+    counted = [corners[kept] for corners, kept in zip(kinds, taken, strict=True)]
+    closest = closest_of_kinds(points, [corners for corners in counted if len(corners)])
     size = max(float(np.abs(corners).max()) for corners in kinds)
     height = np.einsum("nd,nd->n", points - closest.position, closest.normal)  # above the tangent planes
     inside = height < 0
     unsure = np.flatnonzero((np.abs(height) < 0.999 * closest.distance) & (closest.distance > ON_SURFACE * size))
     if len(unsure):
-        triangles = np.concatenate(
-            [corners[:, flat_triangles(corners.shape[1])].reshape(-1, 3, 3) for corners in kinds]
-        )
+        pieces = [corners[:, _flat_pieces(corners)].reshape(-1, *2 * corners.shape[2:]) for corners in kinds]
         number = np.empty(len(unsure))
-        body_overlap_kernels.winding_numbers(np.ascontiguousarray(points[unsure]), triangles, number)
+        body_overlap_kernels.winding_numbers(np.ascontiguousarray(points[unsure]), np.concatenate(pieces), number)
         inside[unsure] = number > 0.5
-    return np.where(inside & (closest.distance > ON_SURFACE * size), closest.distance, 0.0), closest.facet
+    depth = np.where(inside & (closest.distance > ON_SURFACE * size), closest.distance, 0.0)
+    return depth, np.flatnonzero(np.concatenate(taken))[closest.facet]
+
+
+def _flat_pieces(corners: Array) -> Indices:
+    """Return the lines (n, 2) or triangles (n, 3) between the nodes of facets (m, n_nodes, dim)."""
+    n_nodes, dim = corners.shape[1:]
+    if dim == 2:
+        return np.array([[0, 1]] if n_nodes == 2 else [[0, 2], [2, 1]])
+    return flat_triangles(n_nodes)

@@ -96,11 +96,7 @@ def check_penetration(name: str, pair: Formulation) -> None:
 
     An intended interference is smaller, or given as a clearance.
     """
-    if pair.options.tied or pair.options.gap_only:
-        return
-    at_rest = Configuration.undeformed(pair.points)
-    total, geometric = pair.nodal_gap(at_rest)[0], pair.nodal_gap(at_rest, with_clearance=False)[0]
-    gap = np.where(pair.options.excluded_nodes(pair.secondary), np.inf, np.maximum(total, geometric))
+    gap = initial_gaps(pair)
     size = np.zeros(len(gap))
     for block in pair.secondary.blocks:
         long = np.linalg.norm(np.ptp(pair.points[block.facets], axis=1), axis=1)
@@ -113,6 +109,18 @@ def check_penetration(name: str, pair: Formulation) -> None:
             f"the element there is long ({size[row]:.4g}): move a body apart, turn a surface that is inside out, or give an "
             "interference that is meant as clearance"
         )
+
+
+def initial_gaps(pair: Formulation) -> Array:
+    """Return the gaps (n_nodes,) before any load, clearances counting where they open them [length].
+
+    Infinite at nodes that face nothing or are left out, and where penetration is no mistake: in tied pairs and gap_only.
+    """
+    if pair.options.tied or pair.options.gap_only:
+        return np.full(len(pair.secondary.points), np.inf)
+    at_rest = Configuration.undeformed(pair.points)
+    gap = np.maximum(*(pair.nodal_gap(at_rest, with_clearance)[0] for with_clearance in (True, False)))
+    return np.where(pair.options.excluded_nodes(pair.secondary), np.inf, gap)
 
 
 def check_overlap(mesh: Mesh, kinematics: str, paired: Iterable[tuple[str, str]]) -> None:

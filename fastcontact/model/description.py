@@ -9,6 +9,7 @@ import numpy as np
 
 from fastcontact.elasticity.incompatible_modes import BENDING
 from fastcontact.elasticity.initial_states import ALWAYS, COMPONENTS
+from fastcontact.elasticity.loads import listed
 from fastcontact.elasticity.nonlinear_materials import NonlinearElastic
 from fastcontact.model.contact_pair import ContactPair
 
@@ -29,7 +30,6 @@ def sentences(model: Any) -> Iterator[str]:
     if named := [f"{kind} in {unit}" for kind, unit in model.units.items() if unit not in ("", "-")]:
         yield f"Units: {', '.join(named)}."
     for material, groups in model.materials:
-        where = "all solid cells" if groups is None else _listed(groups)
         modes = (
             material.incompatible_modes
             and model.kinematics != "axisymmetric"
@@ -37,7 +37,7 @@ def sentences(model: Any) -> Iterator[str]:
         )
         locking = ", with a mean dilatation against locking" if material.averaged and not modes else ""
         locking += ", with incompatible modes" if modes else ""
-        yield f"Material: {material.described} in {where}{locking}."
+        yield f"Material: {material.described} in {listed(groups)}{locking}."
     if not model.materials:
         yield "Material: none yet."
     yield from _supports(model)
@@ -128,7 +128,3 @@ def _contact(model: Any, pair: ContactPair) -> str:
     if pair.fluid is not None:
         told += f", fluid of pressure {pair.fluid.pressure:g} from '{pair.fluid.source}'{_history(pair.fluid.ramp)}"
     return f"'{pair.secondary}' ({nodes} points) on {opposite}, {pair.method}, {law}{told}"
-
-
-def _listed(groups: tuple[str, ...]) -> str:
-    return ", ".join(f"'{group}'" for group in groups)

@@ -17,9 +17,10 @@ from fastcontact.contact.search.closest import closest_of_kinds
 from fastcontact.contact.surface import surface
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.errors import ModelError
+from fastcontact.linear.sparse_rows import nodal_rows
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.ramp import Table
-from fastcontact.model.relation_rows import APART, matched
+from fastcontact.model.relation_rows import APART, less_first, matched
 
 # How far off the facets of the other end nodes may lie, and beyond their ends, in facet sizes: chords of curved ends.
 BESIDE = 0.02
@@ -87,7 +88,7 @@ def periodic(
     for axis in range(mesh.dim):
         rows = _differences(interface, np.eye(mesh.dim)[axis][:, None], mesh)
         if axis in free:
-            rows = csr_array(rows[1:] - csr_array(vstack([rows[[0]]] * (len(first) - 1), format="csr")))
+            rows = less_first(rows)
         if rows.shape[0]:
             relations.append(MultiPointConstraint(name, rows, float(jump.get(axis, 0.0)), ramp))
     return relations, interface
@@ -189,14 +190,6 @@ def _differences(interface: PeriodicInterface, directions: Array, mesh: Mesh) ->
     """Return rows (m, n_dofs): second nodes along the first column of `directions` (dim, 1 or 2), plus first nodes along the
     last one; with one column less first nodes along it.
     """
-    m, dim = len(interface.first), mesh.dim
     theirs = directions[:, 1] if directions.shape[1] > 1 else -directions[:, 0]
-    values = np.tile(np.concatenate([directions[:, 0], theirs]), (m, 1))
-    dofs = np.hstack(
-        [interface.second[:, None] * dim + np.arange(dim), interface.first[:, None] * dim + np.arange(dim)]
-    )
-    start = 2 * dim * np.arange(m + 1)
-    rows = csr_array((values.ravel(), dofs.ravel(), start), shape=(m, mesh.n_points * dim))
-    rows.sum_duplicates()
-    rows.eliminate_zeros()
-    return rows
+    nodes = np.column_stack([interface.second, interface.first])
+    return nodal_rows(nodes, np.tile([directions[:, 0], theirs], (len(nodes), 1, 1)), mesh.points.size)

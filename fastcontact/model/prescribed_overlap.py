@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -36,11 +36,8 @@ class Supports:
 
     def instants(self) -> list[float]:
         """Return some instants of the ramp, the first and the last among them."""
-        instants_of_ramps = list(self.ramp.instants)
-        return [
-            instants_of_ramps[k]
-            for k in np.unique(np.linspace(0, len(instants_of_ramps) - 1, SOME).round().astype(int))
-        ]
+        instants = list(self.ramp.instants)
+        return [instants[k] for k in np.unique(np.linspace(0, len(instants) - 1, SOME).round().astype(int))]
 
     def at(self, instant: float) -> Array:
         """Return the displacements (n_points, dim), zero where nothing is prescribed [length]."""
@@ -97,17 +94,10 @@ def _overlaps(pairs: Pairs, supports: Supports) -> Iterator[tuple[ContactPair, F
             continue
         # The others face the other side as well, as far as this matters.
         others = len(usable) - len(nodes)
-        worst = _worst(_at(contact, formulation, nodes, supports, instant) for instant in supports.instants())
+        overlaps = [_at(contact, formulation, nodes, supports, instant) for instant in supports.instants()]
+        worst = max(overlaps, key=lambda overlap: overlap.depth)
         if worst.count:
-            yield (
-                contact,
-                formulation,
-                Overlap(worst.count, worst.total + others, worst.depth, worst.point, worst.instant),
-            )
-
-
-def _worst(overlaps: Iterable[Overlap]) -> Overlap:
-    return max(overlaps, key=lambda overlap: overlap.depth)
+            yield contact, formulation, replace(worst, total=worst.total + others)
 
 
 def _at(contact: ContactPair, formulation: Formulation, nodes: Numbers, supports: Supports, instant: float) -> Overlap:

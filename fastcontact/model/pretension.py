@@ -15,7 +15,7 @@ from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.errors import ModelError
 from fastcontact.mesh.companion_groups import OPPOSITE
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.model.relation_rows import along, matched, normals_of
+from fastcontact.model.relation_rows import along, less_first, matched, normals_of
 
 # How far nodes of a section may lie off its plane, relative to its size.
 FLAT = 1e-6
@@ -79,7 +79,7 @@ class Pretension:
         rows = [self._approach(direction, n_dofs) for direction in _across(self.normal)]
         approach = self._approach(self.normal, n_dofs)
         if len(self.nodes) > 1:
-            rows.append(approach[1:] - csr_array(vstack([approach[[0]]] * (len(self.nodes) - 1))))
+            rows.append(less_first(approach))
         matrix = csr_array(vstack(rows, format="csr"))
         matrix.eliminate_zeros()
         constraints = [MultiPointConstraint(f"the sides of {self.name}", matrix)]

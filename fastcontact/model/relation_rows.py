@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, vstack
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.elasticity.loads import facets_of, outward
 from fastcontact.errors import ModelError
+from fastcontact.linear.sparse_rows import nodal_rows
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.round_off import ROUND_OFF
 
@@ -48,11 +49,12 @@ def directions_of(mesh: Mesh, group: str, component: str) -> list[tuple[Indices,
 
 def along(nodes: Indices, directions: Array, n_dofs: int) -> csr_array:
     """Return rows (m, n_dofs): the displacement of each node (m,) along its unit vector (m, dim) [-]."""
-    m, dim = directions.shape
-    dofs = nodes[:, None] * dim + np.arange(dim)
-    rows = csr_array((directions.flatten(), dofs.ravel(), dim * np.arange(m + 1)), shape=(m, n_dofs))
-    rows.eliminate_zeros()
-    return rows
+    return nodal_rows(nodes[:, None], directions[:, None], n_dofs)
+
+
+def less_first(rows: csr_array) -> csr_array:
+    """Return all rows (m, n) but the first one, less the first one."""
+    return csr_array(rows[1:] - csr_array(vstack([rows[[0]]] * (rows.shape[0] - 1), format="csr")))
 
 
 def matched(

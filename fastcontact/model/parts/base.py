@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_array, vstack
 
-from fastcontact.arrays import AnyArray, Array, Indices, Mask
+from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.contact.obstacles.rotation import Rotation
 from fastcontact.elasticity.initial_states import InitialState
-from fastcontact.elasticity.loads import Load, Value, check_number, evaluated
+from fastcontact.elasticity.loads import Load, Value, check_number, check_solids, evaluated, solid_rows
 from fastcontact.elasticity.materials import KINEMATICS, Material
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, stacked_rows
 from fastcontact.elasticity.nonlinear_materials import STRAINS
@@ -133,22 +133,12 @@ class ModelBase:
     def _solid_groups(self, groups: Sequence[str] | str | None, otherwise: str) -> tuple[str, ...] | None:
         """Return groups of solid cells by name, None for all; ModelError that ends with `otherwise` if one holds none."""
         names = group_names(groups)
-        for name in names or ():
-            if not self.mesh.cells_of(name, dim=self.mesh.dim):
-                raise ModelError(f"group '{name}' holds no solid cells{otherwise}")
+        check_solids(self.mesh, names, otherwise)
         return names
 
     def _cells_of(self, groups: Sequence[str] | None) -> Cells:
         """Return the solid cells of groups, or all."""
-        if groups is None:
-            return Cells(self.mesh, {name: np.arange(len(block)) for name, block in self.mesh.solids.items()})
-        cells = self.mesh.split(np.unique(np.concatenate([self.mesh.cell_groups[name] for name in groups])))
-        return Cells(self.mesh, {name: cells[name] for name in self.mesh.solids if name in cells})
-
-    def _points_of_cells(self, groups: Sequence[str] | None) -> Indices:
-        """Return the points of the solid cells of groups, or of all."""
-        cells = self._cells_of(groups)
-        return np.unique(np.concatenate([self.mesh.cells[name][rows].ravel() for name, rows in cells.rows.items()]))
+        return Cells(self.mesh, solid_rows(self.mesh, groups))
 
     def _nodes(self, point: str | int) -> AnyArray:
         if isinstance(point, str):

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csr_array, vstack
+from scipy.sparse import csr_array
 
 from fastcontact.elasticity.loads import axes_of, check_number
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
@@ -18,7 +18,7 @@ from fastcontact.model.parts.initial_states import ModelInitialStates
 from fastcontact.model.periodicity import cyclic, periodic
 from fastcontact.model.pretension import PretensionForce, pretension
 from fastcontact.model.ramp import History, table_of
-from fastcontact.model.relation_rows import NORMAL, along, directions_of, matched, normals_of
+from fastcontact.model.relation_rows import NORMAL, along, directions_of, less_first, matched
 
 
 class ModelConnections(ModelInitialStates):
@@ -112,16 +112,13 @@ class ModelConnections(ModelInitialStates):
         nodes = self.mesh.points_of(group)
         if len(nodes) < 2:
             raise ModelError(f"group '{group}' holds {len(nodes)} points: at least two are needed to couple")
-        if component == NORMAL:
-            rows = along(*normals_of(self.mesh, group), self.n_dofs)
-            first = csr_array(vstack([rows[[0]]] * (rows.shape[0] - 1), format="csr"))
-            self.relations.append(MultiPointConstraint(f"couple('{group}', 'normal')", csr_array(rows[1:] - first)))
-            return
-        for axis in axes_of(f"couple('{group}')", dict.fromkeys(component, 1.0), self.mesh.dim):
-            m = len(nodes) - 1
-            dofs = np.column_stack([np.full(m, nodes[0]), nodes[1:]]).astype(np.intp) * self.mesh.dim + axis
-            rows = csr_array((np.tile([-1.0, 1.0], m), dofs.ravel(), 2 * np.arange(m + 1)), shape=(m, self.n_dofs))
-            self.relations.append(MultiPointConstraint(f"couple('{group}', '{'xyz'[axis]}')", rows))
+        directions = [component] if component == NORMAL else list(dict.fromkeys(component))
+        if component != NORMAL:
+            axes_of(f"couple('{group}')", dict.fromkeys(component, 1.0), self.mesh.dim)
+        for name in directions:
+            ((nodes, vectors),) = directions_of(self.mesh, group, name)
+            rows = less_first(along(nodes, vectors, self.n_dofs))
+            self.relations.append(MultiPointConstraint(f"couple('{group}', '{name}')", rows))
 
     @typed(ModelError)
     def relate_groups(

@@ -12,7 +12,7 @@ import numpy as np
 
 from fastcontact.arrays import Array
 from fastcontact.elasticity.initial_states import StressOffset, initial_state
-from fastcontact.elasticity.loads import Value
+from fastcontact.elasticity.loads import Value, solid_points
 from fastcontact.elasticity.material_axes import Axes
 from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.elasticity.materials import Constant
@@ -127,7 +127,7 @@ class ModelInitialStates(ModelLoads):
         from fastcontact.model.temperature_files import read_temperatures
 
         names = self._solid_groups(groups, ": it has no temperature")
-        values, times_of_file = read_temperatures(self.mesh, file, field, self._points_of_cells(names), instant)
+        values, times_of_file = read_temperatures(self.mesh, file, field, solid_points(self.mesh, names), instant)
         values = np.where(np.isfinite(values), values, reference)
         if len(values) == 1:
             if times is not None:

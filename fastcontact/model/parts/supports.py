@@ -13,7 +13,7 @@ import numpy as np
 
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.obstacles.rotation import Rotation
-from fastcontact.elasticity.loads import Value, axes_of, check_value, evaluated
+from fastcontact.elasticity.loads import Value, axes_of, check_points, check_value, evaluated
 from fastcontact.elasticity.material_axes import Axes, checked_axes, frames
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.elasticity.symmetry_axis import ON_AXIS, axis_nodes
@@ -131,9 +131,8 @@ class ModelSupports(ModelContact):
     def _along_axes(self, group: str, components: Mapping[str, Value], axes: SupportAxes, ramp: History) -> None:
         """Prescribe displacements along axes of the user's, by relations."""
         dim, name = self.mesh.dim, f"the support of '{group}'"
+        check_points(self.mesh, group, "no displacement can be prescribed on it")
         nodes = self.mesh.points_of(group).astype(np.intp)
-        if not len(nodes):
-            raise ModelError(f"group '{group}' is empty: no displacement can be prescribed on it")
         places = self.mesh.points[nodes]
         try:
             frame = frames(checked_axes(axes), places, self.kinematics)
@@ -158,8 +157,7 @@ class ModelSupports(ModelContact):
         self, group: str, components: Mapping[str, Value], ramp: History, rotation: Rotation | None = None,
         rotation_ramp: Table | None = None,
     ) -> None:  # fmt: skip
-        if not len(self.mesh.points_of(group)):
-            raise ModelError(f"group '{group}' is empty: no displacement can be prescribed on it")
+        check_points(self.mesh, group, "no displacement can be prescribed on it")
         for axis, value in axes_of(f"prescribe('{group}')", components, self.mesh.dim).items():
             table = table_of(ramp, f"the ramp of the displacement prescribed on '{group}'")
             support = Support(group, axis, value, table, rotation, rotation_ramp)
