@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any, Protocol
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.sparse import csr_array, diags_array, vstack
 
 from fastcontact.arrays import AnyArray, Array, Indices, Mask
@@ -293,32 +294,38 @@ def stacked(parts: Mapping[str, Constraints]) -> StackedConstraints:
     if len(pairs) == 1:
         values = {entry.name: getattr(pairs[0], entry.name) for entry in fields(Constraints)}
         return StackedConstraints(**values, parts=parts)
+    count = max(len(part.tangents) for part in pairs)
+    numbers, still = [np.zeros(len(part)) for part in pairs], [np.zeros((count, len(part))) for part in pairs]
     return StackedConstraints(
         csr_array(vstack([part.B for part in pairs], format="csr")),
         np.concatenate([part.gap0 for part in pairs]),
         np.vstack([part.positions for part in pairs]),
         _BlockDiagonal(pairs) if any(part.compliance is not None for part in pairs) else None,
-        _stacked_tangents(pairs),
+        tuple(
+            csr_array(vstack([p.tangents[j] if p.tangents else csr_array(p.B.shape) for p in pairs], format="csr"))
+            for j in range(count)
+        ),
         _stacked_directions(pairs),
-        np.concatenate([np.zeros(len(part)) if part.friction is None else part.friction for part in pairs]),
-        _stacked_slips([part.slip0 for part in pairs], pairs),
-        _stacked_vectors([part.equality for part in pairs], pairs, bool),
-        _stacked_vectors([part.softness for part in pairs], pairs, float),
-        _stacked_low_rank(pairs),
-        _stacked_vectors([part.tangential_softness for part in pairs], pairs, float),
-        _stacked_slips([part.elastic_slip for part in pairs], pairs),
+        np.concatenate([part.coefficients for part in pairs]),
+        _stacked_values([part.slip0 for part in pairs], still),
+        _stacked_values([part.equality for part in pairs], [zero > 0.0 for zero in numbers]),
+        _stacked_values([part.softness for part in pairs], numbers),
+        _stacked_low_rank(pairs, count),
+        _stacked_values([part.tangential_softness for part in pairs], numbers),
+        _stacked_values([part.elastic_slip for part in pairs], still),
         nodes=_stacked_nodes(pairs),
         coupled_directions=_stacked_directions(pairs, coupled=True),
         parts=parts,
     )
 
 
-def _stacked_vectors(vectors: Sequence[AnyArray | None], parts: list[Constraints], kind: type) -> Any:
-    """Return vectors (m,) of all parts as one, zero where a part has none; None where no part has one."""
-    if all(vector is None for vector in vectors):
+def _stacked_values(values: Sequence[Any], zeros: Sequence[AnyArray]) -> Any:
+    """Return values (..., m) of all parts side by side, `zeros` where a part has none; None where no part has any."""
+    if all(value is None for value in values):
         return None
-    zero: list[AnyArray] = [np.zeros(len(part), kind) for part in parts]
-    return np.concatenate([zeros if vector is None else vector for zeros, vector in zip(zero, vectors, strict=True)])
+    return np.concatenate(
+        [zero if value is None else value for value, zero in zip(values, zeros, strict=True)], axis=-1
+    )
 
 
 def _stacked_nodes(parts: list[Constraints]) -> Indices | None:
@@ -327,47 +334,24 @@ def _stacked_nodes(parts: list[Constraints]) -> Indices | None:
     return np.concatenate(nodes) if len(nodes) == len(parts) else None
 
 
-def _stacked_slips(slips: Sequence[Array | None], parts: list[Constraints]) -> Array | None:
-    """Return slips (k, m) of all parts as one, zero where a part has none; None where no part has any."""
-    count = max(len(part.tangents) for part in parts)
-    if all(slip is None for slip in slips):
-        return None
-    zero = [np.zeros((count, len(part))) for part in parts]
-    return np.hstack([zeros if slip is None else slip for zeros, slip in zip(zero, slips, strict=True)])
-
-
-def _stacked_tangents(parts: list[Constraints]) -> tuple[csr_array, ...]:
-    """Return the tangential rows of all parts, empty for parts without friction."""
-    count = max(len(part.tangents) for part in parts)
-    return tuple(
-        csr_array(vstack([p.tangents[j] if p.tangents else csr_array(p.B.shape) for p in parts], format="csr"))
-        for j in range(count)
-    )
-
-
 def _stacked_directions(parts: list[Constraints], coupled: bool = False) -> tuple[Array, ...]:
     """Return the tangents of all parts, zero where a part has none; those of compliances where they are `coupled`."""
-    found = [(part.coupled_directions if coupled else ()) or part.directions for part in parts]
+    directions = [(part.coupled_directions if coupled else ()) or part.directions for part in parts]
     return tuple(
-        np.vstack([own[j] if own else np.zeros_like(p.positions) for own, p in zip(found, parts, strict=True)])
-        for j in range(max(map(len, found)))
+        np.vstack(
+            [along[j] if along else np.zeros_like(p.positions) for along, p in zip(directions, parts, strict=True)]
+        )
+        for j in range(max(map(len, directions)))
     )
 
 
-def _stacked_low_rank(parts: list[Constraints]) -> Array | None:
-    """Return the compliances beside C side by side."""
+def _stacked_low_rank(parts: list[Constraints], count: int) -> Array | None:
+    """Return the compliances beside C side by side; `count` is the number of tangents."""
     if all(part.low_rank_compliance is None for part in parts):
         return None
-    count = 1 + max(len(part.tangents) for part in parts)
-    low_rank = [
-        np.zeros((count, len(part), 0)) if part.low_rank_compliance is None else part.low_rank_compliance
-        for part in parts
-    ]
-    total, first, last = np.zeros((count, sum(z.shape[1] for z in low_rank), sum(z.shape[2] for z in low_rank))), 0, 0
-    for z in low_rank:
-        total[:, first : first + z.shape[1], last : last + z.shape[2]] = z
-        first, last = first + z.shape[1], last + z.shape[2]
-    return total
+    none = [np.zeros((1 + count, len(part), 0)) for part in parts]
+    factors = [z if p.low_rank_compliance is None else p.low_rank_compliance for p, z in zip(parts, none, strict=True)]
+    return np.stack([block_diag(*component) for component in zip(*factors, strict=True)])
 
 
 class _Softened:

@@ -13,6 +13,7 @@ from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.contact.projection import CORNER
 from fastcontact.contact.search.closest import closest_of_kinds
 from fastcontact.mesh import elements
+from fastcontact.mesh.area_vectors import area_vectors
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import cells_of_outer_facets, outer_facets
 
@@ -62,7 +63,7 @@ class OuterFacets:
             shape, gradient, _ = elements.get(name).tables
             corners = self.mesh.points[facets]
             point.append((shape @ corners).reshape(-1, self.mesh.dim))
-            normal.append(_normals(gradient, corners).reshape(-1, self.mesh.dim))
+            normal.append(area_vectors(corners, gradient).reshape(-1, self.mesh.dim))
             owner.append(np.repeat(first + np.arange(len(facets)), len(shape)))
         normals = np.concatenate(normal)
         return np.concatenate(owner), np.concatenate(point), normals / np.linalg.norm(normals, axis=1, keepdims=True)
@@ -73,7 +74,7 @@ class OuterFacets:
         areas = [np.empty(0)]
         for name, facets in self.blocks.items():
             _, gradient, weights = elements.get(name).tables
-            areas.append(np.linalg.norm(_normals(gradient, self.mesh.points[facets]), axis=2) @ weights)
+            areas.append(np.linalg.norm(area_vectors(self.mesh.points[facets], gradient), axis=2) @ weights)
         return np.concatenate(areas)
 
     @cached_property
@@ -99,7 +100,7 @@ class OuterFacets:
         keys, facet, normal = [], [], []
         for (name, facets), first in zip(self.blocks.items(), self.first):
             element = elements.get(name)
-            at_nodes = _normals(element.gradient(element.nodes), self.mesh.points[facets])
+            at_nodes = area_vectors(self.mesh.points[facets], element.gradient(element.nodes))
             at_nodes /= np.linalg.norm(at_nodes, axis=2, keepdims=True)
             for ends in [(0, 0), (1, 1)] if self.mesh.dim == 2 else element.edges:
                 keys.append(np.sort(facets[:, ends], axis=1))
@@ -123,14 +124,6 @@ class OuterFacets:
             if len(inside):
                 blocks[name] = block[inside]
         return blocks
-
-
-def _normals(gradient: Array, corners: Array) -> Array:
-    """Return outward vectors (n, k, dim), as long as the facets with nodes (n, m, dim) are stretched, at k points."""
-    along = np.einsum("kmj,nmd->nkjd", gradient, corners)
-    if corners.shape[2] == 2:
-        return np.stack([along[:, :, 0, 1], -along[:, :, 0, 0]], axis=2)
-    return np.cross(along[:, :, 0], along[:, :, 1])
 
 
 @dataclass(frozen=True, eq=False)

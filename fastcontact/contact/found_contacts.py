@@ -184,13 +184,9 @@ def find_contacts(
     names = list(groups) if groups is not None else _names(mesh, body)
     pairs: list[FoundContact] = []
     sides: dict[str, Mapping[str, ArrayLike]] = {}
-    for pair in _pairs(outside, search, stiff):
-        title = f"{names[pair.bodies[0]]} on {names[pair.bodies[1]]}" + (f" {pair.number}" if pair.number else "")
-        groups_of = f"{title} (secondary)", f"{title} (primary)"
-        sides.update(zip(groups_of, map(outside.facets, pair.sides)))
-        both = names[pair.bodies[0]], names[pair.bodies[1]]
-        many = len(pair.sides[0]), len(pair.sides[1])
-        pairs.append(FoundContact(title, both, *groups_of, many, pair.spacing, pair.gap, pair.reason))
+    for pair, facets in _pairs(outside, search, stiff, names):
+        sides.update(zip((pair.secondary, pair.primary), map(outside.facets, facets)))
+        pairs.append(pair)
     return FoundContacts(mesh.with_facets(sides), tuple(pairs))
 
 
@@ -254,20 +250,13 @@ def _names(mesh: Mesh, body: Indices) -> list[str]:
     return names
 
 
-@dataclass(frozen=True)
-class _Pair:
-    """Two sides that face each other: bodies and facets of the secondary and the primary one; number 0 for a single pair."""
+def _pairs(
+    outside: OuterFacets, search: Facing, stiff: Array, names: Sequence[str]
+) -> Iterator[tuple[FoundContact, tuple[Indices, Indices]]]:
+    """Yield the pairs of smooth faces of two bodies each with the facets of both sides.
 
-    bodies: tuple[int, int]
-    sides: tuple[Indices, Indices]
-    number: int
-    spacing: tuple[float, float]
-    gap: tuple[float, float]
-    reason: str
-
-
-def _pairs(outside: OuterFacets, search: Facing, stiff: Array) -> Iterator[_Pair]:
-    """Yield the pairs of smooth faces of two bodies each, where `stiff` (n_cells,) is each cell's modulus [pressure]."""
+    `stiff` (n_cells,) is each cell's modulus [pressure], `names` are those of the bodies.
+    """
     of = np.sort(np.column_stack([outside.body[search.facet], outside.body[search.other]]), axis=1)
     for pair in np.unique(of, axis=0):
         rows = np.flatnonzero((of == pair).all(axis=1))
@@ -280,11 +269,13 @@ def _pairs(outside: OuterFacets, search: Facing, stiff: Array) -> Iterator[_Pair
         for number, one in enumerate(order := np.unique(face), start=1):
             mine = face == one
             gap, spacing = search.gap[rows[mine]], _spacing(outside, ends[mine])
-            yield _Pair(
-                (int(numbers[0]), int(numbers[1])), (np.unique(ends[mine, 0]), np.unique(ends[mine, 1])),
-                number if len(order) > 1 else 0, (float(spacing[0]), float(spacing[1])),
-                (float(gap.min()), float(gap.max())), reason,
-            )  # fmt: skip
+            sides = np.unique(ends[mine, 0]), np.unique(ends[mine, 1])
+            both = names[numbers[0]], names[numbers[1]]
+            title = " on ".join(both) + (f" {number}" if len(order) > 1 else "")
+            yield FoundContact(
+                title, both, f"{title} (secondary)", f"{title} (primary)", (len(sides[0]), len(sides[1])),
+                (float(spacing[0]), float(spacing[1])), (float(gap.min()), float(gap.max())), reason,
+            ), sides  # fmt: skip
 
 
 def _spacing(outside: OuterFacets, ends: Indices) -> Array:

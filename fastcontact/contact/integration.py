@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Numbers
 from fastcontact.contact.surface import Surface
+from fastcontact.linear.sparse_rows import Entries
 from fastcontact.mesh import elements, quadrature
+from fastcontact.mesh.area_vectors import area_vectors
 
 
 def facet_measure(facets: Numbers, element: str, points: Array, xi: Array, axisymmetric: bool) -> Array:
@@ -17,10 +19,7 @@ def facet_measure(facets: Numbers, element: str, points: Array, xi: Array, axisy
     """
     reference = elements.get(element)
     corners = points[facets]
-    tangent = np.einsum("qkj,fkd->fqdj", reference.gradient(xi), corners)
-    if reference.dim == 2:
-        return np.linalg.norm(np.cross(tangent[..., 0], tangent[..., 1]), axis=2)
-    measure = np.linalg.norm(tangent[..., 0], axis=2)
+    measure = np.linalg.norm(area_vectors(corners, reference.gradient(xi)), axis=2)
     if axisymmetric:
         measure = measure * (2 * np.pi * np.einsum("qk,fk->fq", reference.shape(xi), corners[:, :, 0]))
     return measure
@@ -57,18 +56,13 @@ def all_nodes_carry(element: str) -> bool:
 
 def mass_matrix(surface: Surface, points: Array, axisymmetric: bool) -> csr_array:
     """Return the surface mass matrix (m, m) in the order of ``surface.points`` [area]."""
-    rows, columns, values = [], [], []
+    entries = Entries()
     for block in surface.blocks:
         xi, weights = fine_rule(block.element)
         N = elements.get(block.element).shape(xi)
         dA = facet_measure(block.facets, block.element, points, xi, axisymmetric) * weights
-        local = np.einsum("fq,qa,qb->fab", dA, N, N)
-        rows.append(np.broadcast_to(block.local[:, :, None], local.shape).ravel())
-        columns.append(np.broadcast_to(block.local[:, None, :], local.shape).ravel())
-        values.append(local.ravel())
-    positions = np.concatenate(rows), np.concatenate(columns)
-    size = len(surface.points)
-    return coo_array((np.concatenate(values), positions), shape=(size, size)).tocsr()
+        entries.add(block.local, block.local, np.einsum("fq,qa,qb->fab", dA, N, N))
+    return entries.matrix((len(surface.points), len(surface.points)))
 
 
 def nodal_areas(surface: Surface, points: Array, axisymmetric: bool) -> Array:

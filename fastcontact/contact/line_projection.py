@@ -7,7 +7,7 @@ import numpy as np
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact import line_projection_kernels
 from fastcontact.contact.search.closest import Closest
-from fastcontact.contact.surface import Surface
+from fastcontact.contact.surface import Surface, line_neighbours
 
 
 def along_line_normals(
@@ -25,7 +25,7 @@ def along_line_normals(
         first = rows.stop
     facet, xi, overhang = start.facet.astype(np.intp), start.xi[:, 0].copy(), start.overhang.copy()
     work = np.empty(3), np.empty(3)
-    neighbour = np.where(smooth_ends(side, normals), _neighbours(ends, len(side.points)), -1)
+    neighbour = np.where(smooth_ends(side, normals), line_neighbours(ends), -1)
     line_projection_kernels.along_normals(
         np.ascontiguousarray(points), corners, at_nodes, counts, neighbour, facet, xi, overhang, *work
     )
@@ -42,10 +42,3 @@ def smooth_ends(side: Surface, normals: Array) -> Mask:
     total = np.zeros((len(side.points), 2))
     np.add.at(total, ends, normals[:, :2])
     return np.asarray(side.inner_ends & (np.linalg.norm(total, axis=1)[ends] > 2.0 - 1e-6))
-
-
-def _neighbours(ends: Indices, n_points: int) -> Indices:
-    """Return the facets (n_facets, 2) beyond both ends; facets are oriented alike, so ends meet beginnings."""
-    begins, finishes = np.full(n_points, -1, np.intp), np.full(n_points, -1, np.intp)
-    begins[ends[:, 0]] = finishes[ends[:, 1]] = np.arange(len(ends))
-    return np.column_stack([finishes[ends[:, 0]], begins[ends[:, 1]]])

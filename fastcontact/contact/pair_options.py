@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array, csr_array, diags_array, eye_array
+from scipy.sparse import csr_array, diags_array, eye_array
 
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.cohesion import CohesiveLaw
@@ -172,11 +172,7 @@ def spread(side: Surface, excluded: Mask, givers: Indices) -> csr_array:
     m = len(side.points)
     if not excluded.any():
         return csr_array(eye_array(m, format="csr"))
-    rows = [np.repeat(block.local, block.local.shape[1], axis=1).ravel() for block in side.blocks]
-    columns = [np.tile(block.local, block.local.shape[1]).ravel() for block in side.blocks]
-    row, column = np.concatenate(rows), np.concatenate(columns)
-    near = excluded[row] & np.isin(column, givers) & ~excluded[column]
-    beside = csr_array(coo_array((np.ones(near.sum()), (row[near], column[near])), shape=(m, m)))
-    beside.data[:] = 1.0  # a neighbour on two facets counts once
+    gives = np.isin(np.arange(m), givers) & ~excluded
+    beside = diags_array(excluded.astype(float)) @ side.beside @ diags_array(gives.astype(float))
     count = np.maximum(np.asarray(beside.sum(axis=1)).ravel(), 1.0)
     return csr_array(diags_array((~excluded).astype(float)) + diags_array(1.0 / count) @ beside)

@@ -19,6 +19,7 @@ from fastcontact.contact.search.closest import Closest
 from fastcontact.contact.search.facet_tables import tables
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.mesh import elements
+from fastcontact.mesh.area_vectors import area_vectors
 
 # What the projection of a point takes, in nodes of a cell: see `portions`.
 EFFORT = 16
@@ -80,7 +81,9 @@ def nodal_normals(side: Surface, coordinates: Array) -> Array:
     The angles make it depend on the surface alone, not on how it is cut into facets (Thuermer and Wuethrich, 1998).
     """
     normals = [facet_normals(block, coordinates) for block in side.blocks]
-    return _nodal_means(side, normals, [_angles(block, coordinates) for block in side.blocks])
+    return _nodal_means(
+        side, normals, [facet_angles(elements.get(block.element), coordinates[block.facets]) for block in side.blocks]
+    )
 
 
 def _nodal_means(side: Surface, values: Sequence[Array], angles: Sequence[Array]) -> Array:
@@ -100,7 +103,7 @@ def smooth_normals(side: Surface, coordinates: Array) -> list[Array]:
     punch is flat up to its corner, also where its flanks belong to the surface.
     """
     facet_normals_of_blocks = [facet_normals(block, coordinates) for block in side.blocks]
-    angles = [_angles(block, coordinates) for block in side.blocks]
+    angles = [facet_angles(elements.get(block.element), coordinates[block.facets]) for block in side.blocks]
     means = _nodal_means(side, facet_normals_of_blocks, angles)
     smooth = [means[block.local] for block in side.blocks]
     # A node is at a corner where a facet leans from the mean by more than half the angle between two that form one.
@@ -142,20 +145,18 @@ def facet_normals(block: FacetBlock, coordinates: Array) -> Array:
         out = np.empty(nodes.shape)
         shared(lambda part: projection_kernels.normals(nodes, slopes, *part, out), portions(*block.facets.shape))
         return out
-    tangent = np.einsum("akj,fkd->fadj", slopes, nodes)
-    normal = np.stack([tangent[..., 1, 0], -tangent[..., 0, 0]], axis=2)
+    normal = area_vectors(nodes, slopes)
     return normal / np.linalg.norm(normal, axis=2, keepdims=True)
 
 
-def _angles(block: FacetBlock, coordinates: Array) -> Array:
-    """Return the angles of facets at their corners (n_facets, n_nodes); 1 at other nodes, and on lines."""
-    element = elements.get(block.element)
+def facet_angles(element: elements.Element, nodes: Array) -> Array:
+    """Return the angles (n, k) of facets with nodes (n, k, dim) at their corners; 1 at other nodes, and on lines."""
     if element.dim == 1:
-        return np.ones(block.facets.shape)
-    nodes, angle, n = coordinates[block.facets], np.empty(block.facets.shape), element.n_corners
+        return np.ones(nodes.shape[:2])
+    angle, n = np.empty(nodes.shape[:2]), element.n_corners
     around = np.arange(n)  # edges run from each corner to the next
     beside = np.column_stack([(around + 1) % n, (around - 1) % n])
-    shared(lambda part: projection_kernels.angles(nodes, beside, *part, angle), portions(*block.facets.shape))
+    shared(lambda part: projection_kernels.angles(nodes, beside, *part, angle), portions(*angle.shape))
     return angle
 
 

@@ -9,6 +9,7 @@ from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements
+from fastcontact.mesh.area_vectors import flat_area_vectors
 from fastcontact.mesh.mesh import Mesh
 
 # Facets of each kind that are looked at.
@@ -79,20 +80,8 @@ def _facet_frames(mesh: Mesh, side: Surface) -> tuple[Array, Array, Array]:
     for block in side.blocks:
         some = block.facets[:: max(1, len(block.facets) // SAMPLE), : elements.get(block.element).n_corners]
         corners = mesh.points[some]
-        normal = _right_of(corners) if mesh.dim == 2 else _vector_area(corners)
+        normal = flat_area_vectors(corners)
         centres.append(corners.mean(axis=1))
         normals.append(normal / np.linalg.norm(normal, axis=1, keepdims=True))
         sizes.append(np.linalg.norm(normal, axis=1) ** (1 / (mesh.dim - 1)))
     return np.concatenate(centres), np.concatenate(normals), np.concatenate(sizes)
-
-
-def _right_of(ends: Array) -> Array:
-    """Return the vectors (n, 2) to the right of lines (n, 2, 2), as long as they."""
-    along = ends[:, 1] - ends[:, 0]
-    return np.column_stack([along[:, 1], -along[:, 0]])
-
-
-def _vector_area(corners: Array) -> Array:
-    """Return the vector areas (n, 3) of polygons (n, n_corners, 3)."""
-    spokes = corners[:, 1:] - corners[:, :1]
-    return 0.5 * np.cross(spokes[:, :-1], spokes[:, 1:]).sum(axis=1)

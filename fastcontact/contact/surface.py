@@ -13,7 +13,7 @@ from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.errors import ContactError, MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.mesh.topology import ordered_line, outer_facets
+from fastcontact.mesh.topology import ordered_line, outer_facets, same_facets
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,6 +154,13 @@ class Surface:
         return [coordinates[block.facets] for block in self.blocks]
 
 
+def line_neighbours(local: Indices) -> Indices:
+    """Return the lines (n, 2) before and behind each one, of nodes (n, k), -1 for none: lines are oriented alike."""
+    begins, ends = np.full((2, int(local.max()) + 1), -1, np.intp)
+    begins[local[:, 0]] = ends[local[:, 1]] = np.arange(len(local))
+    return np.column_stack([ends[local[:, 0]], begins[local[:, 1]]])
+
+
 def surface(mesh: Mesh, group: str) -> Surface:
     """Return the facets of `group` oriented from the solid behind them, as ORIE_PEAU of code_aster does.
 
@@ -181,13 +188,9 @@ def surface(mesh: Mesh, group: str) -> Surface:
 def _outward(mesh: Mesh, group: str, name: str, block: Numbers, outer: Mapping[str, Numbers]) -> Numbers:
     """Return the facets `outer` of the solids that match `block`, with the solid's orientation."""
     candidates = outer.get(name, np.empty((0, elements.get(name).n_nodes), np.int32))
-    near = np.zeros(mesh.n_points, bool)
-    near[block] = True
-    candidates = candidates[near[candidates].all(axis=1)]
-    keys = {tuple(sorted(facet)): row for row, facet in enumerate(candidates.tolist())}
-    rows = [keys.get(tuple(sorted(facet)), -1) for facet in block.tolist()]
-    missing = [i for i, row in enumerate(rows) if row < 0]
-    if missing:
+    rows = same_facets(candidates, block)
+    missing = np.flatnonzero(rows < 0)
+    if len(missing):
         where = mesh.points[block[missing[0]]].mean(axis=0)
         raise ContactError(
             f"{len(missing)} of {len(block)} facets of '{group}' do not lie on the outside of a solid "

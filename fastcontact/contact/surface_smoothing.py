@@ -27,6 +27,7 @@ from fastcontact.contact.projection import CORNER
 from fastcontact.contact.search.closest import closest_of_kinds
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.mesh import elements
+from fastcontact.mesh.area_vectors import flat_area_vectors
 
 # Heights below this part of the size of a facet, and curvatures below this part of its inverse, are rounding errors.
 FLAT = 1e-10
@@ -124,12 +125,7 @@ def frames(side: Surface, points: Array, coordinates: Array) -> Array:
 def _normals(block: FacetBlock, coordinates: Array) -> Array:
     """Return the unit normals (n_facets, dim) of the planes through the corners of facets."""
     corners = coordinates[block.facets[:, : elements.get(block.element).n_corners]]
-    first = corners[:, 1] - corners[:, 0]
-    if coordinates.shape[1] == 2:
-        normal = first[:, ::-1] * [1.0, -1.0]
-    else:
-        normal = np.cross(first, corners[:, 2] - corners[:, 0])
-        normal += np.cross(corners[:, 2] - corners[:, 0], corners[:, -1] - corners[:, 0])  # of quadrangles
+    normal = flat_area_vectors(corners)
     return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
 
 

@@ -22,9 +22,10 @@ from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.elasticity.symmetry_axis import axis_nodes
 from fastcontact.errors import ModelError, unknown
 from fastcontact.mesh import elements, quadrature
+from fastcontact.mesh.area_vectors import area_vectors
 from fastcontact.mesh.argument_types import values_at
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.mesh.topology import outer_facets
+from fastcontact.mesh.topology import outer_facets, same_facets
 
 Table = tuple[tuple[float, float], ...]
 Value = float | Callable[[Array], Array]
@@ -294,17 +295,15 @@ def outward(mesh: Mesh, group: str, element: str, block: Numbers) -> Numbers:
     ModelError if a facet does not lie on the outside of a solid.
     """
     outer = outer_facets(mesh).get(element, np.empty((0, block.shape[1]), np.int32))
-    keys = np.sort(np.vstack([outer, block]), axis=1)
-    _, first, index = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-    match = first[index.ravel()[len(outer) :]]
-    missing = np.flatnonzero(match >= len(outer))
+    rows = same_facets(outer, block)
+    missing = np.flatnonzero(rows < 0)
     if len(missing):
         where = mesh.points[block[missing[0]]].mean(axis=0)
         raise ModelError(
             f"{len(missing)} of {len(block)} facets of '{group}' do not lie on the outside of a solid (first near "
             f"{where}), so a pressure has no side to act from: use add_traction there"
         )
-    return np.ascontiguousarray(outer[match])
+    return np.ascontiguousarray(outer[rows])
 
 
 def evaluated(value: Value, points: Array, name: str) -> Array:
@@ -358,14 +357,12 @@ def axes_of(caption: str, components: Mapping[str, Any], dim: int) -> dict[int, 
     return {"xyz".index(name): value for name, value in given.items()}
 
 
-def _mapped(mesh: Mesh, element: str, cells: Numbers) -> tuple[Array, Array, Array, Array]:
-    """Return positions (c, q, dim), shape values (q, n), Jacobians (c, q, dim, cell dim) and weights (q,)."""
+def _places(mesh: Mesh, element: str, cells: Numbers) -> tuple[Array, Array, Array, Array]:
+    """Return positions (c, q, dim), shape values (q, n), their derivatives (q, n, cell dim) and weights (q,)."""
     reference = elements.get(element)
     xi, weights = quadrature.product_rule(reference.linear, _POINTS, _STRAIGHT)
-    N, dN = reference.shape(xi), reference.gradient(xi)
-    corners = mesh.points[cells]
-    x = np.einsum("qn,cnd->cqd", N, corners)
-    return x, N, np.einsum("qnk,cnd->cqdk", dN, corners), weights
+    N = reference.shape(xi)
+    return np.einsum("qn,cnd->cqd", N, mesh.points[cells]), N, reference.gradient(xi), weights
 
 
 def cell_points(mesh: Mesh, element: str, cells: Numbers, kinematics: str) -> tuple[Array, Array, Array]:
@@ -373,7 +370,8 @@ def cell_points(mesh: Mesh, element: str, cells: Numbers, kinematics: str) -> tu
 
     At the quadrature points of `cells` (c, n) of int of an element; in axisymmetry over the full circle.
     """
-    x, N, J, weights = _mapped(mesh, element, cells)
+    x, N, dN, weights = _places(mesh, element, cells)
+    J = np.einsum("qnk,cnd->cqdk", dN, mesh.points[cells])
     return x, N, _turned(np.linalg.det(J) * weights, x, kinematics)
 
 
@@ -382,11 +380,8 @@ def facet_points(mesh: Mesh, element: str, facets: Numbers, kinematics: str) -> 
 
     At the quadrature points of `facets` (f, n) of int of an element; in axisymmetry over the full circle.
     """
-    x, N, J, weights = _mapped(mesh, element, facets)
-    if mesh.dim == 2:
-        normal = np.stack([J[:, :, 1, 0], -J[:, :, 0, 0]], axis=2)
-    else:
-        normal = np.cross(J[:, :, :, 0], J[:, :, :, 1])
+    x, N, dN, weights = _places(mesh, element, facets)
+    normal = area_vectors(mesh.points[facets], dN)
     return x, N, _turned(normal * weights[:, None], x, kinematics)
 
 

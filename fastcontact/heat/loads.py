@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array
 from fastcontact.elasticity.loads import (
@@ -26,6 +26,7 @@ from fastcontact.elasticity.loads import (
     facets_of,
 )
 from fastcontact.errors import ModelError
+from fastcontact.linear.sparse_rows import Entries
 from fastcontact.mesh.mesh import Mesh
 
 
@@ -130,7 +131,7 @@ class Film(Load):
         The latter at multiplier 1 [power]; `reference` is the temperature that rises count from [temperature]. ModelError if
         a coefficient is negative.
         """
-        rows, columns, values, powers = [], [], [], np.zeros((mesh.n_points, 1))
+        entries, powers = Entries(), np.zeros((mesh.n_points, 1))
         for element, facets in facets_of(mesh, self.group).items():
             x, N, normal = facet_points(mesh, element, facets, kinematics)
             h = evaluated(self.coefficient, x, f"the coefficient of {self.name}")
@@ -139,9 +140,5 @@ class Film(Load):
             h *= np.linalg.norm(normal, axis=2)
             rise = evaluated(self.ambient, x, f"the ambient temperature of {self.name}") - reference
             add_density(powers, facets, N, (h * rise)[:, :, None])
-            local = np.einsum("fq,qa,qb->fab", h, N, N)
-            rows.append(np.broadcast_to(facets[:, :, None], local.shape).ravel())
-            columns.append(np.broadcast_to(facets[:, None, :], local.shape).ravel())
-            values.append(local.ravel())
-        positions = np.concatenate(rows), np.concatenate(columns)
-        return csr_array(coo_array((np.concatenate(values), positions), shape=(mesh.n_points,) * 2)), powers[:, 0]
+            entries.add(facets, facets, np.einsum("fq,qa,qb->fab", h, N, N))
+        return entries.matrix((mesh.n_points, mesh.n_points)), powers[:, 0]

@@ -1,12 +1,47 @@
-"""Rows of sparse matrices: from nodal values, scaled, and selected, without matrix products."""
+"""Sparse matrices from cells or nodal values; their rows scaled and selected without matrix products."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import coo_array, csr_array
 
-from fastcontact.arrays import AnyArray, Array, Indices
+from fastcontact.arrays import AnyArray, Array, Indices, Numbers
+
+
+class Entries:
+    """Entries of a sparse matrix, collected cell by cell."""
+
+    def __init__(self) -> None:
+        self._rows: list[Numbers] = []
+        self._columns: list[Numbers] = []
+        self._values: list[Array] = []
+
+    def add(self, rows: NDArray[np.integer], columns: NDArray[np.integer], values: Array) -> None:
+        """Add blocks (n, k, l) at rows (n, k) and columns (n, l); zeros are left out."""
+        kept = np.flatnonzero(values)
+        self._rows.append(np.broadcast_to(rows[:, :, None].astype(np.int32), values.shape).ravel()[kept])
+        self._columns.append(np.broadcast_to(columns[:, None, :].astype(np.int32), values.shape).ravel()[kept])
+        self._values.append(values.ravel()[kept])
+
+    def matrix(self, size: tuple[int, int]) -> csr_array:
+        """Return the sum of all entries."""
+        if not self._rows:
+            return csr_array(size)
+        positions = np.concatenate(self._rows), np.concatenate(self._columns)
+        return csr_array(coo_array((np.concatenate(self._values), positions), shape=size))
+
+
+def rows_of(mean: csr_array, direction: Array) -> csr_array:
+    """Return rows (m, n_dofs): the relative motion (m, n_points) of nodes along their directions (m, dim)."""
+    dim = direction.shape[1]
+    row = np.repeat(np.arange(mean.shape[0]), np.diff(mean.indptr))
+    values = mean.data[:, None] * direction[row]
+    columns = mean.indices[:, None] * dim + np.arange(dim)
+    size = (mean.shape[0], mean.shape[1] * dim)
+    rows = csr_array((values.ravel(), columns.ravel(), mean.indptr * dim), shape=size)
+    rows.eliminate_zeros()
+    return rows
 
 
 def nodal_rows(nodes: NDArray[np.integer], values: Array, n_dofs: int) -> csr_array:

@@ -291,3 +291,12 @@ def _plural(phrase: str) -> str:
         part.removeprefix("a ").removeprefix("an ") + "s" * part.startswith(("a ", "an "))
         for part in phrase.split(" or ")
     )
+
+
+def finite_vector(values: Any, size: int) -> np.ndarray[Any, np.dtype[np.float64]] | None:
+    """Return `size` finite numbers as an array; None if they are none."""
+    try:
+        vector = np.asarray(values, float)
+    except (TypeError, ValueError):
+        return None
+    return vector if vector.shape == (size,) and np.isfinite(vector).all() else None

@@ -182,6 +182,14 @@ def _facets(mesh: Mesh) -> tuple[Mapping[str, Numbers], Numbers, Mapping[str, Nu
     return MappingProxyType(kept), parent, MappingProxyType(behind)
 
 
+def same_facets(among: Numbers, facets: Numbers) -> Indices:
+    """Return for each of `facets` (n, k) the row (n,) of the one `among` others (m, k) with the same nodes, -1 for none."""
+    near = np.flatnonzero(np.isin(among, facets).all(axis=1))
+    keys = np.sort(np.vstack([among[near], facets]), axis=1)
+    _, first, index = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    return np.append(near, -1)[np.minimum(first[index.ravel()[len(near) :]], len(near))]
+
+
 @dataclass(frozen=True, eq=False)
 class OrderedLine:
     """Nodes of a line of facets in order, with the length along it.

@@ -11,29 +11,12 @@ from fastcontact.elasticity.loads import Value
 from fastcontact.model.ramp import History
 
 
-class ContactOptions(TypedDict, total=False):
-    """What `add_contact` takes beside the sides: of every formulation first, then fields of single formulations."""
+class FormulationOptions(TypedDict, total=False):
+    """Fields of formulations: of every one first, then of single ones."""
 
     friction: float | None
-    kind: str | None
-    clearance: Value | None
-    clearance_primary: Value | None
-    clearance_ramp: History
-    friction_ramp: History
     surface_smoothing: bool | None
-    excluded: str | Sequence[str] | None
-    frictionless: str | Sequence[str] | None
-    frictionless_along: ArrayLike | None
-    penalty: float | Sequence[tuple[float, float]] | None
-    tangential_penalty: Value | None
-    cohesion: Mapping[str, float | str] | None
-    adhesion: Mapping[str, float] | None
     slip: str | None
-    wear: float | None
-    conductance: Any
-    friction_heat: float | None
-    obstacle_temperature: float | None
-    search_distance: float | None
     normals: str | ArrayLike | None
     projection_tolerance: float | None
     opposite: str | None
@@ -41,3 +24,32 @@ class ContactOptions(TypedDict, total=False):
     augmentation: float | None
     integration: str | None
     n_gauss: int | None
+
+
+class SharedOptions(TypedDict, total=False):
+    """What every contact pair takes, whatever its formulation."""
+
+    kind: str | None
+    clearance: Value | None
+    clearance_primary: Value | None
+    clearance_ramp: History
+    friction_ramp: History
+    excluded: str | Sequence[str] | None
+    frictionless: str | Sequence[str] | None
+    frictionless_along: ArrayLike | None
+    penalty: float | Sequence[tuple[float, float]] | None
+    tangential_penalty: Value | None
+    cohesion: Mapping[str, float | str] | None
+    adhesion: Mapping[str, float] | None
+    wear: float | None
+    conductance: Any
+    friction_heat: float | None
+    obstacle_temperature: float | None
+    search_distance: float | None
+
+
+class ContactOptions(FormulationOptions, SharedOptions, total=False):
+    """What `add_contact` takes beside the sides."""
+
+
+SHARED_OPTIONS = tuple(sorted(SharedOptions.__annotations__))

@@ -14,6 +14,7 @@ from scipy.sparse import csr_array
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.contact.search.box_tree_kernels import build, tree_order
 from fastcontact.mesh import elements
+from fastcontact.mesh.area_vectors import flat_area_vectors
 from fastcontact.mesh.elements import Element
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import bodies, outer_facets
@@ -94,8 +95,8 @@ def hanging_nodes(mesh: Mesh) -> tuple[Indices, Indices, OuterFacets]:
     outward /= np.where(length > 0.0, length, 1.0)[:, None]
     reach = ON_ARC * outer.size + outer.rise
     order = tree_order(outer.centre, TOGETHER)
-    low, high = _extent(mesh.points[outer.corners[order]])
-    tree = build(low - reach[order, None], high + reach[order, None])
+    x = mesh.points[outer.corners[order]]
+    tree = build(x.min(axis=1) - reach[order, None], x.max(axis=1) + reach[order, None])
     nodes = np.flatnonzero(length > 0.0)
     facets = np.full((len(nodes), MOST), -1)
     hanging_nodes_kernels.facing_facets(
@@ -193,13 +194,12 @@ def _outer(mesh: Mesh) -> OuterFacets:
         rises.append(_rise(element, mesh.points[block]))
     corner = np.concatenate(corners)
     x = mesh.points[corner]
-    normal = _normals(x)
+    normal = flat_area_vectors(x)
     length = np.linalg.norm(normal, axis=1)
     normal /= np.where(length > 0.0, length, 1.0)[:, None]
     centre = 0.5 * (x[:, 0] + x[:, 1]) if mesh.dim == 2 else _middles(x)
-    low, high = _extent(x)
     return OuterFacets(
-        np.concatenate(nodes), corner, centre, normal, np.concatenate(rises), np.linalg.norm(high - low, axis=1),
+        np.concatenate(nodes), corner, centre, normal, np.concatenate(rises), np.linalg.norm(np.ptp(x, axis=1), axis=1),
         tuple(facets), np.repeat(np.arange(len(facets)), [len(block) for block in facets.values()]),
     )  # fmt: skip
 
@@ -210,22 +210,6 @@ def _rise(element: Element, x: Array) -> Array:
         return np.zeros(len(x))
     straight = elements.get(element.linear).shape(element.nodes) @ x[:, : element.n_corners]
     return np.asarray(np.linalg.norm(x - straight, axis=2).max(axis=1))
-
-
-def _extent(x: Array) -> tuple[Array, Array]:
-    """Return the lowest and highest coordinates (n, dim) of facets (n, n_corners, dim)."""
-    low = high = x[:, 0]
-    for k in range(1, x.shape[1]):
-        low, high = np.minimum(low, x[:, k]), np.maximum(high, x[:, k])
-    return low, high
-
-
-def _normals(x: Array) -> Array:
-    """Return normals (n, dim), of any length, of lines (n, 2, 2) and faces (n, 4, 3)."""
-    if x.shape[2] == 2:
-        along = x[:, 1] - x[:, 0]
-        return np.column_stack([along[:, 1], -along[:, 0]])
-    return np.asarray(np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1]) + np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]))
 
 
 def _middles(x: Array) -> Array:

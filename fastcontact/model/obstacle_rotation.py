@@ -6,11 +6,10 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from fastcontact.contact.obstacles.rotation import Rotation
 from fastcontact.elasticity.loads import check_number
 from fastcontact.errors import ModelError, unknown
+from fastcontact.mesh.argument_types import finite_vector
 from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.ramp import Ramp, Table, multiplier, table_of
 
@@ -47,11 +46,8 @@ def rotation_of(caption: str, given: Mapping[str, Any], kinematics: str) -> tupl
 
 
 def _vector(name: str, values: Sequence[float], size: int) -> tuple[float, ...]:
-    try:
-        vector = np.asarray(values, float)
-    except (TypeError, ValueError):
-        vector = np.empty(0)
-    if vector.shape != (size,) or not np.isfinite(vector).all():
+    vector = finite_vector(values, size)
+    if vector is None:
         raise ModelError(f"{name} must be {size} finite numbers, not {values!r}")
     return tuple(vector.tolist())
 

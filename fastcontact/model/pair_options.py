@@ -16,15 +16,9 @@ from fastcontact.contact.pair_options import KINDS, Field, PairOptions
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity.loads import check_number, check_value, evaluated
 from fastcontact.errors import ContactError, unknown
+from fastcontact.mesh.argument_types import finite_vector
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.ramp import Table, table_of
-
-# Options that every contact pair takes, beside those of its formulation.
-SHARED_OPTIONS = (
-    "adhesion", "clearance", "clearance_primary", "clearance_ramp", "cohesion", "conductance", "excluded", "friction_heat",
-    "friction_ramp", "frictionless", "frictionless_along", "kind", "obstacle_temperature", "penalty", "search_distance",
-    "tangential_penalty", "wear",
-)  # fmt: skip
 
 
 def pair_options(
@@ -185,11 +179,8 @@ def _vector(name: str, option: str, options: Mapping[str, Any], dim: int) -> Arr
     value = options.get(option)
     if value is None:
         return None
-    try:
-        vector = np.asarray(value, float)
-    except (TypeError, ValueError):
-        vector = np.empty(0)
-    if vector.shape != (dim,) or not np.isfinite(vector).all() or not vector.any():
+    vector = finite_vector(value, dim)
+    if vector is None or not vector.any():
         raise ContactError(f"{option} = {value!r} of contact '{name}' must be a vector of {dim} numbers, not all zero")
     return vector
 

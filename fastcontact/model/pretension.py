@@ -13,9 +13,11 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.loads import Load, Table, check_number
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.errors import ModelError
+from fastcontact.mesh.argument_types import finite_vector
 from fastcontact.mesh.companion_groups import OPPOSITE
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.relation_rows import along, less_first, matched, normals_of
+from fastcontact.round_off import ROUND_OFF
 
 # How far nodes of a section may lie off its plane, relative to its size.
 FLAT = 1e-6
@@ -189,17 +191,16 @@ def _sides(mesh: Mesh, name: str, section: str, opposite: str | None) -> tuple[I
 def _normal(mesh: Mesh, name: str, nodes: Indices, normal: Sequence[float] | None) -> Array:
     """Return the unit normal (dim,) of a section, of its plane where none is given."""
     if normal is not None:
-        vector = np.asarray(normal, float)
-        length = np.linalg.norm(vector)
-        if vector.shape != (mesh.dim,) or not (np.isfinite(length) and length > 0):
+        vector = finite_vector(normal, mesh.dim)
+        if vector is None or not vector.any():
             raise ModelError(f"the normal {normal} of {name} must be {mesh.dim} numbers, not all zero")
-        return np.asarray(vector / length)
+        return np.asarray(vector / np.linalg.norm(vector))
     places = mesh.points[nodes] - mesh.points[nodes].mean(axis=0)
     spread, axes = np.linalg.svd(places, full_matrices=True)[1:]
     if len(nodes) < mesh.dim or (len(spread) >= mesh.dim and spread[-1] > FLAT * spread[0]):
         raise ModelError(f"the nodes of {name} determine no plane: give its normal, along the bolt")
-    found = axes[-1] * np.sign(axes[-1][np.argmax(np.abs(axes[-1]))])
-    return np.asarray(np.where(np.abs(found) < 1e-12, 0.0, found))
+    across = axes[-1] * np.sign(axes[-1][np.argmax(np.abs(axes[-1]))])
+    return np.asarray(np.where(np.abs(across) < ROUND_OFF, 0.0, across))
 
 
 def _outwards(mesh: Mesh, name: str, section: str, direction: Array) -> Array:

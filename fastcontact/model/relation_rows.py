@@ -13,6 +13,7 @@ from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.elasticity.loads import facets_of, outward
 from fastcontact.errors import ModelError
 from fastcontact.linear.sparse_rows import nodal_rows
+from fastcontact.mesh.argument_types import finite_vector
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.round_off import ROUND_OFF
 
@@ -80,9 +81,10 @@ def matched(
     low, high = ours.min(axis=0), ours.max(axis=0)
     shift = 0.5 * (theirs.min(axis=0) + theirs.max(axis=0) - low - high)
     if translation is not None:
-        shift = np.asarray(translation, float)
-        if shift.shape != (mesh.dim,) or not np.isfinite(shift).all():
+        given = finite_vector(translation, mesh.dim)
+        if given is None:
             raise ModelError(f"the translation {translation} of '{name}' must be {mesh.dim} numbers")
+        shift = given
     distance, match = cKDTree(theirs).query(ours + shift)
     size = max(float(np.ptp(ours, axis=0).max()), 1e-3 * float(np.ptp(mesh.points, axis=0).max()))
     far = int(np.argmax(distance))

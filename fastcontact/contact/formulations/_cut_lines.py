@@ -16,7 +16,7 @@ from fastcontact.contact.formulations._overlap import Coupling, Overlap
 from fastcontact.contact.pairing import Candidates, pair
 from fastcontact.contact.projection import CORNER, facet_normals, nodal_normals
 from fastcontact.contact.search.closest import closest
-from fastcontact.contact.surface import FacetBlock, Surface
+from fastcontact.contact.surface import FacetBlock, Surface, line_neighbours
 from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.mesh import elements, quadrature
 
@@ -106,7 +106,7 @@ def _opposite_nodes(block: FacetBlock, primary: Surface, deformed: Array, normal
     smooth = inner & ~_corners(primary, deformed, normals)[ends]
     inside = np.flatnonzero((opposite.overhang == 0.0) & (np.abs(along) < 1.0 - SLIVER) & ~smooth)
     rows = np.flatnonzero(inner)
-    beside = np.column_stack([opposite.facet[rows], _neighbours(block)[opposite.facet[rows]]])
+    beside = np.column_stack([opposite.facet[rows], line_neighbours(block.local)[opposite.facet[rows]]])
     crossed = _across(deformed[block.facets[beside]], foot[rows][:, None], normal[rows][:, None])
     crossed[beside < 0] = 1.0
     row, xi = _zeros(crossed.reshape(-1, block.facets.shape[1]))
@@ -126,14 +126,6 @@ def _across(points: Array, foot: Array, normal: Array) -> Array:
     """Return how far `points` (..., k, 2) lie beside the lines through `foot` along `normal` (..., 2) [length]."""
     away = points - foot[..., None, :]
     return np.asarray(away[..., 0] * normal[..., None, 1] - away[..., 1] * normal[..., None, 0])
-
-
-def _neighbours(block: FacetBlock) -> Indices:
-    """Return the facets (n, 2) before and behind each facet of a block, -1 where there is none."""
-    size = int(block.local.max()) + 1
-    begins, ends = np.full(size, -1), np.full(size, -1)
-    begins[block.local[:, 0]] = ends[block.local[:, 1]] = np.arange(len(block.local))
-    return np.column_stack([ends[block.local[:, 0]], begins[block.local[:, 1]]])
 
 
 def _opposite_ends(

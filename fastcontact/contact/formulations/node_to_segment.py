@@ -21,8 +21,8 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints, NodalField
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.integration import all_nodes_carry, mass_matrix, nodal_areas
-from fastcontact.contact.node_pairing import at_nodes
 from fastcontact.contact.pairing import Candidates, Pairing
+from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError, unknown
 
@@ -69,10 +69,17 @@ class NodeToSegment(Formulation):
         pairing = super().facing(candidates, at, tolerance)
         if self.opposite == "facet":
             return pairing
+        from scipy.spatial import cKDTree
+
         assert isinstance(self.primary, Surface)
-        assert self.normals is not None
-        snapped = at_nodes(pairing, candidates, self.primary, self.points + at.displacement, self.normals)
-        return replace(snapped, beyond=None)
+        deformed, nodes = self.points + at.displacement, Candidates.nodes_of(self.primary)
+        nearest = cKDTree(deformed[self.primary.points]).query(candidates.positions(deformed))[1]
+        normal = pairing.normal
+        if self.normals in ("facet", "averaged"):  # the primary side's own: the means of the facets there
+            normal = nodal_normals(self.primary, deformed)[nearest]
+        assert nodes.facet is not None
+        assert nodes.xi is not None
+        return replace(pairing, facet=nodes.facet[nearest], xi=nodes.xi[nearest], normal=normal, beyond=None)
 
     def unilateral(self, at: Configuration) -> Constraints:
         """Pair on the displaced configuration and return one gap per secondary node."""

@@ -14,10 +14,12 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
 from fastcontact.arrays import Array, Indices, Mask, Numbers
+from fastcontact.contact.projection import facet_angles
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements
+from fastcontact.mesh.area_vectors import area_vectors
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.mesh.topology import outer_facets
+from fastcontact.mesh.topology import outer_facets, same_facets
 
 # Ridges of a facet at most: four sides of a quadrangle.
 MOST_RIDGES = 4
@@ -40,23 +42,11 @@ class Block:
         return self.nodes[:, edges[:, 0]], self.nodes[:, edges[:, 1]]
 
     def normals(self) -> tuple[Array, Array]:
-        """Return the unit normals (n, k, dim) at the nodes, and the angles (n, k) of the facets there [radian]."""
-        tangent = np.einsum("akj,fkd->fadj", self.element.gradient(self.element.nodes), self.corners)
-        angle = np.full(self.nodes.shape, np.pi)
-        if self.element.dim == 1:
-            normal = np.stack([tangent[..., 1, 0], -tangent[..., 0, 0]], axis=2)
-        else:
-            normal = np.cross(tangent[..., 0], tangent[..., 1])
-            for corner in range(self.element.n_corners):
-                arms = [
-                    self.corners[:, b if a == corner else a] - self.corners[:, corner]
-                    for a, b in self.element.edges
-                    if corner in (a, b)
-                ]
-                sine = np.linalg.norm(np.cross(arms[0], arms[1]), axis=1)
-                angle[:, corner] = np.arctan2(sine, np.einsum("fd,fd->f", arms[0], arms[1]))
+        """Return the unit normals (n, k, dim) at the nodes, and the angles (n, k) of `facet_angles` there."""
+        normal = area_vectors(self.corners, self.element.gradient(self.element.nodes))
         length = np.linalg.norm(normal, axis=2, keepdims=True)
-        return np.divide(normal, length, out=np.zeros_like(normal), where=length > 0), angle
+        unit = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
+        return unit, facet_angles(self.element, self.corners)
 
 
 class SurfaceFacets(NamedTuple):
@@ -130,13 +120,8 @@ def _out_of_solids(nodes: Numbers, outer: Numbers | None) -> Numbers:
     """Return facets with those that are among `outer` replaced by it."""
     if outer is None:
         return nodes
-    both = np.concatenate([outer, nodes])
-    _, key = np.unique(np.sort(both, axis=1), axis=0, return_inverse=True)
-    key = key.ravel()
-    row = np.full(key.max() + 1, -1)
-    row[key[: len(outer)]] = np.arange(len(outer))
-    at = row[key[len(outer) :]]
-    return np.where((at >= 0)[:, None], outer[at], nodes)
+    rows = same_facets(outer, nodes)
+    return np.where((rows >= 0)[:, None], outer[rows], nodes)
 
 
 def _described(blocks: list[Block], facet: int) -> str:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from fastcontact.arrays import Array
 from fastcontact.errors import ContactError
-from fastcontact.mesh.argument_types import typed
+from fastcontact.mesh.argument_types import finite_vector, typed
 
 
 def _positive(**values: float) -> None:
@@ -21,11 +21,8 @@ def _positive(**values: float) -> None:
 
 
 def _vector(name: str, values: ArrayLike, dim: int) -> Array:
-    try:
-        vector = np.asarray(values, float)
-    except (TypeError, ValueError):
-        vector = np.empty(0)
-    if vector.shape != (dim,) or not np.isfinite(vector).all():
+    vector = finite_vector(values, dim)
+    if vector is None:
         raise ContactError(f"{name} = {values!r} of a rigid obstacle must be {dim} finite numbers, one a coordinate")
     return vector
 

@@ -20,7 +20,7 @@ from fastcontact.elasticity.temperature import Temperature
 from fastcontact.elasticity.varying_constants import Cells
 from fastcontact.errors import ModelError, unknown
 from fastcontact.heat.loads import Film, FixedTemperature, Heating
-from fastcontact.mesh.argument_types import typed
+from fastcontact.mesh.argument_types import finite_vector, typed
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
 from fastcontact.model.contact_pair import ContactPair
@@ -160,13 +160,12 @@ class ModelBase:
             return None
         if not along:
             raise ModelError(f"{name} has a direction, but no axial or transverse stiffness that would use it")
-        vector = np.asarray(direction, float)
-        length = np.linalg.norm(vector)
-        if vector.shape != (self.mesh.dim,) or not (np.isfinite(length) and length > 0):
+        vector = finite_vector(direction, self.mesh.dim)
+        if vector is None or not vector.any():
             raise ModelError(
                 f"the direction {direction} of {name} must be a vector of {self.mesh.dim} numbers, not all zero"
             )
-        return np.asarray(vector / length)
+        return np.asarray(vector / np.linalg.norm(vector))
 
     def _related(self) -> Mask:
         """Return which points (n_points,) relations and springs hold."""

@@ -8,8 +8,7 @@ from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.contact.formulations import FORMULATIONS
-from fastcontact.model.contact_options import ContactOptions
-from fastcontact.model.pair_options import SHARED_OPTIONS
+from fastcontact.model.contact_options import SHARED_OPTIONS, ContactOptions
 
 
 @pytest.fixture
