@@ -24,6 +24,7 @@ from fastcontact.contact.held_motions import HeldMotions
 from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.surface import Surface
 from fastcontact.contact.unrolled_line import UnrolledLine, unrolled
+from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 # A plane of symmetry cuts the surface: its normal and that of the surface are nearly perpendicular [cosine].
 ACROSS = 0.5
@@ -124,7 +125,7 @@ def _in_space(points: Array, weight: Array, planes: list[tuple[int, Indices]], m
 
 def _meets_axis(points: Array) -> bool:
     """Return whether one of the `points` (n, 2) [length] lies on the axis x = 0."""
-    return bool(np.abs(points[:, 0]).min() <= 1e-9 * np.ptp(points, axis=0).max())
+    return bool(np.abs(points[:, 0]).min() <= LENGTH_ROUND_OFF * np.ptp(points, axis=0).max())
 
 
 def symmetry_planes(surface: Surface, coordinates: Array, motions: HeldMotions | None) -> list[tuple[int, Indices]]:
@@ -136,7 +137,7 @@ def symmetry_planes(surface: Surface, coordinates: Array, motions: HeldMotions |
         return []
     points = coordinates[surface.points]
     held = np.diagonal(motions.at(surface.points), axis1=1, axis2=2) >= HELD
-    tolerance, planes = 1e-6 * float(np.ptp(points, axis=0).max()), []
+    tolerance, planes = SINGLE_PRECISION * float(np.ptp(points, axis=0).max()), []
     across = np.abs(nodal_normals(surface, coordinates)) < ACROSS
     for axis in range(points.shape[1]):
         x = points[:, axis]

@@ -16,8 +16,7 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import area_vectors
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import cells_of_outer_facets, outer_facets
-
-ROUNDING = 1e-9  # of the size of a facet
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +192,7 @@ def _faced_by(
     beside = np.linalg.norm(apart - gap[:, None] * closest.normal, axis=1)
     larger = np.maximum(size[facet], size[other])
     opposed = np.einsum("nd,nd->n", normal[ours], closest.normal) <= -np.cos(np.radians(angle))
-    near = closest.distance <= (larger if distance is None else distance) + ROUNDING * larger
-    ahead = beside <= np.abs(gap) * np.tan(np.radians(angle)) + ROUNDING * larger
+    near = closest.distance <= (larger if distance is None else distance) + LENGTH_ROUND_OFF * larger
+    ahead = beside <= np.abs(gap) * np.tan(np.radians(angle)) + LENGTH_ROUND_OFF * larger
     kept = opposed & near & ahead
     return facet[kept], other[kept], gap[kept]

@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 from scipy.spatial.distance import cdist
 
 from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION, TINY
 
 # Cosine of the angle within which directions at several nodes are taken together, as those of a curved rim are.
 TOGETHER = 0.94
@@ -45,7 +46,7 @@ class HeldMotions:
             index = np.searchsorted(nodes, owners)
             np.add.at(projectors, index, np.einsum("md,me->mde", normals, normals))
             turned = np.unique(index)
-            projectors[turned] = spanned(projectors[turned], 1e-6)
+            projectors[turned] = spanned(projectors[turned], SINGLE_PRECISION)
         return cls(nodes, projectors)
 
     def at(self, nodes: NDArray[np.integer]) -> Array:
@@ -99,7 +100,7 @@ def alike(projectors: Array, places: Array) -> list[tuple[Array, Mask]]:
         seeds = seeds[rank[seeds] == least]
         seeds = seeds if least == 1 else seeds[:1]  # of several directions any are taken
         axis = np.linalg.eigh(rest[seeds])[1][:, :, -1]
-        away = np.where(np.abs(axis @ axis.T) >= TOGETHER, np.maximum(cdist(places[seeds], places[seeds]), 1e-300), 0.0)
+        away = np.where(np.abs(axis @ axis.T) >= TOGETHER, np.maximum(cdist(places[seeds], places[seeds]), TINY), 0.0)
         order, before = breadth_first_order(minimum_spanning_tree(csr_array(away)), 0, directed=False)
         for child in order[1:]:  # one sign for all, passed on from the nearest
             axis[child] *= np.sign(axis[child] @ axis[before[child]])
@@ -114,11 +115,11 @@ def alike(projectors: Array, places: Array) -> list[tuple[Array, Mask]]:
 
 def _from_nearest(directions: Array, origin: Array, places: Array) -> Array:
     """Return unit means (n, dim) of `directions` (k, dim) at `origin` (k, dim), by their distance to `places`."""
-    if (directions @ directions[0] > 1.0 - 1e-12).all():
+    if (directions @ directions[0] > 1.0 - ROUND_OFF).all():
         return np.tile(directions[0], (len(places), 1))
-    away = np.maximum(cdist(places, origin), 1e-300)
+    away = np.maximum(cdist(places, origin), TINY)
     return _unit((away.min(axis=1, keepdims=True) / away) ** NEAREST @ directions)
 
 
 def _unit(vectors: Array) -> Array:
-    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300))
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), TINY))

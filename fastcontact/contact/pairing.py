@@ -26,6 +26,7 @@ from fastcontact.contact.projection import (
 from fastcontact.contact.search.closest import Closest, closest_of_kinds
 from fastcontact.contact.surface import Surface
 from fastcontact.mesh import elements
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 # In facet lengths: how far beyond both facets at a node a point may lie and still face it; what is rounding.
 FOLDED = 0.5
@@ -89,7 +90,7 @@ class Candidates:
         """Return which candidates (n,) lie nearer to nodes of `mask` (n_points,) than to all others."""
         inside = mask[self.nodes]
         largest = np.where(inside, self.shape, -np.inf).max(axis=1)
-        return largest > np.where(inside, -np.inf, self.shape).max(axis=1) + 1e-9
+        return largest > np.where(inside, -np.inf, self.shape).max(axis=1) + LENGTH_ROUND_OFF
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,12 +260,12 @@ def tangents(normal: Array) -> list[Array]:
         return [np.column_stack([normal[:, 1], -normal[:, 0]])]
     mean = normal[np.isfinite(normal).all(axis=1)].sum(axis=0)
     length = np.linalg.norm(mean)
-    mean = mean / length if length > 1e-9 * len(normal) else np.array([0.0, 0.0, 1.0])
+    mean = mean / length if length > LENGTH_ROUND_OFF * len(normal) else np.array([0.0, 0.0, 1.0])
     axis = np.cross(np.eye(3)[np.argmin(np.abs(mean))], mean)
     axis /= np.linalg.norm(axis)
     # What a rotation of the mean normal to the normal does to the axis; where they are opposite, a half turn about it.
     both = 1.0 + normal @ mean
-    slope = np.divide(normal @ axis, both, out=np.zeros(len(normal)), where=both > 1e-9)
+    slope = np.divide(normal @ axis, both, out=np.zeros(len(normal)), where=both > LENGTH_ROUND_OFF)
     first = axis - slope[:, None] * (mean + normal)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     return [first, np.cross(normal, first)]

@@ -156,7 +156,7 @@ def facet_angles(element: elements.Element, nodes: Array) -> Array:
     angle, n = np.empty(nodes.shape[:2]), element.n_corners
     around = np.arange(n)  # edges run from each corner to the next
     beside = np.column_stack([(around + 1) % n, (around - 1) % n])
-    shared(lambda part: projection_kernels.angles(nodes, beside, *part, angle), portions(*angle.shape))
+    shared(lambda part: projection_kernels.angles(nodes, beside, *part, angle), portions(len(nodes), nodes.shape[1]))
     return angle
 
 

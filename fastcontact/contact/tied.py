@@ -16,9 +16,7 @@ from scipy.sparse import csr_array, diags_array, eye_array, vstack
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.constraints import Constraints, NodalField
 from fastcontact.contact.multiplier_field import Projection
-
-# Entries of a row below this fraction of the largest are rounding errors of a projection that ends at a node.
-ZERO = 1e-12
+from fastcontact.round_off import ROUND_OFF, TINY
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +68,7 @@ class TiedPair:
 def tied(constraints: Constraints) -> TiedPair:
     """Return the tying equations of the constraints `constraints`, which have tangents."""
     moments, areas = moments_of(constraints)
-    size = np.maximum(np.asarray(abs(moments).sum(axis=1)).ravel(), 1e-300)
+    size = np.maximum(np.asarray(abs(moments).sum(axis=1)).ravel(), TINY)
     positions = abs(moments) @ constraints.positions / size[:, None]
     rows = tuple(_cleaned(csr_array(moments @ along)) for along in (constraints.B, *constraints.tangents))
     assert constraints.nodal is not None
@@ -90,10 +88,10 @@ def moments_of(constraints: Constraints) -> tuple[csr_array, Array | None]:
     alone = np.flatnonzero((areas == 0.0) & constraints.usable)  # at the axis
     single = csr_array((np.ones(len(alone)), (np.arange(len(alone)), alone)), shape=(len(alone), len(areas)))
     whole = np.concatenate([scale, np.zeros(len(alone))])
-    return csr_array(vstack([diags_array(1.0 / np.maximum(scale, 1e-300)) @ weighted, single])), whole
+    return csr_array(vstack([diags_array(1.0 / np.maximum(scale, TINY)) @ weighted, single])), whole
 
 
 def _cleaned(rows: csr_array) -> csr_array:
-    rows.data[np.abs(rows.data) < ZERO * np.abs(rows.data).max(initial=0.0)] = 0.0
+    rows.data[np.abs(rows.data) < ROUND_OFF * np.abs(rows.data).max(initial=0.0)] = 0.0
     rows.eliminate_zeros()
     return rows

@@ -17,7 +17,7 @@ from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.pairing import Pairing, normals
 from fastcontact.contact.surface import Surface
 from fastcontact.linear.sparse_rows import nodal_rows
-from fastcontact.round_off import LENGTH_ROUND_OFF
+from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
 
 
 def with_arms(constraints: Constraints, pairing: Pairing, primary: Surface, points: Array) -> Constraints:
@@ -43,7 +43,7 @@ def with_arms(constraints: Constraints, pairing: Pairing, primary: Surface, poin
         slope = np.einsum("mkd,md->mk", along, direction)
         lever = nodal_rows(facing.nodes, slope[:, :, None] * normal[:, None, :], points.size)
         arm, left = np.asarray(lever @ rotations), np.asarray(tangent @ rotations)
-        square = np.maximum((arm**2).sum(axis=1), 1e-300)
+        square = np.maximum((arm**2).sum(axis=1), TINY)
         length = (arm * left).sum(axis=1) / square
         moved = np.abs(np.stack([tangent @ np.tile(e, len(points)) for e in np.eye(points.shape[1])])).max(axis=0)
         length[(np.abs(length) <= LENGTH_ROUND_OFF * size) | (moved > LENGTH_ROUND_OFF)] = 0.0

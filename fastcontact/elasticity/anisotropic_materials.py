@@ -24,12 +24,11 @@ from fastcontact.elasticity.materials import (
 from fastcontact.elasticity.varying_constants import CellAxes, Varying, wrapped
 from fastcontact.errors import ModelError
 from fastcontact.mesh.argument_types import check_type
+from fastcontact.round_off import ROUND_OFF
 
 NAMES = ("12", "13", "23")
 # Of the stiffness to be symmetric, relative to its largest entry.
 SYMMETRIC = 1e-9
-# Of Poisson's ratios together, above which the energy is positive.
-LEAST = 1e-12
 
 
 @dataclass(frozen=True)
@@ -165,7 +164,7 @@ class Orthotropic(Material):
         with np.errstate(all="ignore"):  # what is no modulus is found above
             nu21, nu31, nu32 = nu[0] * E[1] / E[0], nu[1] * E[2] / E[0], nu[2] * E[2] / E[1]
             single = (nu[0] * nu21 < 1.0) & (nu[1] * nu31 < 1.0) & (nu[2] * nu32 < 1.0)
-            return fit & single & (_determinant(nu, (nu21, nu31, nu32)) > LEAST)
+            return fit & single & (_determinant(nu, (nu21, nu31, nu32)) > ROUND_OFF)
 
 
 @dataclass(frozen=True)
@@ -310,7 +309,7 @@ def _check_ratios(E: Sequence[float], nu: Sequence[float]) -> None:
     nu12, nu13, nu23 = nu
     nu21, nu31, nu32 = nu12 * E[1] / E[0], nu13 * E[2] / E[0], nu23 * E[2] / E[1]
     determinant = _determinant(nu, (nu21, nu31, nu32))
-    if not determinant > LEAST:
+    if not determinant > ROUND_OFF:
         raise ModelError(
             f"Poisson's ratios nu12, nu13, nu23 = {nu12:g}, {nu13:g}, {nu23:g} are too large together: 1 - nu12 nu21 - nu23 "
             f"nu32 - nu13 nu31 - 2 nu21 nu32 nu13 = {determinant:.6g} must be positive"

@@ -11,7 +11,7 @@ import numpy as np
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 from fastcontact.mesh.argument_types import check_type, values_at
-from fastcontact.round_off import LENGTH_ROUND_OFF
+from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 Axes = Sequence[Sequence[float]] | Callable[[Array], Array] | None
 # Components of stress and strain: xx, yy, zz, xy, yz, xz.
@@ -99,7 +99,7 @@ def checked_axes(axes: Any) -> Axes:
         raise ModelError(f"the axes of a material {vectors.tolist()} have one without length")
     vectors = vectors / lengths
     off = np.abs(vectors @ vectors.T - np.eye(len(vectors))).max()
-    if off > 1e-6:
+    if off > SINGLE_PRECISION:
         raise ModelError(
             f"the axes of a material {vectors.tolist()} are not at right angles: the cosine between two is {off:.3g}"
         )
@@ -139,7 +139,7 @@ def frames(axes: Axes, points: Array, kinematics: str) -> Array:
             f"return three vectors in rows for each, shape ({len(points)}, 3, 3)"
         )
     off = np.abs(frame @ frame.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2), initial=0.0)
-    bad = np.flatnonzero(~(off <= 1e-6) | np.iscomplexobj(frame))
+    bad = np.flatnonzero(~(off <= SINGLE_PRECISION) | np.iscomplexobj(frame))
     if len(bad):
         raise ModelError(
             f"the function of a material's axes returned {frame[bad[0]].tolist()} at {points[bad[0]]}: these are not unit "

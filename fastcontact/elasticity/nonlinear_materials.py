@@ -115,7 +115,7 @@ class ElasticPlastic(NonlinearElastic):
             rows = np.vstack([[0.0, self.yield_stress], rows])
         if not (np.isfinite(rows).all() and (np.diff(rows[:, 0]) > 0.0).all() and (rows[:, 1] > 0.0).all()):
             raise ModelError("hardening must have ascending plastic strains, from zero on, and positive yield stresses")
-        if rows[0, 0] < 0.0 or not math.isclose(rows[0, 1], self.yield_stress, rel_tol=1e-9):
+        if rows[0, 0] < 0.0 or not math.isclose(rows[0, 1], self.yield_stress):
             raise ModelError(
                 f"hardening begins with the yield stress {rows[0, 1]:g} at the plastic strain {rows[0, 0]:g}, where "
                 f"yield_stress = {self.yield_stress:g}: the first pair is (0, yield_stress), or left out"

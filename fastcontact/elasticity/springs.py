@@ -16,6 +16,7 @@ from scipy.sparse import bsr_array, csr_array, diags_array, vstack
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 from fastcontact.linear.sparse_rows import nodal_rows
+from fastcontact.round_off import ROUND_OFF
 
 # Ratio of the stiffness of a spring between nodes to that of the bodies there: warned about, and refused.
 STIFF, STIFFEST = 1e5, 1e12
@@ -117,7 +118,7 @@ def _line(name: str, points: Array, first: int, second: int) -> Array:
     """Return the unit vector (dim,) from one point to another."""
     line = points[second] - points[first]
     length = float(np.linalg.norm(line))
-    if length <= 1e-12 * np.abs(points).max():
+    if length <= ROUND_OFF * np.abs(points).max():
         raise ModelError(
             f"{name}: points {first} and {second} are at the same place and have no line between them: give x, y or "
             "z instead of axial, or a direction"

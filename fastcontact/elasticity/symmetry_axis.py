@@ -6,9 +6,7 @@ import numpy as np
 
 from fastcontact.arrays import Indices
 from fastcontact.mesh.mesh import Mesh
-
-# Nodes nearer to the axis than this fraction of the largest coordinate lie on it: files may hold single precision.
-ON_AXIS = 1e-6
+from fastcontact.round_off import SINGLE_PRECISION
 
 
 def axis_nodes(mesh: Mesh) -> Indices:
@@ -16,7 +14,7 @@ def axis_nodes(mesh: Mesh) -> Indices:
 
     A body that reaches the axis stays closed there: by symmetry its points on the axis move along it only.
     """
-    near = np.abs(mesh.points[:, 0]) <= ON_AXIS * np.abs(mesh.points).max()
+    near = np.abs(mesh.points[:, 0]) <= SINGLE_PRECISION * np.abs(mesh.points).max()
     used = np.zeros(mesh.n_points, bool)
     for block in mesh.solids.values() if near.any() else ():
         used[block] = True

@@ -10,15 +10,13 @@ from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.elasticity.energy import cell_volumes, gradients_at, integration_rule
+from fastcontact.elasticity.mass import AT_ONCE
 from fastcontact.elasticity.materials import Material
 from fastcontact.elasticity.stiffness import sparsity
 from fastcontact.elasticity.varying_constants import positions
 from fastcontact.errors import ModelError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
-
-# Numbers of local matrices that are formed at a time.
-AT_ONCE = 2_000_000
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,6 +15,7 @@ from fastcontact.mesh.topology import bodies
 from fastcontact.model.body_overlap import penetration
 from fastcontact.model.ramp import Table
 from fastcontact.model.rigid_motions import FreeMotions, body_name, node_at
+from fastcontact.round_off import SINGLE_PRECISION
 
 if TYPE_CHECKING:
     from fastcontact.contact.formulations import Formulation
@@ -132,7 +133,7 @@ def check_overlap(mesh: Mesh, kinematics: str, paired: Iterable[tuple[str, str]]
     joined = {frozenset((int(body[mesh.points_of(a)[0]]), int(body[mesh.points_of(b)[0]]))) for a, b in paired}
     size = float(np.ptp(mesh.points, axis=0).max())
     for number, other, depth, where in penetration(mesh, kinematics, mesh.points):
-        if depth > 1e-6 * size and frozenset((number, other)) not in joined:
+        if depth > SINGLE_PRECISION * size and frozenset((number, other)) not in joined:
             names = body_name(mesh, body, number), body_name(mesh, body, other)
             raise ModelError(
                 f"body {names[0]} overlaps body {names[1]} by {depth:.3g} near {where} before any load, "

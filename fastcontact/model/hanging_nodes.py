@@ -13,6 +13,7 @@ from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.contact.search.box_tree_kernels import build, tree_order
+from fastcontact.contact.search.closest import TOGETHER
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import flat_area_vectors
 from fastcontact.mesh.elements import Element
@@ -29,8 +30,6 @@ if TYPE_CHECKING:
 NEAR, ON_ARC = 0.02, 0.1
 # More facets than these face no node at such a distance.
 MOST = 8
-# Facets that follow each other in the order of the search are sorted down to so many.
-TOGETHER = 4
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,6 +25,7 @@ from fastcontact.model.prescribed_overlap import Supports, prescribed_overlap_wa
 from fastcontact.model.ramp import Harmonic, Ramp, Table
 from fastcontact.model.repeated_pairs import split_side_warnings
 from fastcontact.model.units import in_si, misfit
+from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 
 if TYPE_CHECKING:
     from fastcontact.model.model import Model
@@ -40,9 +41,8 @@ SOLIDS = (1e2, 2e12)
 SOME = 1000
 # Relative error of the integral of a load, and of the stiffness (1.6 % on regular pyramids), above which there is a warning.
 INTEGRAL, STIFFNESS = 1e-3, 5e-2
-# Nodes nearer to each other than these parts of the size of the model and of the edges there are meant to be one; those
-# nearer than the last are.
-COINCIDENT, NEAR, SAME_PLACE = 1e-6, 1e-2, 1e-9
+# Nodes nearer to each other than this part of the edges there, and than single precision, are meant to be one.
+NEAR = 1e-2
 # Rubber on rough ground has a coefficient of friction of 1 to 2.
 RUBBING = 3.0
 
@@ -84,7 +84,7 @@ def _lost_loads(model: Model) -> list[str]:
     for load in model.loads:
         forces = model.load_vector(load)
         total = float(np.abs(forces).sum())
-        if total > 0.0 and float(np.abs(forces[~fixed]).sum()) <= 1e-12 * total:
+        if total > 0.0 and float(np.abs(forces[~fixed]).sum()) <= ROUND_OFF * total:
             texts.append(
                 f"{load.name} acts on {int(forces.any(axis=1).sum())} points whose displacement is prescribed in its "
                 "direction: all of it goes into the supports. Load other points, or leave out the support"
@@ -172,7 +172,7 @@ def _coincident(model: Model) -> list[str]:
             lone[mesh.points_of(group) if group else []] = False
     lone[model.holding_rows().indices // mesh.dim] = False
     numbers = np.flatnonzero(lone)
-    pairs = cKDTree(mesh.points[numbers]).query_pairs(COINCIDENT * size, output_type="ndarray")
+    pairs = cKDTree(mesh.points[numbers]).query_pairs(SINGLE_PRECISION * size, output_type="ndarray")
     pairs = numbers[pairs.reshape(-1, 2)]
     apart = np.linalg.norm(mesh.points[pairs[:, 0]] - mesh.points[pairs[:, 1]], axis=1)
     near = apart < NEAR * edge[pairs].min(axis=1)
@@ -183,7 +183,7 @@ def _coincident(model: Model) -> list[str]:
     first = pairs[np.lexsort(mesh.points[pairs[:, 0]].T)[0]]
     point = ", ".join(f"{x:.6g}" for x in mesh.points[first[0]])
     largest = float(apart.max())
-    where = "where another one is" if largest <= SAME_PLACE * size else f"within {largest:.3g} of another one"
+    where = "where another one is" if largest <= LENGTH_ROUND_OFF * size else f"within {largest:.3g} of another one"
     return [
         f"{count} nodes lie {where}, and no contact joins them (first: points {first[0]} and {first[1]} at ({point})): merge "
         "them in the mesher or with generate.transform.merge_points, or define the contact"

@@ -20,12 +20,11 @@ from fastcontact.errors import ModelError
 from fastcontact.linear.sparse_rows import nodal_rows
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.ramp import Table
-from fastcontact.model.relation_rows import APART, less_first, matched
+from fastcontact.model.relation_rows import less_first, matched
+from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION
 
 # How far off the facets of the other end nodes may lie, and beyond their ends, in facet sizes: chords of curved ends.
 BESIDE = 0.02
-# Part of a row of a relation that has cancelled.
-CANCELLED = 1e-12
 
 
 class PeriodicInterface(NamedTuple):
@@ -120,7 +119,7 @@ def cyclic(
     distance, match, turn = min(turns, key=lambda one: float(one[0].max()))
     size = float(np.ptp(mesh.points[first], axis=0).max())
     far = int(np.argmax(distance))
-    if len(first) == len(second) == len(np.unique(match)) and distance[far] <= APART * size:
+    if len(first) == len(second) == len(np.unique(match)) and distance[far] <= SINGLE_PRECISION * size:
         interface = PeriodicInterface(first, second[match], turn, rotation, sectors)
         relation = MultiPointConstraint(name, turned_rows(interface, 1.0, mesh))
         return [relation], interface._replace(relation=relation)
@@ -170,7 +169,7 @@ def _following(mesh: Mesh, dependent: str, facets: str, rotation: Rotation, sign
 def _without_zeros(rows: csr_array) -> csr_array:
     """Return rows without their round-off, and without those of nothing else: along the axis on it."""
     rows.sum_duplicates()
-    rows.data[np.abs(rows.data) < CANCELLED] = 0.0
+    rows.data[np.abs(rows.data) < ROUND_OFF] = 0.0
     rows.eliminate_zeros()
     return csr_array(rows[np.diff(rows.indptr) > 0])
 

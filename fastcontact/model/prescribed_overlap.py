@@ -16,12 +16,13 @@ from fastcontact.errors import ModelError
 from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.obstacle_rotation import angle_at
 from fastcontact.model.ramp import PartHistory, Ramp, combined, multiplier
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 Pairs = Sequence[tuple[ContactPair, Formulation]]
 # A gap that changes with a displacement by less than this does not depend on it [-].
 STILL = 1e-6
-# Depths below this fraction of the largest prescribed displacement, or of the size of the model, are no mistake.
-SMALL, ROUNDING = 1e-3, 1e-9
+# Depths below this fraction of the largest prescribed displacement are no mistake.
+SMALL = 1e-3
 # So many instants of a history are looked at.
 SOME = 20
 
@@ -115,7 +116,7 @@ def _at(contact: ContactPair, formulation: Formulation, nodes: Numbers, supports
         depth, paired = _torn(formulation, candidates, displacement, supports.fixed)
     else:
         depth, paired = _depth(formulation, candidates, at, supports.fixed)
-    small = max(SMALL * np.abs(displacement).max(), ROUNDING * np.ptp(formulation.points, axis=0).max())
+    small = max(SMALL * np.abs(displacement).max(), LENGTH_ROUND_OFF * np.ptp(formulation.points, axis=0).max())
     row = int(np.argmax(depth))
     return Overlap(int((depth > small).sum()), int(paired.sum()), float(depth[row]), int(nodes[row]), instant)
 

@@ -17,10 +17,8 @@ from fastcontact.mesh.argument_types import finite_vector
 from fastcontact.mesh.companion_groups import OPPOSITE
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.relation_rows import along, less_first, matched, normals_of
-from fastcontact.round_off import ROUND_OFF
+from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION
 
-# How far nodes of a section may lie off its plane, relative to its size.
-FLAT = 1e-6
 # A bolt whose direction is farther from the normal of its section than this cosine tells is a mistake [-].
 ALONG = 0.7
 
@@ -197,7 +195,7 @@ def _normal(mesh: Mesh, name: str, nodes: Indices, normal: Sequence[float] | Non
         return np.asarray(vector / np.linalg.norm(vector))
     places = mesh.points[nodes] - mesh.points[nodes].mean(axis=0)
     spread, axes = np.linalg.svd(places, full_matrices=True)[1:]
-    if len(nodes) < mesh.dim or (len(spread) >= mesh.dim and spread[-1] > FLAT * spread[0]):
+    if len(nodes) < mesh.dim or (len(spread) >= mesh.dim and spread[-1] > SINGLE_PRECISION * spread[0]):
         raise ModelError(f"the nodes of {name} determine no plane: give its normal, along the bolt")
     across = axes[-1] * np.sign(axes[-1][np.argmax(np.abs(axes[-1]))])
     return np.asarray(np.where(np.abs(across) < ROUND_OFF, 0.0, across))
@@ -222,7 +220,7 @@ def _across(normal: Array) -> Array:
     axis = int(np.argmax(np.abs(normal)))
     directions = [unit for k, unit in enumerate(np.eye(len(normal))) if k != axis]
     basis = np.linalg.qr(np.column_stack([normal, *directions]))[0][:, 1:].T
-    return np.asarray(np.where(np.abs(basis) < 1e-14, 0.0, basis))
+    return np.asarray(np.where(np.abs(basis) < ROUND_OFF, 0.0, basis))
 
 
 def locked_lengths(

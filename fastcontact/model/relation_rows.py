@@ -15,11 +15,9 @@ from fastcontact.errors import ModelError
 from fastcontact.linear.sparse_rows import nodal_rows
 from fastcontact.mesh.argument_types import finite_vector
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.round_off import ROUND_OFF
+from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION
 
 NORMAL = "normal"
-# How far apart nodes may lie that belong together, in sizes of their group.
-APART = 1e-6
 
 
 def normals_of(mesh: Mesh, group: str) -> tuple[Indices, Array]:
@@ -88,7 +86,7 @@ def matched(
     distance, match = cKDTree(theirs).query(ours + shift)
     size = max(float(np.ptp(ours, axis=0).max()), 1e-3 * float(np.ptp(mesh.points, axis=0).max()))
     far = int(np.argmax(distance))
-    if distance[far] > APART * size or len(np.unique(match)) < len(match):
+    if distance[far] > SINGLE_PRECISION * size or len(np.unique(match)) < len(match):
         raise ModelError(
             f"point {nodes[far]} of '{name}', moved by {shift}, lies {distance[far]:.3g} from the nearest node of '{other}': "
             "groups are joined nodes upon nodes; give the translation that brings them there, or another mesh"

@@ -10,15 +10,13 @@ import numpy as np
 
 from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.contact.formulations import Formulation
-from fastcontact.contact.projection import nodal_normals
+from fastcontact.contact.projection import CORNER, nodal_normals
 from fastcontact.contact.side_checks import shared_facets
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.contact_pair import ContactPair
-
-# Sides whose normals at a common node are within 45 degrees go on in each other there; others meet in a corner.
-GOES_ON = 0.7
+from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 
 def check_repeated(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
@@ -68,7 +66,8 @@ def _check_obstacles(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
     points = mesh.points[nodes]
     (gap, normal), (gap_there, normal_there) = pair.obstacle.distance(points), other.obstacle.distance(points)
     size = float(np.ptp(mesh.points, axis=0).max())
-    if np.allclose(gap, gap_there, rtol=0.0, atol=1e-9 * size) and np.allclose(normal, normal_there, atol=1e-6):
+    same_gap = np.allclose(gap, gap_there, rtol=0.0, atol=LENGTH_ROUND_OFF * size)
+    if same_gap and np.allclose(normal, normal_there, atol=SINGLE_PRECISION):
         raise ContactError(
             f"contact '{pair.name}' presses facets of '{pair.secondary}' on the rigid obstacle on which contact "
             f"'{other.name}' presses them already, with {len(nodes)} nodes (first: point {nodes[0]}): leave out one of the "
@@ -111,7 +110,7 @@ def _common(points: Array, side: Surface, other: Surface) -> Numbers:
     if not len(nodes):
         return nodes
     normals = [nodal_normals(s, points)[_places(s, nodes)] for s in (side, other)]
-    return np.asarray(nodes[np.einsum("nd,nd->n", *normals) > GOES_ON])
+    return np.asarray(nodes[np.einsum("nd,nd->n", *normals) > np.cos(np.radians(CORNER))])
 
 
 def _places(side: Surface, nodes: Numbers) -> Indices:

@@ -11,7 +11,7 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.loads import Load, Table, Traction, check_number
 from fastcontact.errors import MeshError, ModelError, unknown
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.round_off import ROUND_OFF
+from fastcontact.round_off import ROUND_OFF, TINY
 
 # Weights by the distance over the radius, from 1 at the place to 0 at the radius.
 WEIGHTINGS: dict[str, Callable[[Array], Array]] = {
@@ -109,7 +109,7 @@ def mean_rotation(weight: Array, arms: Array) -> Array:
             [np.column_stack([zero, -z, y]), np.column_stack([z, zero, -x]), np.column_stack([-y, x, zero])]
         )
         inertia = (weight @ (arms**2).sum(axis=1)) * np.eye(3) - np.einsum("n,ni,nj->ij", weight, arms, arms)
-    if np.linalg.matrix_rank(inertia, tol=1e-12 * np.abs(inertia).max(initial=1e-300)) < len(inertia):
+    if np.linalg.matrix_rank(inertia, tol=ROUND_OFF * np.abs(inertia).max(initial=TINY)) < len(inertia):
         raise ModelError(
             "the points lie in one line or place, so they have no mean rotation about it: take a wider group"
         )

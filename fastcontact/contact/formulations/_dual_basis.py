@@ -23,6 +23,7 @@ import numpy as np
 
 from fastcontact.arrays import Array, Mask
 from fastcontact.mesh import elements
+from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
 
 # Share of a mid node's function that either end of its edge gets: 1/4 makes parabolas Bernstein polynomials; without a
 # centre node, 3/8 is the least that leaves no negative part, that of (a + b) / 4 + 1 / 2 for a, b in [-1, 1].
@@ -34,7 +35,6 @@ EQUAL = 0.9
 # Dual functions of whole facets have root mean squares up to 2.4 (nine nodes); beyond this multiple of one, and where
 # their integral falls below this fraction of their weight, they extrapolate more than they test.
 MOST, LEAST = 20.0, 0.2
-ROUNDING = 1e-9
 
 
 @cache
@@ -103,13 +103,13 @@ def dual_functions(mass: Array, kept: Mask, fraction: Array) -> tuple[Array, Arr
 
 def _tame(dual: Array, mass: Array, partial: Mask) -> Mask:
     """Return for which facets (n_facets,) the dual functions are moderate and positive on average."""
-    area = np.maximum(mass.sum(axis=(1, 2)), 1e-300)
+    area = np.maximum(mass.sum(axis=(1, 2)), TINY)
     weight = mass.sum(axis=2)
     with np.errstate(invalid="ignore", over="ignore"):
         size = np.sqrt(np.einsum("fab,fbc,fac->fa", dual, mass, dual) / area[:, None]).max(axis=1)
         off = np.abs(dual.sum(axis=1) - 1.0).max(axis=1)  # the shape functions sum to one with no other coefficients
         share = np.where(partial, np.einsum("fab,fb->fa", dual, weight) - LEAST * weight, 0.0).min(axis=1)
-    return ((size <= MOST) & (off <= ROUNDING) & (share >= 0.0)) | ~partial.any(axis=1)
+    return ((size <= MOST) & (off <= LENGTH_ROUND_OFF) & (share >= 0.0)) | ~partial.any(axis=1)
 
 
 def biorthogonal(mass: Array, partial: Mask) -> tuple[Array, Array]:

@@ -27,9 +27,8 @@ from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.contact.tied import TiedPair, tied
 from fastcontact.contact.tied_offset import with_arms
 from fastcontact.errors import ContactError, unknown
+from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
 
-# Vectors shorter than this have no direction; unit normals that differ by less are the same.
-TINY, ALIKE = 1e-300, 1e-9
 SLIPS = ("symmetric", "primary")
 # Nodes on an axis or plane of symmetry stand out a little beyond facets that lean, nodes at the end of one side beyond
 # that of the other where the two strain differently, in facet lengths.
@@ -355,7 +354,7 @@ class Formulation(ABC):
             np.linalg.norm(along, axis=1) > np.sqrt(0.5), np.einsum("nd,nd->n", moved, pairing.normal), 0.0
         )
         moved -= closing[:, None] * pairing.normal
-        both = without(both, moved, ALIKE * max(np.abs(at.displacement).max(), np.abs(at.start).max()))
+        both = without(both, moved, LENGTH_ROUND_OFF * max(np.abs(at.displacement).max(), np.abs(at.start).max()))
         held = np.zeros((len(self.secondary.points), *both.shape[1:]))
         held[nodes] = both
         return alike(self._without_whole_facets(held), self.points[self.secondary.points])
@@ -390,7 +389,7 @@ class Formulation(ABC):
         theirs = interpolated(theirs, facing)
         mean = theirs - self._secondary_normals(Candidates(nodes, shape), deformed)
         length = np.linalg.norm(mean, axis=1, keepdims=True)
-        mean = np.divide(mean, length, out=np.zeros_like(mean), where=length > ALIKE)
+        mean = np.divide(mean, length, out=np.zeros_like(mean), where=length > LENGTH_ROUND_OFF)
         apart = np.einsum("nk,nkd->nd", shape, start[nodes])
         apart -= np.einsum("nk,nkd->nd", facing.shape, start[facing.nodes])
         opening = np.einsum("nd,nd->n", mean, apart)
@@ -406,7 +405,7 @@ class Formulation(ABC):
         """
         positions = self.points[self.secondary.points]
         gap, normal = self.nodal_gap(replace(at, displacement=np.zeros_like(self.points)))
-        close = np.flatnonzero(gap <= gap.min() + 1e-9 * np.ptp(positions, axis=0).max())
+        close = np.flatnonzero(gap <= gap.min() + LENGTH_ROUND_OFF * np.ptp(positions, axis=0).max())
         first = close[np.argmin(np.linalg.norm(positions[close], axis=1))]
         return positions[first], normal[first]
 

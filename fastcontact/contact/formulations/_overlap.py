@@ -15,6 +15,9 @@ from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.mesh import elements
 
+# What faces the other side with less than this part of its area is left out: its multipliers would have next to no equation.
+LEAST = 1e-3
+
 
 @dataclass(frozen=True, eq=False)
 class Coupling:

@@ -28,19 +28,14 @@ from scipy.sparse import coo_array, csr_array, diags_array
 from scipy.sparse.linalg import splu
 
 from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.contact.closed_nodes import NO_AREA
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints, NodalField
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.multiplier_field import Projection
 from fastcontact.contact.pairing import Candidates, Pairing, normals
 from fastcontact.errors import ContactError
-
-# The area of a node on the axis vanishes but for rounding errors; what is below this part of the largest counts as zero.
-NO_AREA = 1e-9
-# Corners of quadratic faces have next to none, or less.
-NO_SHARE = 1e-3
-# Of shape functions at a point, where two nodes are equally near.
-ROUNDING = 1e-9
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +111,7 @@ class PressureField(NodalField):
     def covered(self) -> Array:
         """Covered part of the nodal areas; one for nodes without area."""
         whole = self.nodal_areas
-        with_area = np.abs(whole) > NO_AREA * np.abs(whole).max(initial=0.0)
+        with_area = np.abs(whole) > LENGTH_ROUND_OFF * np.abs(whole).max(initial=0.0)
         return np.divide(self.covered_areas, whole, out=np.ones_like(whole), where=with_area)
 
     def shares(self, force: Array) -> Array:
@@ -132,7 +127,7 @@ class PressureField(NodalField):
         weight = np.where(usable, self.projection.areas, 0.0)[:, None] * self.shape
         total = np.bincount(self.around.ravel(), weight.ravel(), n)
         sums = np.bincount(self.around.ravel(), (weight * np.where(usable, gaps, 0.0)[:, None]).ravel(), n)
-        kept = total > NO_SHARE * total.max(initial=0.0)
+        kept = total > NO_AREA * total.max(initial=0.0)
         near = np.where(kept[self.around], self.shape, -np.inf).argmax(axis=1)
         return np.divide(sums, total, out=np.full(n, np.inf), where=kept), self.around[np.arange(len(gaps)), near]
 
@@ -144,7 +139,7 @@ class PressureField(NodalField):
         an area is closed, too. Of nodes that no point with an area is nearest to, at an axis or beyond the end of the other
         side, the facet tells.
         """
-        usual = self.nodal_areas > NO_SHARE * self.nodal_areas.max(initial=0.0)
+        usual = self.nodal_areas > NO_AREA * self.nodal_areas.max(initial=0.0)
         near = _nearest(self.around[active], self.shape[active], len(gap))
         near |= _nearest(
             self.around[active], np.where(usual[self.around[active]], self.shape[active], -np.inf), len(gap)
@@ -169,7 +164,7 @@ class PressureField(NodalField):
 def _nearest(around: Indices, shape: Array, n_nodes: int) -> Mask:
     """Return the nodes (n_nodes,) with the largest shape functions (m, n) at any of the points; several where equal."""
     nearest = np.zeros(n_nodes, bool)
-    nearest[around[shape >= shape.max(axis=1, keepdims=True, initial=-np.inf) - ROUNDING]] = True
+    nearest[around[shape >= shape.max(axis=1, keepdims=True, initial=-np.inf) - LENGTH_ROUND_OFF]] = True
     return nearest
 
 

@@ -20,6 +20,7 @@ from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations._cut_lines import line_points
 from fastcontact.contact.formulations._determined_field import WholeFacets, determined
+from fastcontact.contact.formulations._overlap import LEAST
 from fastcontact.contact.formulations._pressure_field import PressureField, PressureFieldFormulation
 from fastcontact.contact.integration import facet_measure
 from fastcontact.contact.pairing import Candidates
@@ -27,9 +28,7 @@ from fastcontact.contact.prescribed_normals import Normals
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError
 from fastcontact.mesh import quadrature
-
-# A facet that faces less than this part of its length takes no part: its multipliers would have next to no equation.
-COVERED = 1e-3
+from fastcontact.round_off import SINGLE_PRECISION
 
 
 @dataclass(eq=False)
@@ -44,7 +43,7 @@ class SegmentMortar(PressureFieldFormulation):
         ``"standard"``: the multiplier field is that of the facets.
     """
 
-    projection_tolerance: float = 1e-6
+    projection_tolerance: float = SINGLE_PRECISION
     normals: Normals | None = "averaged"
     surface_smoothing: bool = True
     n_gauss: int | None = None
@@ -78,7 +77,7 @@ class SegmentMortar(PressureFieldFormulation):
         paired = np.repeat(faced.paired.reshape(-1, n_gauss).mean(axis=1) > 0.5, n_gauss)
         total = np.bincount(facet, weights=area)
         covered = np.bincount(facet, weights=np.where(paired, area, 0.0))
-        kept = paired & (covered > COVERED * total)[facet] & (area > 0) & ~self.options.out(candidates)
+        kept = paired & (covered > LEAST * total)[facet] & (area > 0) & ~self.options.out(candidates)
         pairing = replace(faced, paired=kept)
         field = self._pressure_field(facet, shape, np.where(kept, area, 0.0), area)
         return self.of_points(candidates, pairing, field, at)

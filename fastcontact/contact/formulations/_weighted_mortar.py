@@ -31,7 +31,7 @@ from fastcontact.contact.formulations._cut_faces import face_overlap
 from fastcontact.contact.formulations._cut_lines import line_overlap
 from fastcontact.contact.formulations._dual_basis import COVERED, dual_functions, positive
 from fastcontact.contact.formulations._formulation import Formulation
-from fastcontact.contact.formulations._overlap import Overlap, obstacle_overlap
+from fastcontact.contact.formulations._overlap import LEAST, Overlap, obstacle_overlap
 from fastcontact.contact.integration import facet_measure, fine_rule, nodal_areas
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.pairing import Candidates, tangents
@@ -40,10 +40,9 @@ from fastcontact.contact.projection import facet_normals, nodal_normals, smooth_
 from fastcontact.errors import ContactError, unknown
 from fastcontact.linear.sparse_rows import Entries, rows_of, scaled
 from fastcontact.mesh import elements
+from fastcontact.round_off import SINGLE_PRECISION, TINY
 
 MULTIPLIERS = ("standard", "dual")
-# What faces the other side with less than this fraction of its area is left out.
-LEAST = 1e-3
 # A tangent of which less than this part, squared, is free counts as held.
 FREE = 0.1
 
@@ -61,7 +60,7 @@ class WeightedMortar(Formulation):
         ``"dual"`` or, between faces, ``"standard"``.
     """
 
-    projection_tolerance: float = 1e-6
+    projection_tolerance: float = SINGLE_PRECISION
     normals: Normals | None = "averaged"
     surface_smoothing: bool = True
     multipliers: str = "standard"
@@ -211,7 +210,7 @@ class WeightedMortar(Formulation):
         between = normal
         if not isinstance(self.primary, RigidSide):
             between = normal - nodal_normals(self.secondary, self.points + at.displacement)
-            between /= np.maximum(np.linalg.norm(between, axis=1, keepdims=True), 1e-300)  # zero where nothing is faced
+            between /= np.maximum(np.linalg.norm(between, axis=1, keepdims=True), TINY)  # zero where nothing is faced
         lean = np.einsum("nd,nd->n", normal, between)
         gap = np.where(part.usable & (lean > 0.0), part.gaps(at.start), 0.0)
         return (gap / np.where(lean > 0.0, lean, 1.0))[:, None] * between

@@ -16,13 +16,14 @@ from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations._pressure_field import PressureField, PressureFieldFormulation, shapes_at
-from fastcontact.contact.integration import facet_measure, fine_rule, gauss_rule
+from fastcontact.contact.integration import all_nodes_carry, facet_measure, fine_rule, gauss_rule
 from fastcontact.contact.pair_options import spread
 from fastcontact.contact.pairing import Candidates, filled_up
 from fastcontact.contact.prescribed_normals import Normals
 from fastcontact.contact.surface import FacetBlock
 from fastcontact.errors import ContactError, unknown
 from fastcontact.mesh import elements, quadrature
+from fastcontact.round_off import ROUND_OFF
 
 RULES = ("gauss", "simpson", "node")
 
@@ -138,7 +139,7 @@ class Continuous(PressureFieldFormulation):
         pairing = self.facing(self._candidates, at)
         areas = self._field.projection.areas
         at_axis = self._at_axis
-        pairing.paired[~(areas > 1e-12 * areas.max()) & ~at_axis] = False
+        pairing.paired[~(areas > ROUND_OFF * areas.max()) & ~at_axis] = False
         constraints = self.of_points(self._candidates, pairing, self._field, at)
         if constraints.friction is not None and at_axis.any():  # nothing slides at the axis
             constraints = replace(constraints, friction=np.where(at_axis, 0.0, constraints.friction))
@@ -171,7 +172,7 @@ def _at_nodes(element: str) -> quadrature.Rule:
     reference = elements.get(element)
     xi, weights = fine_rule(element)
     areas = weights @ reference.shape(xi)
-    if areas.min() < 1e-6 * areas.max():
+    if not all_nodes_carry(element):
         raise ContactError(
             f"integration = 'node' makes no sense on facets of {element}: their corners have no positive area. Use "
             "'gauss' or 'simpson'"

@@ -25,6 +25,7 @@ from fastcontact.contact.pairing import Candidates, Pairing
 from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError, unknown
+from fastcontact.round_off import ROUND_OFF
 
 OPPOSITE = ("facet", "node")
 
@@ -86,7 +87,7 @@ class NodeToSegment(Formulation):
         pairing = self.facing(self._candidates, at)
         pairing.paired[self.options.out(self._candidates)] = False
         areas = self._nodal.nodal_areas
-        usable = np.where(areas > 1e-12 * areas.max(), areas, np.inf)
+        usable = np.where(areas > ROUND_OFF * areas.max(), areas, np.inf)
         constraints = self.assembled(self._candidates, pairing, None, at)
         return replace(constraints, areas=usable, nodes=self.secondary.points.astype(np.intp), nodal=self._nodal)
 

@@ -20,6 +20,7 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import area_vectors
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets, same_facets
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 # Ridges of a facet at most: four sides of a quadrangle.
 MOST_RIDGES = 4
@@ -199,7 +200,7 @@ def _smooth_normals(blocks: list[Block], own: list[tuple[Array, Array]], crease:
     at_points = np.zeros((node.max() + 1, dim))
     np.add.at(at_points, node, weight[:, None] * normal)
     i, j = _pairs_at_nodes(node)
-    alike = np.einsum("nd,nd->n", normal[i], normal[j]) >= np.cos(np.radians(crease)) - 1e-9
+    alike = np.einsum("nd,nd->n", normal[i], normal[j]) >= np.cos(np.radians(crease)) - LENGTH_ROUND_OFF
     alike |= i == j
     mean = np.zeros_like(normal)
     np.add.at(mean, i[alike], weight[j[alike], None] * normal[j[alike]])

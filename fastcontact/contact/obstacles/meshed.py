@@ -12,9 +12,8 @@ from fastcontact.contact.search.closest import Closest, closest_of_kinds
 from fastcontact.errors import ContactError
 from fastcontact.mesh.argument_types import typed
 from fastcontact.mesh.mesh import Mesh
+from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
 
-# Reference coordinates of a projection nearer than this to a side of its facet lie on it.
-ON_SIDE = 1e-12
 # A point counts as beyond the border of an open surface if it stands out farther than this part of a facet, and leans
 # by more than this over its height: borders on a plane of symmetry, where facets never stand quite upright, still hold.
 BEYOND, LEAN = 0.05, 0.27
@@ -110,7 +109,7 @@ class MeshedSurface:
         normal = smooth if self.crease else np.where(on_ridge[:, None], smooth, closest.normal)
         sense /= np.linalg.norm(sense, axis=1, keepdims=True)
         # Next to a sharp edge the closest point tells the direction; the normals of either facet do not.
-        sharp = np.einsum("nd,nd->n", sense, smooth) < np.cos(np.radians(0.5 * self.crease)) - 1e-9
+        sharp = np.einsum("nd,nd->n", sense, smooth) < np.cos(np.radians(0.5 * self.crease)) - LENGTH_ROUND_OFF
         turned = on_ridge & sharp & ~touching
         normal[turned] = apart[turned] / distance[turned, None]
         height = np.abs(np.einsum("nd,nd->n", apart, sense))
@@ -168,11 +167,11 @@ def _place(block: Block, xi: Array) -> tuple[Indices, Indices]:
     none = np.full(len(xi), -1, np.intp)
     if element.dim == 1:
         s = xi[:, 0]
-        return np.where(s <= -1.0 + ON_SIDE, 0, np.where(s >= 1.0 - ON_SIDE, 1, none)), none
+        return np.where(s <= -1.0 + ROUND_OFF, 0, np.where(s >= 1.0 - ROUND_OFF, 1, none)), none
     edges = np.array(element.edges)
     a, b = element.nodes[edges[:, 0]], element.nodes[edges[:, 1]]
     across = np.column_stack([a[:, 1] - b[:, 1], b[:, 0] - a[:, 0]])
-    on = np.einsum("nej,ej->ne", xi[:, None] - a[None], across) <= ON_SIDE * np.einsum("ej,ej->e", across, across)
+    on = np.einsum("nej,ej->ne", xi[:, None] - a[None], across) <= ROUND_OFF * np.einsum("ej,ej->e", across, across)
     corner = none.copy()
     for k in range(element.n_corners):
         at = np.flatnonzero((edges == k).any(axis=1))

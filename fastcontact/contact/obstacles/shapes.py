@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from fastcontact.arrays import Array
 from fastcontact.errors import ContactError
 from fastcontact.mesh.argument_types import finite_vector, typed
+from fastcontact.round_off import ROUND_OFF
 
 
 def _positive(**values: float) -> None:
@@ -282,5 +283,5 @@ class FlatPunch:
         normal = np.zeros_like(points)
         normal[:, -1] = sign
         gap = sign * (points[:, -1] - self.height)
-        beside = np.linalg.norm(points[:, :-1], axis=1) > self.radius * (1 + 1e-12)
+        beside = np.linalg.norm(points[:, :-1], axis=1) > self.radius * (1 + ROUND_OFF)
         return np.where(beside, np.inf, gap), normal

@@ -28,6 +28,7 @@ from fastcontact.model.periodicity import PeriodicInterface
 from fastcontact.model.pretension import Pretension
 from fastcontact.model.ramp import Harmonic, PartHistory, Table
 from fastcontact.model.units import named_units
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,7 @@ class ModelBase:
         check_cells(mesh)
         if kinematics == "axisymmetric":
             radius = mesh.points[:, 0].min()
-            if radius < -1e-9 * np.abs(mesh.points).max():
+            if radius < -LENGTH_ROUND_OFF * np.abs(mesh.points).max():
                 raise ModelError(
                     f"point {int(mesh.points[:, 0].argmin())} has the radius x = {radius:.6g} < 0: "
                     "an axisymmetric model lies at x >= 0, with y along the axis"

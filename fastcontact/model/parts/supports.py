@@ -16,7 +16,7 @@ from fastcontact.contact.obstacles.rotation import Rotation
 from fastcontact.elasticity.loads import Value, axes_of, check_points, check_value, evaluated
 from fastcontact.elasticity.material_axes import Axes, checked_axes, frames
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
-from fastcontact.elasticity.symmetry_axis import ON_AXIS, axis_nodes
+from fastcontact.elasticity.symmetry_axis import axis_nodes
 from fastcontact.errors import ModelError
 from fastcontact.mesh.argument_types import typed
 from fastcontact.model.obstacle_rotation import rotation_of
@@ -24,6 +24,7 @@ from fastcontact.model.parts.base import Support
 from fastcontact.model.parts.contact import ModelContact
 from fastcontact.model.ramp import History, PartHistory, Table, table_of
 from fastcontact.model.relation_rows import NORMAL, along, normals_of
+from fastcontact.round_off import SINGLE_PRECISION
 
 log = logging.getLogger("fastcontact")
 # Vectors or a function as those of materials; in the plane the first vector alone will do.
@@ -142,7 +143,7 @@ class ModelSupports(ModelContact):
             caption = f"the displacement {'xyz'[axis]} prescribed on '{group}'"
             check_value(caption, value)
             direction = frame[:, axis]
-            if dim == 2 and np.abs(direction[:, 2]).max() > ON_AXIS:
+            if dim == 2 and np.abs(direction[:, 2]).max() > SINGLE_PRECISION:
                 raise ModelError(f"{name}: its axes leave the plane, where nothing moves")
             rows = along(nodes, np.ascontiguousarray(direction[:, :dim]), self.n_dofs)
             table = table_of(ramp, f"the ramp of {caption}")
@@ -203,7 +204,7 @@ class ModelSupports(ModelContact):
         """Add the symmetry at the axis of an axisymmetric model to the supports, and refuse those that contradict it."""
         axis = self.axis_nodes
         for values in by_ramp.values():
-            off = axis[np.abs(values[axis, 0]) > ON_AXIS * np.abs(values).max()]
+            off = axis[np.abs(values[axis, 0]) > SINGLE_PRECISION * np.abs(values).max()]
             if len(off):
                 raise ModelError(
                     f"x = {values[off[0], 0]:g} is prescribed at point {off[0]} on the axis of symmetry, where the radial "
