@@ -62,7 +62,7 @@ def recover(
             problem.sides, problem.model.stress_offset(temperature, initial, problem.field, heat),
         )  # fmt: skip
     else:
-        at_places = recovery.averaged_stress(bodies.stress, problem.sides)
+        at_places = recovery.nodal_average(mesh, bodies.stress, problem.sides)
     stress, by_material = by_largest_von_mises(problem.sides, problem.material_of_cells, at_places, mesh.n_points)
     von_mises, named = recovery.von_mises(stress), problem.model.units
     return StepResult(

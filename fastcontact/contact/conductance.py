@@ -99,18 +99,18 @@ class Conductance:
             closed = by.get("pressure", by.get("gap", 0.0))
             return np.where(touching, closed, by.get("gap", 0.0))
         try:
-            found = np.asarray(self.given(pressure, gap), float)
+            h = np.asarray(self.given(pressure, gap), float)
         except Exception as error:
             raise ContactError(
                 f"the conductance of contact '{self.name}' fails: {type(error).__name__}: {error}"
             ) from error
-        found = np.broadcast_to(found, gap.shape) if found.ndim == 0 else found
-        if found.shape != gap.shape or not (np.isfinite(found).all() and (found >= 0.0).all()):
+        h = np.broadcast_to(h, gap.shape) if h.ndim == 0 else h
+        if h.shape != gap.shape or not (np.isfinite(h).all() and (h >= 0.0).all()):
             raise ContactError(
                 f"the conductance of contact '{self.name}' must return a number from zero on for each pressure and gap, "
-                f"shape {gap.shape}, not shape {found.shape}{'' if found.shape != gap.shape else f', least {found.min():g}'}"
+                f"shape {gap.shape}, not shape {h.shape}{'' if h.shape != gap.shape else f', least {h.min():g}'}"
             )
-        return found
+        return h
 
 
 @dataclass(frozen=True, eq=False)

@@ -59,16 +59,14 @@ class Candidates:
     @classmethod
     def inside(cls, side: Surface, xi: Sequence[Array]) -> Candidates:
         """Return points at the same reference coordinates (n, dim - 1) in all facets of a block, `xi` for each block."""
-        nodes, shapes, facets, first = [], [], [], 0
+        nodes, shapes, facets, coordinates, first = [], [], [], [], 0
         for block, xi_of_block in zip(side.blocks, xi, strict=True):
             nodes.append(np.repeat(block.facets, len(xi_of_block), axis=0))
             shapes.append(np.tile(elements.get(block.element).shape(xi_of_block), (len(block.facets), 1)))
             facets.append(np.repeat(first + np.arange(len(block.facets)), len(xi_of_block)))
+            coordinates.append(np.tile(xi_of_block, (len(block.facets), 1)))
             first += len(block.facets)
-        places = [
-            np.tile(xi_of_block, (len(block.facets), 1)) for block, xi_of_block in zip(side.blocks, xi, strict=True)
-        ]
-        return cls(filled_up(nodes), filled_up(shapes), np.concatenate(facets), np.concatenate(places))
+        return cls(filled_up(nodes), filled_up(shapes), np.concatenate(facets), np.concatenate(coordinates))
 
     @classmethod
     def nodes_of(cls, side: Surface) -> Candidates:

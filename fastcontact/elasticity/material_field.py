@@ -117,26 +117,22 @@ class MaterialField:
     @cached_property
     def compliance(self) -> Array:
         """Compliances (n_moduli, n_components, n_components) [1 / pressure], see `Material.compliance_at`."""
-        compliance = np.zeros_like(self.moduli)
-        for number, material in enumerate(self.materials):
-            if not material.varies:  # else there is no cell of this number
-                compliance[number] = material.compliance_at(self._anywhere, self.kinematics)[0]
-        for own in self.places:
-            law = self.materials[own.material]
-            compliance[own.rows] = law.compliance_at(own.points, self.kinematics, own.constants)
-        return compliance
+        return self._of_materials(np.zeros_like(self.moduli), "compliance_at")
 
     @cached_property
     def expansion(self) -> Array:
         """Thermal strains (n_moduli, n_components) [1 / temperature]; NaN of materials that have no expansion."""
-        expansion = np.zeros(self.moduli.shape[:2])
+        return self._of_materials(np.zeros(self.moduli.shape[:2]), "expansion_at")
+
+    def _of_materials(self, values: Array, method: str) -> Array:
+        """Fill `values` (n_moduli, ...) with what a method of the materials returns."""
         for number, material in enumerate(self.materials):
-            if not material.varies:
-                expansion[number] = material.expansion_at(self._anywhere, self.kinematics)[0]
-        for own in self.places:
-            law = self.materials[own.material]
-            expansion[own.rows] = law.expansion_at(own.points, self.kinematics, own.constants)
-        return expansion
+            if not material.varies:  # else there is no cell of this number
+                values[number] = getattr(material, method)(self._anywhere, self.kinematics)[0]
+        for place in self.places:
+            at = getattr(self.materials[place.material], method)
+            values[place.rows] = at(place.points, self.kinematics, place.constants)
+        return values
 
     @property
     def _anywhere(self) -> Array:

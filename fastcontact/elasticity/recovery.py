@@ -94,18 +94,6 @@ def nodal_stress(
     return average.result()
 
 
-@typed(ModelError)
-def averaged_stress(at_points: dict[str, Array], sides: MaterialSides) -> Array:
-    """Return the stress (n_places, n_components) [pressure] at the nodes of each material: the average over its cells.
-
-    From `at_points` (n_cells, n_q, n_components) [pressure], by solid element.
-    """
-    average = NodalAverage(len(sides.node), next(iter(at_points.values())).shape[2])
-    for name, values in at_points.items():
-        average.add(sides.cells[name], elements.get(name).extrapolation, values)
-    return average.result()
-
-
 class NodalAverage:
     """The plain average, at each node, of the stresses of its cells there."""
 
@@ -148,14 +136,16 @@ def stress_at_element_nodes(at_points: dict[str, Array]) -> dict[str, Array]:
 
 
 @typed(ModelError)
-def nodal_average(mesh: Mesh, at_points: dict[str, Array]) -> Array:
+def nodal_average(mesh: Mesh, at_points: dict[str, Array], sides: MaterialSides | None = None) -> Array:
     """Return the stress (n_points, n_components) [pressure] at the nodes: the plain average over the cells at each node.
 
     From `at_points` (n_cells, n_q, n_components) [pressure], as SIEF_NOEU of code_aster; zero at points without solid cell.
+    With `sides` the average is over the cells of one material, (n_places, n_components) in their order.
     """
-    average = NodalAverage(mesh.n_points, next(iter(at_points.values())).shape[2])
+    cells, count = (mesh.cells, mesh.n_points) if sides is None else (sides.cells, len(sides.node))
+    average = NodalAverage(count, next(iter(at_points.values())).shape[2])
     for name, values in at_points.items():
-        average.add(mesh.cells[name], elements.get(name).extrapolation, values)
+        average.add(cells[name], elements.get(name).extrapolation, values)
     return average.result()
 
 

@@ -126,11 +126,13 @@ def stiffness(
     isotropic = is_isotropic(moduli)
     for name, block in mesh.solids.items():
         split = dilatation.split(name, moduli, averaged)
-        add = _Addition(mesh, name, kinematics == "axisymmetric", material[name], pattern, data)
-        bends = incompatible_modes.asked(name, averaged)
-        add_part = partial(add.part, moduli=moduli, isotropic=isotropic, split=split, bends=bends)
-        parts_done = parallel.shared(add_part, range(add.n_parts))
-        bad = min((number for number in parts_done if number >= 0), default=-1)
+        of_element = moduli, isotropic, split, incompatible_modes.asked(name, averaged)
+        add_part = partial(
+            _add_part, mesh=mesh, name=name, material=material[name], moduli=of_element,
+            axisymmetric=kinematics == "axisymmetric", pattern=pattern, data=data,
+        )  # fmt: skip
+        bad_cells = parallel.shared(add_part, range(len(pattern.owners(mesh, name).cells)))
+        bad = min((number for number in bad_cells if number >= 0), default=-1)
         if bad >= 0:
             where = mesh.points[block[bad]].mean(axis=0)
             raise MeshError(
@@ -176,48 +178,37 @@ def _passes(
         yield (N, dN, weights), np.ascontiguousarray(material[:, q])
 
 
-class _Addition:
-    """The cells of one element, whose stiffness threads add to `data` (n_blocks, dim, dim)."""
+def _add_part(
+    number: int, mesh: Mesh, name: str, material: Numbers, moduli: tuple[Array, Mask, dilatation.Split | None, Mask | None],
+    axisymmetric: bool, pattern: Sparsity, data: Array,
+) -> int:  # fmt: skip
+    """Add the rows of a part of the cells of one element to `data` (n_blocks, dim, dim).
 
-    def __init__(
-        self, mesh: Mesh, name: str, axisymmetric: bool, material: Numbers, pattern: Sparsity, data: Array
-    ) -> None:
-        self._points, self._cells, self._material = mesh.points, mesh.cells[name], material
-        self._name, self._tables, self._axisymmetric = name, elements.get(name).tables, axisymmetric
-        self._owner, self._parts = pattern.owners(mesh, name)
-        self._slots, self._data = pattern.slots[name], data
-
-    @property
-    def n_parts(self) -> int:
-        """How many threads share the cells."""
-        return len(self._parts)
-
-    def part(
-        self, number: int, moduli: Array, isotropic: dilatation.Mask, split: dilatation.Split | None,
-        bends: Mask | None,
-    ) -> int:  # fmt: skip
-        """Add the rows of a part; return the number of the first cell with a Jacobian that is not positive, or -1."""
-        rows = slice(*self._parts[number])
-        cells, material, slots = self._cells[rows], self._material[rows], self._slots[rows]
-        target = self._axisymmetric, slots, self._owner, number, self._data
-        for tables, numbers in _passes(self._tables, material):
-            bad = element_kernels.loops(self._points.shape[1]).add_stiffness(
-                self._points, cells, *tables, moduli if split is None else split.moduli, isotropic, numbers, *target
-            )
-            if bad >= 0:
-                return int(bad) + rows.start
-        if bends is not None:
-            incompatible_modes_kernels.subtract_stiffness(
-                self._points, cells, *incompatible_modes.tables(self._name), moduli, bends,
-                material.reshape(len(cells), -1), slots, self._owner, number, self._data,
-            )  # fmt: skip
-        if split is not None:
-            material = of_cells(material)
-            polynomials = dilatation.basis(self._name, elements.get(self._name).quadrature[0])
-            dilatation_kernels.add_stiffness(
-                self._points, cells, *self._tables, polynomials, split.bulk, material, *target
-            )
-        return -1
+    `moduli` are these, which of them are isotropic, their split, and which have incompatible modes. Returns the number of
+    the first cell with a Jacobian that is not positive, or -1.
+    """
+    (D, isotropic, split, bends), tables = moduli, elements.get(name).tables
+    owner, parts = pattern.owners(mesh, name)
+    rows = slice(*parts[number])
+    cells, material, slots = mesh.cells[name][rows], material[rows], pattern.slots[name][rows]
+    target = axisymmetric, slots, owner, number, data
+    for tables_of_pass, numbers in _passes(tables, material):
+        bad = element_kernels.loops(mesh.dim).add_stiffness(
+            mesh.points, cells, *tables_of_pass, D if split is None else split.moduli, isotropic, numbers, *target
+        )
+        if bad >= 0:
+            return int(bad) + rows.start
+    if bends is not None:
+        incompatible_modes_kernels.subtract_stiffness(
+            mesh.points, cells, *incompatible_modes.tables(name), D, bends, material.reshape(len(cells), -1), slots, owner,
+            number, data,
+        )  # fmt: skip
+    if split is not None:
+        polynomials = dilatation.basis(name, elements.get(name).quadrature[0])
+        dilatation_kernels.add_stiffness(
+            mesh.points, cells, *tables, polynomials, split.bulk, of_cells(material), *target
+        )
+    return -1
 
 
 def owners(cells: Numbers, n_points: int) -> Owners:

@@ -164,13 +164,7 @@ class Varying:
         if len(given) == mesh.n_points and not column:
             self._nodal = given.astype(float)
             return
-        blocks, first = {}, 0
-        for name, block in mesh.solids.items():
-            blocks[name] = np.full(len(block), np.nan)
-            rows = np.arange(len(block)) if len(given) != cells.count else cells.rows.get(name, np.empty(0, np.intp))
-            blocks[name][rows] = given[first : first + len(rows)]
-            first += len(rows)
-        self._by_cell = blocks
+        self._by_cell = _by_cell(given, cells)
 
     @property
     def inside(self) -> bool:
@@ -207,26 +201,30 @@ class CellAxes(Varying):
 
     def _place(self, given: Array, cells: Cells) -> None:
         """Find out from its length whether an array has axes for the cells of the material or of the mesh."""
-        solids = cells.mesh.solids
-        total = sum(map(len, solids.values()))
+        total = sum(map(len, cells.mesh.solids.values()))
         if len(given) not in (cells.count, total):
             raise ModelError(
                 f"the axes of a material are {len(given)}: they must be as many as its cells, {cells.count}, or those of the "
                 f"mesh, {total}"
             )
-        found, first = {}, 0
-        for name, block in solids.items():
-            found[name] = np.zeros((len(block), 3, 3))
-            rows = np.arange(len(block)) if len(given) != cells.count else cells.rows.get(name, np.empty(0, np.intp))
-            found[name][rows] = given[first : first + len(rows)]
-            first += len(rows)
-        self._by_cell = found
+        self._by_cell = _by_cell(given, cells)
 
     def at(self, name: str, rows: Indices, N: Array) -> Array:
         """Return the axes (n_rows * n, 3, 3) [-] at points of cells, see `Varying.at`."""
         if self._by_cell is None:
             raise ModelError("axes by cell are known in the material of a model only")
         return np.repeat(self._by_cell[name][rows], len(N), axis=0)
+
+
+def _by_cell(given: Array, cells: Cells) -> dict[str, Array]:
+    """Return by element the values (n_cells, ...) that are `given` for `cells` or for all solid cells; NaN elsewhere."""
+    blocks, first = {}, 0
+    for name, block in cells.mesh.solids.items():
+        blocks[name] = np.full((len(block), *given.shape[1:]), np.nan)
+        rows = np.arange(len(block)) if len(given) != cells.count else cells.rows.get(name, np.empty(0, np.intp))
+        blocks[name][rows] = given[first : first + len(rows)]
+        first += len(rows)
+    return blocks
 
 
 def positions(mesh: Mesh, nodes: Numbers, N: Array) -> Array:

@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Facets that nodes lie close to without belonging to them, found with a tree of boxes."""
+"""Facets that nodes lie close to without belonging to them, by a tree of boxes."""
 
 import numpy as np
 
@@ -8,8 +8,8 @@ from fastcontact.contact.search.box_tree_kernels import DEPTH, square_to_box
 
 
 @kernel
-def facing_facets(points, nodes, outward, facets, centre, normal, reach, tree, order, found):
-    """Fill `found` (m, k) with the facets that each of `nodes` (m,) faces at a distance below their `reach`, -1 for none.
+def facing_facets(points, nodes, outward, facets, centre, normal, reach, tree, order, facing):
+    """Fill `facing` (m, k) with the facets that each of `nodes` (m,) faces at a distance below their `reach`, -1 for none.
 
     A node faces a facet (n, n_nodes; -1 for no node) that it does not belong to, in whose box it lies, and whose `normal`
     (n, dim) is at more than 120 degrees to that of the node, `outward` (n_points, dim). Distances are those from the plane
@@ -20,7 +20,7 @@ def facing_facets(points, nodes, outward, facets, centre, normal, reach, tree, o
         node, count, top = nodes[i], 0, 1
         point = points[node]
         stack[0] = 1
-        while top > 0 and count < found.shape[1]:
+        while top > 0 and count < facing.shape[1]:
             top -= 1
             box = stack[top]
             if square_to_box(tree, box, point) > 0.0:
@@ -40,5 +40,5 @@ def facing_facets(points, nodes, outward, facets, centre, normal, reach, tree, o
             for a in range(facets.shape[1]):
                 is_corner = is_corner or facets[f, a] == node
             if not is_corner:
-                found[i, count] = f
+                facing[i, count] = f
                 count += 1

@@ -75,8 +75,8 @@ class ModelInitialStates(ModelLoads):
             temperatures = histories(names, checked, reference, times)
         else:
             temperatures = [Temperature(names, checked, reference, table_of(ramp, "the ramp of the temperature"))]
-        for own in temperatures:
-            own.check(self.mesh)
+        for temperature in temperatures:
+            temperature.check(self.mesh)
         self.temperatures += temperatures
 
     @typed(ModelError)
@@ -264,15 +264,16 @@ class ModelInitialStates(ModelLoads):
         if not self.temperatures:
             return by_ramp
         field = self.material_field()
-        for own in self.temperatures:
-            rise = own.rise(self.mesh)
+        for temperature in self.temperatures:
+            rise = temperature.rise(self.mesh)
             missing = field.without_expansion(self.mesh, rise)
             if missing:
                 raise ModelError(
-                    f"{own.name} acts on {missing} solid cells whose material has no coefficient of thermal expansion: give "
-                    "it expansion=..., 0.0 if it does not expand"
+                    f"{temperature.name} acts on {missing} solid cells whose material has no coefficient of thermal "
+                    "expansion: give it expansion=..., 0.0 if it does not expand"
                 )
-            by_ramp[own.ramp] = by_ramp.get(own.ramp, 0.0) + self._forces_of(field, field.offset(rise))
+            forces = self._forces_of(field, field.offset(rise))
+            by_ramp[temperature.ramp] = by_ramp.get(temperature.ramp, 0.0) + forces
         return by_ramp
 
     @typed(ModelError)
