@@ -256,7 +256,7 @@ def solid_rows(mesh: Mesh, groups: Sequence[str] | None) -> dict[str, Indices]:
 
 
 def solid_points(mesh: Mesh, groups: Sequence[str] | None) -> Indices:
-    """Return the points of the solid cells of groups, or of all, ascending."""
+    """Return the points (n,) of int of the solid cells of groups, or of all, ascending."""
     return np.unique(
         np.concatenate([mesh.cells[name][rows].ravel() for name, rows in solid_rows(mesh, groups).items()])
     )

@@ -183,7 +183,7 @@ def _facets(mesh: Mesh) -> tuple[Mapping[str, Numbers], Numbers, Mapping[str, Nu
 
 
 def same_facets(among: Numbers, facets: Numbers) -> Indices:
-    """Return for each of `facets` (n, k) the row (n,) of the one `among` others (m, k) with the same nodes, -1 for none."""
+    """Return for each of `facets` (n, k) the row (n,) in `among` (m, k) of the one with the same nodes, -1 for none."""
     near = np.flatnonzero(np.isin(among, facets).all(axis=1))
     keys = np.sort(np.vstack([among[near], facets]), axis=1)
     _, first, index = np.unique(keys, axis=0, return_index=True, return_inverse=True)
