@@ -40,7 +40,8 @@ class CommittedFile(DriverFile):
 
     After an error nothing is written: the file stays as the last good write has left it. Nor is anything written once `ours`
     is False, because another program has written to the file. `end` is where the contents end; the file may take more room.
-    While `synchronised` is True, what is flushed is on the disk, whole or not at all.
+    While `synchronised` is True, what is flushed is on the disk, whole or not at all up to `journal.LARGEST` bytes of changes;
+    beyond, in several turns, each of which is.
     """
 
     def __init__(self, path: Path) -> None:
@@ -123,12 +124,13 @@ class CommittedFile(DriverFile):
         changes = [change for write in waiting[n_new:] if (change := self._changed(*write))[1]]
         for offset, data in new:
             self._put(offset, data)
-        if self.synchronised:
-            self._synchronise(new, changes)
-        for offset, data in changes:
-            self._put(offset, data)
-        if self.synchronised:
-            os.fsync(self.fileno())
+        for turn in journal.turns(changes) if self.synchronised else [changes]:
+            if self.synchronised:
+                self._synchronise(new, turn)
+            for offset, data in turn:
+                self._put(offset, data)
+            if self.synchronised:
+                os.fsync(self.fileno())
         self._head = self._read_head()
         for offset, data in waiting:
             self._note(offset, offset + len(data))

@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 import io
 import struct
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import IO, Any
 
 from fastcontact.errors import FileError
@@ -21,8 +21,8 @@ MAGIC = b"fastcontact journal\n"
 FOOTER = struct.Struct(f"<Q32s{len(MAGIC)}s")  # length and SHA-256 of the writes
 HEADER = struct.Struct("<QQ?")  # place and length of one; whether its checksum stands for it
 DIGEST = hashlib.sha256().digest_size
-# Bytes of a journal, which holds what changes in place: restart data, at most some hundred bytes an unknown.
-LARGEST = 1 << 31
+# Bytes of changes in a journal: more are made in several turns, so that whoever replays one has it in memory.
+LARGEST = 1 << 28
 PIECE = 1 << 20
 
 
@@ -35,6 +35,20 @@ def packed(new: Sequence[Write], changes: Sequence[Write]) -> bytes:
         ]
     )
     return body + FOOTER.pack(len(body), hashlib.sha256(body).digest(), MAGIC)
+
+
+def turns(changes: Iterable[Write]) -> Iterator[list[Write]]:
+    """Yield changes in their order, at most LARGEST bytes in a turn, longer ones in pieces; the last turn may be empty."""
+    turn, size = [], 0  # type: tuple[list[Write], int]
+    for offset, data in changes:
+        for start in range(0, len(data), LARGEST):
+            piece = data[start : start + LARGEST]
+            if size + len(piece) > LARGEST:
+                yield turn
+                turn, size = [], 0
+            turn.append((offset + start, piece))
+            size += len(piece)
+    yield turn
 
 
 def found(file: IO[bytes]) -> list[Write]:
@@ -50,41 +64,34 @@ def found(file: IO[bytes]) -> list[Write]:
     if magic != MAGIC or length > size - FOOTER.size:
         return []
     end = size - FOOTER.size - length  # of what was there before
-    if length > LARGEST:
+    if length > 2 * LARGEST:  # changes, where they stand, and checksums of new data
         raise _forged(file, f"declares {length:.3g} bytes")
-    if _digest(file, end, length) != digest:
+    file.seek(end)
+    body = file.read(length)
+    if hashlib.sha256(body).digest() != digest:
         return []
-    records = _records(file, end, end + length)
-    if sum(count for _, count, is_new, _ in records if is_new) > end:
+    records = list(_records(file, body))
+    new = [(offset, count, kept) for offset, count, is_new, kept in records if is_new]
+    if sum(count for _, count, _ in new) > end:
         raise _forged(file, "counts data twice")
-    changes = []
-    for offset, count, is_new, data in records:
-        if count and offset + count > end:
-            raise _forged(file, "leads beyond the contents")
-        file.seek(data)
-        kept = file.read(DIGEST if is_new else count)
-        if not is_new:
-            changes.append((offset, kept))
-        elif _digest(file, offset, count) != kept:
-            return []
-    return changes
+    if any(count and offset + count > end for offset, count, _, _ in records):
+        raise _forged(file, "leads beyond the contents")
+    if any(_digest(file, offset, count) != kept for offset, count, kept in new):
+        return []
+    return [(offset, data) for offset, _, is_new, data in records if not is_new]
 
 
-def _records(file: IO[bytes], offset: int, end: int) -> list[tuple[int, int, bool, int]]:
-    """Return place, length and kind of each write of a journal, and where its data or checksum stand."""
-    records = []
-    while offset < end:
-        file.seek(offset)
-        head = file.read(min(HEADER.size, end - offset))
-        if len(head) < HEADER.size:
+def _records(file: IO[bytes], body: bytes) -> Iterator[tuple[int, int, bool, bytes]]:
+    """Yield place, length and kind of each write of a journal, and its data or its checksum."""
+    at = 0
+    while at < len(body):
+        if at + HEADER.size > len(body):
             raise _forged(file, "is cut off")
-        at, count, is_new = HEADER.unpack(head)
-        offset += HEADER.size
-        records.append((at, count, is_new, offset))
-        offset += DIGEST if is_new else count
-    if offset > end:
-        raise _forged(file, "is cut off")
-    return records
+        offset, count, is_new = HEADER.unpack_from(body, at)
+        begin, at = at + HEADER.size, at + HEADER.size + (DIGEST if is_new else count)
+        if at > len(body):
+            raise _forged(file, "is cut off")
+        yield offset, count, is_new, body[begin:at]
 
 
 def _digest(file: IO[bytes], offset: int, count: int) -> bytes:

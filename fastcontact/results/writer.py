@@ -28,7 +28,7 @@ from fastcontact.mesh.files.hdf5_driver import new_hdf5
 from fastcontact.mesh.files.packing import packed
 from fastcontact.mesh.files.paths import PathLike, checked_target, replacing
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results import layout, write_arrays
+from fastcontact.results import journal, layout, write_arrays
 from fastcontact.results.background import Background
 from fastcontact.results.committed_file import CommittedFile, uninterrupted
 from fastcontact.results.file_lock import PathLock, left_at, reserve
@@ -225,12 +225,16 @@ class ResultWriter:
             restart = packed({"step": self.n_steps, "restart": step.restart})
             room = write_arrays.step_size(self._mesh, step) + restart.nbytes
             self._reserve(2 * room if self._committed.synchronised else room)
+            # The parts of a step are flushed in the order in which they count, unless one journal holds them all.
+            in_parts = not self._committed.synchronised or room > journal.LARGEST
             write_arrays.append_fields(self._file, self._mesh, self.n_steps, step, self._cell_fields)
             write_arrays.append_tables(self._file, self._mesh, self.n_steps, step, self._pairs, self._notes)
             write_arrays.set_restart(self._file, self.n_steps, restart)
-            self._flush_part()
+            if in_parts:
+                self._flush()
             write_arrays.append_rows(self._file, self._mesh, self.n_steps, step, self._cell_fields)
-            self._flush_part()
+            if in_parts:
+                self._flush()
             self._file["VTKHDF/Steps"].attrs.modify("NSteps", np.int64(self.n_steps + 1))
             self._flush()
             self.n_steps += 1
@@ -349,11 +353,6 @@ class ResultWriter:
     def _flush(self) -> None:
         self._file.flush()
         self._committed.check()
-
-    def _flush_part(self) -> None:
-        """Flush a part of a step, in the order in which its parts count; synchronised, a step is one part."""
-        if not self._committed.synchronised:
-            self._flush()
 
     def _is_synchronised(self) -> bool:
         if self._synchronise is None:

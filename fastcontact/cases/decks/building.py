@@ -253,7 +253,8 @@ class Building:
             alike.setdefault((acting, conditions.supports.table(name)), []).append(name)
         for (acting, table), names in alike.items():
             ends = "" if acting.ends == np.inf else f" to {acting.ends:g}"
-            label = f"the support of {conditions.named(names[0])}, line {acting.location.line}, from {acting.begins:g}{ends}"
+            line = f", line {acting.location.line}" if acting.location else ""
+            label = f"the support of {conditions.named(names[0])}{line}, from {acting.begins:g}{ends}"
             rows = csr_array(vstack([self._support_row(conditions, name) for name in names]))
             self._relate_support(
                 TemporaryConstraint(label, rows, 1.0, table, acting.begins, acting.ends, keeps=acting.keeps)
@@ -297,6 +298,7 @@ class Building:
                 self.model.add_pressure(group, 1.0, ramp=table)
 
     def _body_forces(self, conditions: Conditions) -> None:
+        forces: dict[str, tuple[Table, dict[str, Any]]] = {}
         for number, name in enumerate(conditions.loads.tracks, start=1):
             if name.face is not None:
                 continue
@@ -307,9 +309,10 @@ class Building:
                     by_density.setdefault(self._density(element, name, track.location), []).append(element)
             for density, members in by_density.items():
                 group = self.found.add_solids(f"load {number} of density {density:g}", members)
-                self._name_solids(group)
-                values = _body_force(name, density, self.found.dim)
-                self.model.add_body_force(group, ramp=conditions.loads.table(name), **values)
+                forces[group] = conditions.loads.table(name), _body_force(name, density, self.found.dim)
+        self._name_solids(forces)
+        for group, (table, values) in forces.items():
+            self.model.add_body_force(group, ramp=table, **values)
 
     def _density(self, element: Element, name: Distributed, location: Location) -> float:
         if name.kind[0] == "B":
@@ -319,11 +322,14 @@ class Building:
             raise location.refuse(f"material '{material.name}' has no *DENSITY, so {name.kind} is no force")
         return material.density
 
-    def _name_solids(self, group: str) -> None:
-        """Add a group of solids to the mesh that is made already; elements begin the numbers of cells."""
+    def _name_solids(self, groups: Iterable[str]) -> None:
+        """Add groups of solids to the mesh that is made already; elements begin the numbers of cells."""
         offsets = self.model.mesh.offsets
-        numbers = [offsets[name] + row for name, rows in self.found.groups[group].items() for row in rows]
-        self.model.mesh = self.model.mesh.with_groups(cells={group: numbers})
+        numbers = {
+            group: [offsets[name] + row for name, rows in self.found.groups[group].items() for row in rows]
+            for group in groups
+        }
+        self.model.mesh = self.model.mesh.with_groups(cells=numbers)
 
     def _springs(self) -> None:
         for name, (location, stiffness) in self.content.springs.items():

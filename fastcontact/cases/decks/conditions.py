@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +10,7 @@ from fastcontact.cases.decks.assembled import Element, Face
 from fastcontact.cases.decks.blocks import Location, Row
 from fastcontact.cases.decks.content import Given
 from fastcontact.cases.decks.heat import OF_HEAT, HeatConditions
-from fastcontact.cases.decks.histories import Histories
+from fastcontact.cases.decks.histories import Histories, Values
 from fastcontact.cases.decks.local_axes import local_directions
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.cases.decks.pretension import Locks
@@ -37,9 +36,9 @@ class Distributed:
 
 @dataclass(frozen=True, slots=True)
 class Acting:
-    """When a support acts, as load factors, and whether it keeps what it finds; its place where it begins."""
+    """When a support acts, as load factors, whether it keeps what it finds, and where it is given if not from the start."""
 
-    location: Location
+    location: Location | None
     begins: float
     ends: float = np.inf
     keeps: bool = False
@@ -104,13 +103,15 @@ class Conditions:
         self._act(changing, number - 1.0)
         self.keeping.clear()
 
-    def _act(self, names: Mapping[Component, tuple[float, str, Location]], begin: float) -> None:
+    def _act(self, values: Values[Component], begin: float) -> None:
         """Let supports act from the beginning of a step on, where they do not yet."""
-        begun: dict[tuple[Location, bool], Acting] = {}
-        for name, (_, _, location) in names.items():
+        begun: dict[tuple[Location | None, bool], Acting] = {}
+        for name in values:
             if name not in self.acting:
-                key = location, name in self.keeping
-                self.acting[name] = begun.setdefault(key, Acting(location, begin, keeps=key[1]))
+                key = values.get(name)[2] if begin else None, name in self.keeping
+                if key not in begun:
+                    begun[key] = Acting(key[0], begin, keeps=key[1])
+                self.acting[name] = begun[key]
 
     def temporary(self) -> list[tuple[Component, Acting]]:
         """Return the supports that do not act in all steps, each with when it does."""
@@ -131,6 +132,7 @@ class Conditions:
         if given.new:
             self.supports.forget()
             self.heat.temperatures.forget()
+        driven = False
         for row in block.each():
             if row.text(1) == "11":
                 self.heat.prescribe(given, row)
@@ -144,12 +146,13 @@ class Conditions:
             value = 0.0 if named else row.number(3, 0.0)
             if not 1 <= first <= last <= 6:
                 raise row.location.refuse(f"components {row.text(1)} to {row.text(2)} are not within 1 to 6")
-            if before and value:
-                self.made.content.note(row.location, "a displacement before the first step is reached in that step")
+            driven = driven or bool(before and value)
             components = named or tuple(range(first, last + 1))
             for point in points:
                 for component in components:
                     self._support(given, row, point, component, value)
+        if driven:
+            self.made.content.note(block.location, "a displacement before the first step is reached in that step")
 
     def _support(self, given: Given, row: Row, point: int, component: int, value: float) -> None:
         name = self._component(point, component)

@@ -213,7 +213,7 @@ class HeatConditions:
         history = by.get(keyword, self.fluxes)
         if given.new:
             history.forget(lambda name: getattr(name, "keyword", keyword) == keyword)
-        for row in given.block.rows:
+        for row in given.block.each():
             if keyword == "CFLUX":
                 if row.whole(1, TEMPERATURE) not in (0, TEMPERATURE):
                     raise row.location.refuse(f"component {row.text(1)} is not 11, that of heat")
@@ -248,9 +248,9 @@ class HeatConditions:
         """Go on to the end of step `number`, from 1."""
         for history, what in ((self.temperatures, "a temperature"), (self.films, "a film")):
             given: Histories[Any] = history  # type: ignore[assignment]
-            for name, (_, _, location) in given.changing.items():
+            for name in given.changing:
                 if self.begun and name not in given.tracks:
-                    raise location.refuse(
+                    raise given.changing.get(name)[2].refuse(
                         f"{what} that comes in a later step is not supported: give it from the first one on"
                     )
             for name in given.dying:

@@ -59,6 +59,53 @@ class Track:
 
 
 @dataclass
+class Values(Generic[Name]):
+    """Values of a step by what they are given for: their rows in columns of values, line numbers, and lines they stand below.
+
+    Every node may have a value of its own, and an object for each would take several times the line that gives it.
+    """
+
+    rows: dict[Name, int] = field(default_factory=dict)
+    values: array[float] = field(default_factory=lambda: array("d"))
+    lines: array[int] = field(default_factory=lambda: array("q"))
+    origins: array[int] = field(default_factory=lambda: array("q"))
+    blocks: list[tuple[str, Location]] = field(default_factory=list)  # amplitude, and a line of the block
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.rows
+
+    def __iter__(self) -> Iterator[Name]:
+        return iter(self.rows)
+
+    def put(self, name: Name, value: float, amplitude: str, location: Location) -> None:
+        """Take a value; the last one for a name counts."""
+        block = self.blocks[-1] if self.blocks else None
+        if block is None or (amplitude, location.file, location.keyword) != (block[0], block[1].file, block[1].keyword):
+            self.blocks.append((amplitude, location))
+        self.rows[name] = len(self.values)
+        self.values.append(value)
+        self.lines.append(location.line)
+        self.origins.append(len(self.blocks) - 1)
+
+    def get(self, name: Name) -> tuple[float, str, Location]:
+        """Return the value for a name, its amplitude and its place."""
+        row = self.rows[name]
+        amplitude, location = self.blocks[self.origins[row]]
+        return self.values[row], amplitude, replace(location, line=self.lines[row])
+
+    def update(self, other: Values[Name]) -> None:
+        """Take all values of others."""
+        for name in other:
+            self.put(name, *other.get(name))
+
+    def columns(self) -> tuple[Array, list[str]]:
+        """Return values (n,) and amplitudes of all names."""
+        rows = np.fromiter(self.rows.values(), int, len(self.rows))
+        origins = np.asarray(self.origins, int)[rows]
+        return np.asarray(self.values, float)[rows], [self.blocks[origin][0] for origin in origins.tolist()]
+
+
+@dataclass
 class Histories(Generic[Name]):
     """Histories by what they act on.
 
@@ -70,27 +117,29 @@ class Histories(Generic[Name]):
 
     content: Content
     tracks: dict[Name, Track] = field(default_factory=dict)
-    changing: dict[Name, tuple[float, str, Location]] = field(default_factory=dict)
+    changing: Values[Name] = field(default_factory=Values)
     dying: dict[Name, None] = field(default_factory=dict)
     rest: Mapping[Name, float] = field(default_factory=dict)
-    first: dict[Name, tuple[float, str, Location]] = field(default_factory=dict)
+    first: Values[Name] = field(default_factory=Values)
     time: float = 0.0
     lasting: dict[int, Track] = field(default_factory=dict)
 
     def give(self, name: Name, value: float, amplitude: str, location: Location) -> None:
         """Give a value for the current step; CaseError if the step has another one for the same."""
-        if name in self.changing and self.changing[name][:2] != (value, amplitude):
-            raise location.refuse(
-                f"{value:g} is the second value here in one step, after {self.changing[name][0]:g} in line "
-                f"{self.changing[name][2].line}: programs differ in what that means, so give it once"
-            )
-        self.changing[name] = (value, amplitude, location)
+        if name in self.changing:
+            first, other, before = self.changing.get(name)
+            if (first, other) != (value, amplitude):
+                raise location.refuse(
+                    f"{value:g} is the second value here in one step, after {first:g} in line {before.line}: programs "
+                    "differ in what that means, so give it once"
+                )
+        self.changing.put(name, value, amplitude, location)
         self.dying.pop(name, None)
 
     def hold(self, name: Name, location: Location) -> None:
         """Keep the value that the last step ended with."""
         if name in self.tracks:
-            self.changing[name] = (self.tracks[name].last, "", location)
+            self.changing.put(name, self.tracks[name].last, "", location)
             self.dying.pop(name, None)
 
     def begin(self) -> None:
@@ -99,14 +148,13 @@ class Histories(Generic[Name]):
         for name in self.changing:
             alike.setdefault(self.rest.get(name, 0.0), []).append(name)
         for value, names in alike.items():
-            self.tracks.update(
-                dict.fromkeys(names, Track(array("d", (0.0, value)), self.changing[names[0]][2], len(names)))
-            )
-        self.first, self.changing = self.changing, {}
+            track = Track(array("d", (0.0, value)), self.changing.get(names[0])[2], len(names))
+            self.tracks.update((name, track) for name in names)
+        self.first, self.changing = self.changing, Values()
 
     def forget(self, which: Callable[[Name], bool] = lambda name: True) -> None:
         """Drop what earlier steps gave."""
-        self.first = {}
+        self.first = Values()
         for name, track in self.tracks.items():
             if track.alive and name not in self.changing and which(name):
                 self.dying[name] = None
@@ -115,19 +163,21 @@ class Histories(Generic[Name]):
         """Go on to the end of step `number`, from 1."""
         begin, start = float(number - 1), self.time
         self.time += step.period
-        given = {**self.first, **self.changing}
-        alike: dict[tuple[int, float, str, float, bool], list[Name]] = {}
-        for name, (value, amplitude, _) in given.items():
-            key = (id(self.tracks.get(name)), value, amplitude, self.rest.get(name, 0.0), True)
-            alike.setdefault(key, []).append(name)
-        for name in self.dying:
-            rest = self.rest.get(name, 0.0)
-            alike.setdefault((id(self.tracks[name]), rest, "", rest, False), []).append(name)
+        given = self.first if self.first.rows else self.changing
+        if given is self.first:
+            given.update(self.changing)
+        names = [*given, *self.dying]
+        rests = np.array([self.rest.get(name, 0.0) for name in names])
+        values, amplitudes = given.columns()
+        alive = np.arange(len(names)) < len(values)
+        values, amplitudes = np.append(values, rests[len(values) :]), [*amplitudes, *[""] * len(self.dying)]
+        shared = np.array([id(self.tracks.get(name)) for name in names])
         changed = set()
-        for (_, value, amplitude, rest, alive), names in alike.items():
-            track = self._track(names, rest, given.get(names[0]))
+        for rows in _equal(shared, values, amplitudes, rests, alive):
+            value, amplitude = float(values[rows[0]]), amplitudes[rows[0]]
+            track = self._track([names[row] for row in rows], float(rests[rows[0]]), given)
             changed.add(id(track))
-            track.alive = alive
+            track.alive = bool(alive[rows[0]])
             self.lasting.pop(id(track), None)
             track.add([(begin, track.last)])
             if amplitude:
@@ -140,20 +190,19 @@ class Histories(Generic[Name]):
         for number_of_track, track in self.lasting.items():
             if number_of_track not in changed and track.shape is not None:
                 track.add(_shaped(*track.shape, begin, start, step.period))
-        self.changing, self.first, self.dying = {}, {}, {}
+        self.changing, self.first, self.dying = Values(), Values(), {}
 
-    def _track(self, names: list[Name], rest: float, given: tuple[float, str, Location] | None) -> Track:
+    def _track(self, names: list[Name], rest: float, given: Values[Name]) -> Track:
         """Return the track that these names alone have: theirs, a new one, or one apart from others that had the same."""
         track = self.tracks.get(names[0])
         if track is not None and track.size == len(names):
             return track
         if track is None:
-            assert given is not None
-            track = Track(array("d", (0.0, rest)), given[2], len(names))
+            track = Track(array("d", (0.0, rest)), given.get(names[0])[2], len(names))
         else:
             track.size -= len(names)
             track = replace(track, numbers=track.numbers[:], size=len(names))
-        self.tracks.update(dict.fromkeys(names, track))
+        self.tracks.update((name, track) for name in names)
         return track
 
     def distinct(self) -> list[Track]:
@@ -172,6 +221,18 @@ class Histories(Generic[Name]):
             members.setdefault(track.numbers.tobytes(), []).append(name)
         for names in members.values():
             yield self.table(names[0]), names
+
+
+def _equal(*columns: Sequence[Any]) -> Iterator[list[int]]:
+    """Yield the rows in which columns (n,) have the same entries, in the order of the first ones."""
+    order = np.lexsort(columns)
+    differs = np.zeros(max(len(order) - 1, 0), bool)
+    for column in columns:
+        ascending = np.asarray(column)[order]
+        differs |= ascending[1:] != ascending[:-1]
+    bounds = np.array([0, *(np.flatnonzero(differs) + 1), len(order)])[len(order) == 0 :]
+    for group in np.argsort(order[bounds[:-1]]):
+        yield order[bounds[group] : bounds[group + 1]].tolist()
 
 
 def shape_of(table: Table) -> tuple[float, Table]:

@@ -53,8 +53,15 @@ class Disk:
 
 
 @pytest.fixture
-def recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[list[tuple[str, object]], Path]:
+def largest() -> int:
+    """Bytes of changes in one journal."""
+    return journal.LARGEST
+
+
+@pytest.fixture
+def recorded(largest: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[list[tuple[str, object]], Path]:
     """All that was done to a file that takes twelve steps, each on the disk when its writing ends; and the begun file."""
+    monkeypatch.setattr(journal, "LARGEST", largest)
     events: list[tuple[str, object]] = []
     path, begun = tmp_path / "run.vtkhdf", tmp_path / "begun.vtkhdf"
     real = committed_file.CommittedFile
@@ -92,8 +99,20 @@ def recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[list[tupl
     return events, begun
 
 
-@pytest.mark.parametrize("repeats", [1, pytest.param(3, marks=pytest.mark.slow)])
-def test_a_loss_of_power_costs_no_step(recorded, repeats, tmp_path: Path) -> None:
+SHARES = (0.0, 0.5, 0.95, 1.0)  # of what was written since the disk was synchronised
+
+
+@pytest.mark.parametrize(
+    ("largest", "shares"),
+    [
+        (journal.LARGEST, SHARES),
+        (2100, (0.5,)),
+        pytest.param(journal.LARGEST, 3 * SHARES, marks=pytest.mark.slow),
+        pytest.param(2100, SHARES, marks=pytest.mark.slow),
+    ],
+)
+def test_a_loss_of_power_costs_no_step(recorded, largest, shares, tmp_path: Path) -> None:
+    """Nor where a step changes more than fits into a journal, which is then written in several turns."""
     events, begun = recorded
     random = np.random.default_rng(1)
     disk, steps, tried, repeated = Disk(bytearray(begun.read_bytes())), 0, 0, 0
@@ -106,7 +125,7 @@ def test_a_loss_of_power_costs_no_step(recorded, repeats, tmp_path: Path) -> Non
         elif kind == "step":
             steps = what
         else:
-            for share in (0.0, 0.5, 0.95, 1.0) * repeats:
+            for share in shares:
                 kept = random.random(len(disk.pieces())) < share
                 crashed.write_bytes(disk.state(kept, int(random.choice([len(disk.safe), *disk.sizes]))))
                 tried += 1
@@ -117,8 +136,8 @@ def test_a_loss_of_power_costs_no_step(recorded, repeats, tmp_path: Path) -> Non
                     for number in {0, len(results) // 2, len(results) - 1} if len(results) else ():
                         assert_same(results[number], nth_step(number), f"step {number} of {len(results)}")
             disk.synchronise()
-    assert tried > 80 * repeats
-    assert repeated > 16 * repeats
+    assert tried > 20 * len(shares)
+    assert repeated > 4 * len(shares)
 
 
 def test_a_run_goes_on_after_a_loss_of_power(recorded, tmp_path: Path) -> None:
@@ -158,3 +177,10 @@ def test_a_journal_counts_whole_or_not_at_all(tmp_path: Path, damage: str) -> No
     path.write_bytes(data + {"cut": log[:-1], "changed": log[:3] + b"x" + log[4:]}.get(damage, log))
     with open(path, "rb") as file:
         assert journal.found(file) == (writes if damage == "none" else [])
+
+
+def test_changes_beyond_a_journal_are_made_in_turns(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(journal, "LARGEST", 4)
+    turns = list(journal.turns([(0, b"ab"), (7, b"c"), (10, b"0123456789"), (30, b"xy")]))
+    assert turns == [[(0, b"ab"), (7, b"c")], [(10, b"0123")], [(14, b"4567")], [(18, b"89"), (30, b"xy")]]
+    assert list(journal.turns([])) == [[]]
