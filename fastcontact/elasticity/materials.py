@@ -255,7 +255,12 @@ class Material:
 
     def _frames(self, points: Array, kinematics: str, constants: Any) -> Array:
         """Return the axes (n, 3, 3) at `points` (n, dim), those of cells from `constants` [-]."""
-        return frames(constants.axes if constants and varying(self.axes) else self.axes, points, kinematics)
+        axes = constants.axes if constants and varying(self.axes) else self.axes
+        if varying(axes):
+            raise ModelError(
+                "axes by cell are known where cells are: give the `constants_at` of the material of a model"
+            )
+        return frames(axes, points, kinematics)
 
     def _compliance6(self, points: Array, kinematics: str, constants: Any) -> Array:
         """Return the compliance (n, 6, 6) in the mesh's axes; ModelError where kinematics of the plane do not hold."""

@@ -179,9 +179,20 @@ def von_mises(stress: Array) -> Array:
 
     Components xx, yy, zz, xy, in 3D also yz, xz.
     """
+    stress = _with_components(stress)
     xx, yy, zz = stress[..., 0], stress[..., 1], stress[..., 2]
     shear = (stress[..., 3:] ** 2).sum(axis=-1)
     return np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3.0 * shear)
+
+
+def _with_components(stress: Array) -> Array:
+    """Return stresses or strains (..., n_components) as an array; ModelError where there are no four or six components."""
+    stress = np.asarray(stress, float)
+    if stress.shape[-1:] not in ((4,), (6,)):
+        raise ModelError(
+            f"components along the last axis are xx, yy, zz, xy, in 3D also yz, xz, not as in {stress.shape}"
+        )
+    return stress
 
 
 @typed(ModelError)
@@ -190,6 +201,7 @@ def equivalent_strain(strain: Array) -> Array:
 
     Components xx, yy, zz, 2xy, in 3D also 2yz, 2xz.
     """
+    strain = _with_components(strain)
     tensor = strain * np.array([1.0] * 3 + [0.5] * (strain.shape[-1] - 3))
     return np.asarray(2.0 / 3.0 * von_mises(tensor))
 
@@ -200,5 +212,6 @@ def von_mises_signed(stress: Array, equivalent: Array | None = None) -> Array:
 
     Of `stress` (..., n_components) [pressure]; `equivalent` (...) [pressure] is its von Mises stress, where known already.
     """
+    stress = _with_components(stress)
     trace = stress[..., 0] + stress[..., 1] + stress[..., 2]
     return np.where(trace < 0, -1.0, 1.0) * (von_mises(stress) if equivalent is None else equivalent)

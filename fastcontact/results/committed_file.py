@@ -40,8 +40,8 @@ class CommittedFile(DriverFile):
 
     After an error nothing is written: the file stays as the last good write has left it. Nor is anything written once `ours`
     is False, because another program has written to the file. `end` is where the contents end; the file may take more room.
-    While `synchronised` is True, what is flushed is on the disk, whole or not at all up to `journal.LARGEST` bytes of changes;
-    beyond, in several turns, each of which is.
+    While `synchronised` is True, what is flushed is on the disk, whole or not at all; in several turns, each of which is,
+    beyond `journal.LARGEST` bytes of changes.
     """
 
     def __init__(self, path: Path) -> None:

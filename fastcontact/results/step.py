@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact.arrays import Array, Mask, Numbers
-from fastcontact.errors import unknown
+from fastcontact.errors import FastcontactError, unknown
 from fastcontact.mesh.html_table import html_table
 from fastcontact.results.material_stress import MaterialStress
 from fastcontact.results.units import with_unit
@@ -169,6 +169,10 @@ class ContactResult:
     units: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        if np.ndim(self.coordinates) != 2:
+            raise FastcontactError(
+                f"coordinates of a ContactResult must be an array (m, dim), not {type(self.coordinates).__name__}"
+            )
         if self.middle is None:
             object.__setattr__(self, "middle", np.zeros(self.coordinates.shape[1]))
         if self.place is None:  # of a file from before places were measured from the middle
@@ -339,6 +343,8 @@ class StepResult:
     units: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        if not isinstance(self.contact, Mapping):
+            raise FastcontactError(f"contact of a StepResult must be a dict, not {type(self.contact).__name__}")
         named = {name: replace(pair, units=self.units) for name, pair in self.contact.items()} if self.units else {}
         object.__setattr__(self, "contact", ContactsByName(named or self.contact))
 

@@ -82,6 +82,7 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Any
     return table[np.argsort(contact.place, kind="stable")]  # a closed line has no first node
 
 
+@typed(CaseError)
 def normal_stress(contact: ContactResult, step: StepResult) -> Array:
     """Return the normal stress ``n . sigma . n`` (m,) at the secondary nodes of a contact [pressure].
 

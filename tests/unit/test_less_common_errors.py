@@ -1,5 +1,6 @@
 """Errors and answers that few users meet: wrong histories, places, fields of files, streams; systems that lack something."""
 
+import dataclasses
 import errno
 import os
 import threading
@@ -28,6 +29,36 @@ GROUP = SQUARE.group_names[0]
 
 def model(mesh=SQUARE):
     return elastic_model(mesh, "plane_strain")
+
+
+AXES_BY_CELL = fc.Orthotropic(E=(3.0, 2.0, 1.0), nu=(0.3,) * 3, G=(1.0,) * 3, axes=np.stack([np.eye(3)] * 4))
+
+
+def numbers(kind):
+    """An object of a data class whose fields are all 1."""
+    needed = (f for f in dataclasses.fields(kind) if f.default is f.default_factory is dataclasses.MISSING)
+    return kind(**{entry.name: 1.0 for entry in needed})
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (
+            lambda: fc.recovery.von_mises([[0.0, 0.0], [1.0, 1.0]]),
+            r"components along the last axis are .* not as in \(2, 2\)",
+        ),
+        (lambda: fc.recovery.von_mises_signed(1.0), r"not as in \(\)"),
+        (lambda: fc.recovery.equivalent_strain(np.zeros((3, 5))), r"not as in \(3, 5\)"),
+        (lambda: AXES_BY_CELL.moduli_at(np.ones((4, 2)), "plane_strain"), "axes by cell are known where cells are"),
+        (lambda: model().load_vector(5), r"argument load of Model\.load_vector"),
+        (lambda: fc.normal_stress(None, 1.0), "argument contact of normal_stress"),
+        (lambda: fc.StepResult(1, 1.0, *[np.zeros(1)] * 5, contact=np.zeros), "contact of a StepResult must be a dict"),
+        (lambda: numbers(fc.ContactResult), r"coordinates of a ContactResult must be an array \(m, dim\)"),
+    ],
+)
+def test_what_is_no_stress_load_or_result(call, said):
+    with pytest.raises(fc.FastcontactError, match=said):
+        call()
 
 
 def test_the_curve_of_a_pin_is_its_pressure_over_the_arc():

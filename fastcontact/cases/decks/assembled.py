@@ -352,7 +352,8 @@ def assembled(content: Content) -> Assembled:
     for scope in made.scopes:
         part = made.part(scope)
         places.append(_placed(part, content.instances.get(scope)))
-        index = made.index[scope] = dict(zip(part.nodes, range(total, total + len(part.nodes)), strict=True))
+        index = {number: total + row for number, row in part.nodes.items()} if total else part.nodes
+        made.index[scope] = index
         total += len(index)
         elements = made.elements[scope] = {}
         for number, cell in part.cells.items():
@@ -372,7 +373,7 @@ def assembled(content: Content) -> Assembled:
 
 def _placed(part: Part, instance: Instance | None) -> Array:
     """Return the coordinates (n, 3) of the nodes of a part in the assembly [length]."""
-    points = np.array(list(part.nodes.values()), float).reshape(-1, 3)
+    points = np.array(part.coordinates).reshape(-1, 3)
     if instance is None:
         return points
     points = points + np.array(instance.translation)

@@ -84,10 +84,14 @@ class Section:
 
 @dataclass
 class Part:
-    """Nodes, elements, sets and surfaces of a part, of the assembly, or of a deck without parts."""
+    """Nodes, elements, sets and surfaces of a part, of the assembly, or of a deck without parts.
+
+    `nodes` are rows by number, and `coordinates` three numbers a row.
+    """
 
     name: str = ""
-    nodes: dict[int, tuple[float, float, float]] = field(default_factory=dict)
+    nodes: dict[int, int] = field(default_factory=dict)
+    coordinates: array[float] = field(default_factory=lambda: array("d"))
     flat: bool = False
     cells: dict[int, Cell] = field(default_factory=dict)
     node_sets: dict[str, list[Members]] = field(default_factory=dict)

@@ -26,8 +26,11 @@ def nodes(content: Content, part: Part, block: Block) -> None:
         number = row.whole(0)
         if len(row.entries) > 4 and any(row.entries[4:]):
             raise row.location.refuse(f"node {number} has more than three coordinates")
-        where = (row.number(1, 0.0), row.number(2, 0.0), row.number(3, 0.0))
-        if part.nodes.setdefault(number, where) != where:
+        position = array("d", (row.number(1, 0.0), row.number(2, 0.0), row.number(3, 0.0)))
+        known = part.nodes.setdefault(number, len(part.nodes))
+        if 3 * known == len(part.coordinates):
+            part.coordinates.extend(position)
+        elif part.coordinates[3 * known : 3 * known + 3] != position:
             raise row.location.refuse(f"node {number} is defined twice, at different places")
         numbers.append(number)
     if block.get("NSET"):

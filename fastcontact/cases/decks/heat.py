@@ -173,7 +173,7 @@ class HeatConditions:
         content = self.made.content
         self.reference = _reference(self.made, initial) if content.heat else 0.0
         self.rest: dict[Exchange, float] = {}
-        of_points = dict.fromkeys(range(len(self.made.points)), self.reference)
+        of_points = dict.fromkeys(range(len(self.made.points)), self.reference) if content.heat else {}
         self.temperatures: Histories[int] = Histories(content, rest=of_points)
         self.powers: Histories[int] = Histories(content)
         self.fluxes: Histories[Exchange] = Histories(content)

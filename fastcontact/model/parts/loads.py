@@ -355,6 +355,7 @@ class ModelLoads(ModelHeat):
         pressures = [load for load in self.loads if isinstance(load, Pressure)]
         return [(FollowingPressure(self.mesh, self.kinematics, load), load.ramp) for load in pressures]
 
+    @typed(ModelError)
     def load_vector(self, load: Load) -> Array:
         """Return the nodal forces (n_points, dim) of a load at multiplier 1 [force]."""
         density = None

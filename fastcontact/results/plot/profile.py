@@ -66,6 +66,10 @@ def pressure_profile(
     >>> ax = fc.plot.pressure_profile(steps[-1].contact["joint"], title="joint")
     >>> ax.figure.savefig("joint.png")
     """
+    if stress is not None and np.shape(stress) != np.shape(contact.place):
+        raise FastcontactError(
+            f"stress has the shape {np.shape(stress)}, not {np.shape(contact.place)}: one of each node"
+        )
     ax, units = new_axes(ax, (6.4, 4.4)), units or contact.units
     order = np.argsort(contact.place, kind="stable")
     position, flat = contact.place[order], contact.coordinates.shape[1] == 2

@@ -33,11 +33,17 @@ def numbered(cells):
     return range(1, (cells + 1) ** 3 + 1)
 
 
+def motions(cells):
+    """Displacements of their own along every axis."""
+    return "\n".join(f"{k}, {axis}, {axis}, {1e-6 * k * axis:.6g}" for k in numbered(cells) for axis in (1, 2, 3))
+
+
 # What every node may have a line of its own for: a part of the deck and what stands in its place.
 LINES = {
     "sets": ("", None),
     "forces": ("*Dsload\noutside, P, 1.", lambda n: "*Cload\n" + "\n".join(f"{k}, 3, {k}." for k in numbered(n))),
     "same forces": ("*Dsload\noutside, P, 1.", lambda n: "*Cload\n" + "\n".join(f"{k}, 3, 1." for k in numbered(n))),
+    "displacements": ("*Dsload\noutside, P, 1.", lambda n: "*Boundary\n" + motions(n)),
     "members": ("*Step\n", lambda n: "*Nset, nset=singly\n" + "\n".join(map(str, numbered(n))) + "\n*Step\n"),
 }
 
