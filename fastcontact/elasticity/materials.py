@@ -283,9 +283,17 @@ class Material:
         return compliance
 
 
+def _real(value: Any) -> float:
+    """Return a real number, infinite where it is too large for one; NaN for what is none."""
+    try:
+        return float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
+    except OverflowError:
+        return math.inf
+
+
 def check_positive(name: str, value: Any, caption: str = "a positive number") -> None:
     """Raise ModelError if a constant of a material, `name` in the message, is not a positive number."""
-    number: Any = float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
+    number = _real(value)
     if not 0.0 < number < math.inf:
         raise ModelError(f"{name} = {value!r} must be {caption}")
     if not 1.0 / LARGEST <= number <= LARGEST:
@@ -294,21 +302,14 @@ def check_positive(name: str, value: Any, caption: str = "a positive number") ->
 
 def check_density(value: Any) -> None:
     """Raise ModelError if a density is given and is no number from zero on; one that varies is checked with its cells."""
-    if (
-        not isinstance(value, Varying)
-        and value is not None
-        and (not isinstance(value, Real) or isinstance(value, bool) or not 0.0 <= float(value) < math.inf)
-    ):
+    if not isinstance(value, Varying) and value is not None and not 0.0 <= _real(value) < math.inf:
         raise ModelError(f"the density = {value} must be a number, zero or more")
 
 
 def check_expansion(value: Any, most: int) -> None:
     """Raise ModelError if an expansion is given and is neither a finite number nor `most` of them along the axes."""
     numbers = [value] if not isinstance(value, (Sequence, np.ndarray)) else list(value)
-    fit = all(
-        isinstance(v, Varying) or (isinstance(v, Real) and not isinstance(v, bool) and math.isfinite(v))
-        for v in numbers
-    )
+    fit = all(isinstance(v, Varying) or math.isfinite(_real(v)) for v in numbers)
     if value is not None and not (fit and len(numbers) in (1, most)):
         wanted = "a number" if most == 1 else "a number, or three along the material's axes"
         raise ModelError(f"the coefficient of thermal expansion = {value} must be {wanted}")
@@ -384,7 +385,7 @@ class LinearElastic(Material):
             object.__setattr__(self, name, wrapped(getattr(self, name)))
         if not isinstance(self.E, Varying):
             check_positive("Young's modulus E", self.E)
-        if not isinstance(self.nu, Varying) and not (isinstance(self.nu, Real) and -1.0 < float(self.nu) < 0.5):
+        if not isinstance(self.nu, Varying) and not -1.0 < _real(self.nu) < 0.5:
             raise ModelError(
                 f"Poisson's ratio nu = {self.nu} must lie between -1 and 0.5, both excluded "
                 "(for an incompressible material take nu = 0.4999, in quadrangles or hexahedra: they have a mean dilatation "

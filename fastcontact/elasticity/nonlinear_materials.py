@@ -107,12 +107,12 @@ class ElasticPlastic(NonlinearElastic):
         """Return the hardening table from zero on; ModelError if it is not one."""
         try:
             rows = np.array([[float(value) for value in row] for row in self.hardening]).reshape(-1, 2)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise ModelError(
                 "hardening must be pairs (equivalent plastic strain, yield stress), such as [(0.0, 250.0), (0.1, 400.0)]"
             ) from None
         if not len(rows) or rows[0, 0] > 0.0:
-            rows = np.vstack([[0.0, self.yield_stress], rows])
+            rows = np.vstack([[0.0, float(self.yield_stress)], rows])
         if not (np.isfinite(rows).all() and (np.diff(rows[:, 0]) > 0.0).all() and (rows[:, 1] > 0.0).all()):
             raise ModelError("hardening must have ascending plastic strains, from zero on, and positive yield stresses")
         if rows[0, 0] < 0.0 or not math.isclose(rows[0, 1], self.yield_stress):
@@ -312,7 +312,7 @@ class Ogden(Hyperelastic):
     ) -> None:  # fmt: skip
         try:
             terms = [tuple(float(v) for v in np.atleast_1d(np.asarray(value, float))) for value in (mu, alpha)]
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise ModelError("mu and alpha of Ogden must be numbers, or lists with a number for each term") from None
         if len(terms[0]) != len(terms[1]) or not terms[0]:
             raise ModelError(f"Ogden has {len(terms[0])} mu and {len(terms[1])} alpha: give as many of both")

@@ -244,7 +244,7 @@ def wrapped(value: Any, vector: bool = False) -> Any:
     if isinstance(value, list | tuple):
         try:
             value = np.asarray(value, float)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise ModelError(
                 f"a constant of a material is a number or one for each cell or point, not {value!r}"
             ) from None

@@ -61,6 +61,35 @@ def test_what_is_no_stress_load_or_result(call, said):
         call()
 
 
+TOO_LARGE = 10**400
+
+
+@pytest.mark.parametrize("value", [TOO_LARGE, [TOO_LARGE], [(0.0, 3.0), (1.0, TOO_LARGE)]])
+@pytest.mark.parametrize(
+    ("law", "names"),
+    [
+        (
+            lambda **given: fc.LinearElastic(**{"E": 1.0, "nu": 0.3} | given),
+            ["E", "nu", "density", "expansion", "conductivity"],
+        ),
+        (lambda **given: fc.NeoHookean(**{"E": 1.0, "nu": 0.3} | given), ["E", "nu", "density", "expansion"]),
+        (
+            lambda **given: fc.Ogden(**{"mu": 1.0, "alpha": 2.0, "bulk": 9.0} | given),
+            ["mu", "alpha", "bulk", "density"],
+        ),
+        (
+            lambda **given: fc.ElasticPlastic(**{"E": 1.0, "nu": 0.3, "yield_stress": 3.0} | given),
+            ["yield_stress", "hardening"],
+        ),
+    ],
+)
+def test_whole_numbers_too_large_for_a_constant(law, names, value):
+    for name in names:
+        with pytest.raises(fc.ModelError):
+            law(**{name: value})
+    assert fc.ElasticPlastic(E=1.0, nu=0.3, yield_stress=10**30).hardening[0][1] == 1e30
+
+
 def test_the_curve_of_a_pin_is_its_pressure_over_the_arc():
     pin = fc.analytic.persson_pin(E=1e3, R=2.0, clearance=1e-3, force=1.0)
     curve = pressure_curve(pin)

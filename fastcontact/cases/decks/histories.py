@@ -11,7 +11,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from fastcontact.arrays import Array
+from fastcontact.arrays import AnyArray, Array
 from fastcontact.cases.decks.blocks import Location, folded
 from fastcontact.cases.decks.content import Amplitude, Content, Step
 from fastcontact.model.ramp import Table
@@ -173,7 +173,7 @@ class Histories(Generic[Name]):
         values, amplitudes = np.append(values, rests[len(values) :]), [*amplitudes, *[""] * len(self.dying)]
         shared = np.array([id(self.tracks.get(name)) for name in names])
         changed = set()
-        for rows in _equal(shared, values, amplitudes, rests, alive):
+        for rows in _equal(shared, values, np.array(amplitudes), rests, alive):
             value, amplitude = float(values[rows[0]]), amplitudes[rows[0]]
             track = self._track([names[row] for row in rows], float(rests[rows[0]]), given)
             changed.add(id(track))
@@ -223,12 +223,12 @@ class Histories(Generic[Name]):
             yield self.table(names[0]), names
 
 
-def _equal(*columns: Sequence[Any]) -> Iterator[list[int]]:
+def _equal(*columns: AnyArray) -> Iterator[list[int]]:
     """Yield the rows in which columns (n,) have the same entries, in the order of the first ones."""
     order = np.lexsort(columns)
     differs = np.zeros(max(len(order) - 1, 0), bool)
     for column in columns:
-        ascending = np.asarray(column)[order]
+        ascending = column[order]
         differs |= ascending[1:] != ascending[:-1]
     bounds = np.array([0, *(np.flatnonzero(differs) + 1), len(order)])[len(order) == 0 :]
     for group in np.argsort(order[bounds[:-1]]):

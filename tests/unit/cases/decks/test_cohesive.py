@@ -89,7 +89,7 @@ WHOLE_LAYER = LAYER.format("QUADS", "1., 2., 2.", "type=ENERGY, mixed mode behav
         ("criterion=QUADS", "criterion=MAXE", r"\*DAMAGE INITIATION: CRITERION=MAXE is not supported"),
         ("\n1., 2., 2.\n*Damage", "\n1., 2., 3.\n*Damage", r"\*DAMAGE INITIATION: the strengths along both shear"),
         ("power=2.", "softening=EXPONENTIAL", r"\*DAMAGE EVOLUTION: SOFTENING=EXPONENTIAL"),
-        ("*Damage Initiation, criterion=QUADS\n1., 2., 2.\n", "", r"DAMAGE INITIATION and .* are both needed"),
+        ("*Damage Initiation, criterion=QUADS\n1., 2., 2.\n", "", "INITIATION and .DAMAGE EVOLUTION are both needed"),
         (", power=2.", "", r"\*DAMAGE EVOLUTION: the parameter POWER is missing"),
         ("type=ENERGY, mixed mode behavior=BK, power=2.", "type=DISPLACEMENT", r"QUADS of one strength only"),
         ("*Cohesive Behavior, eligibility=ORIGINAL CONTACTS\n1000., 1000., 1000.\n", "", r"has no \*COHESIVE BEHAVIOR"),
