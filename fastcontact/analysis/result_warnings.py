@@ -244,7 +244,7 @@ def _lost(pair: Formulation, contact: ContactResult, touched: bool, loaded: bool
             f"contact '{name}' carries nothing where its sides penetrate by {-least:.4g}, more than its "
             f"search_distance {reach:.4g}: raise that, or use more load steps"
         )
-    elif least < 0.0 and not touched:
+    elif least < -LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max()) and not touched:
         yield (
             f"contact '{name}' carries nothing although its sides penetrate by {-least:.4g}: supports or relations "
             "hold its nodes there; leave these nodes free, or out of the contact as 'excluded'"

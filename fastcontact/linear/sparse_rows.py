@@ -21,3 +21,9 @@ def scaled(matrix: csr_array, factor: AnyArray) -> csr_array:
 def taken(matrix: csr_array, rows: Indices) -> csr_array:
     """Return `rows` (k,) of a matrix, ascending; the matrix itself where they are all."""
     return matrix if len(rows) == matrix.shape[0] else matrix[rows]
+
+
+def without_remnants(matrix: csr_array, origin: csr_array, least: float) -> csr_array:
+    """Return the matrix (m, n), rows empty whose entries are below `least` of the largest in that row of `origin` (m, k)."""
+    kept = abs(matrix).max(axis=1).toarray() > least * abs(origin).max(axis=1).toarray()
+    return matrix if kept.all() else scaled(matrix, kept)

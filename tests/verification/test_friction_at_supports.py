@@ -131,3 +131,36 @@ def test_a_push_beyond_friction_is_told_as_such():
     message = r"friction cannot hold body .* coefficient of about 0\.\d+ where the largest is 0\.3"
     with pytest.raises(fc.ConvergenceError, match=message):
         fc.solve(model, [1.0, 2.0])
+
+
+def flange(name, bottom):
+    """A quarter of a plate with a hole in the midst."""
+    mesh = fc.generate.box((1.0, 1.0, 8.0), (4, 12, 2), "hex8", (0.0, 0.0, bottom), name=name)
+    radius, angle = 20.0 + 40.0 * mesh.points[:, 0], np.pi / 2.0 * mesh.points[:, 1]
+    mesh = mesh.replace(points=np.column_stack([radius * np.cos(angle), radius * np.sin(angle), mesh.points[:, 2]]))
+    return prefixed(mesh, name)
+
+
+@pytest.mark.filterwarnings("ignore:.*nodal pressures waver", "ignore:.*across its radius")
+@pytest.mark.parametrize("friction", [None, 0.2])
+def test_bolted_flanges_held_at_the_same_edge_settle_and_mirror_each_other(friction):
+    """Of the weighted gaps at the held edge, supports leave round-off, and later what strains of the neighbours bring in."""
+    mesh = fc.generate.union(flange("A", 0.0), flange("B", 8.0))
+    model = elastic_model(mesh, "3d", E=210e3)
+    for name, outside in (("A", "ZMIN"), ("B", "ZMAX")):
+        model.fix(f"{name}_XMIN", "xyz")
+        model.fix(f"{name}_YMIN", "y")
+        model.fix(f"{name}_YMAX", "x")
+        model.add_pressure(f"{name}_{outside}", lambda x: 2.0 * (60.0 - np.linalg.norm(x[:, :2], axis=1)))
+    model.add_contact("joint", secondary="B_ZMIN", primary="A_ZMAX", friction=friction)
+    step = fc.solve(model, 1, criteria=fc.Criteria(max_geometry_updates=10, max_halvings=0))[-1]
+    a, b = (mesh.points_of(name) for name in "AB")
+    mirrored = (
+        a[np.lexsort(np.round(mesh.points[a][:, :3], 6).T)],
+        b[np.lexsort(np.round(mesh.points[b] * [1, 1, -1], 6).T)],
+    )
+    below, above = (step.displacement[nodes] for nodes in mirrored)
+    assert np.abs(below - above * [1, 1, -1]).max() < 1e-6 * np.abs(above).max()
+    contact = step.contact["joint"]
+    assert abs(step.reaction[a, 2].sum() + step.reaction[b, 2].sum()) < 1e-6 * contact.force[2]
+    assert np.allclose(contact.coordinates[contact.pressure > 0.0, 2], 8.0, atol=1e-3)
