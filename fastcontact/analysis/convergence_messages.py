@@ -117,8 +117,12 @@ def named_nodes(problem: Problem, nodes: Mapping[str, list[int]]) -> str:
 
 
 def _smoother(problem: Problem) -> str:
-    """Return the advice for pairs that may oscillate between facets at a node, or between supports of dual functions."""
+    """Return the advice for pairs that oscillate between facets at a node, supports of dual functions, branches of a law."""
     faceted = [name for name, pair in problem.pairs.items() if pair.normals == "facet" and len(pair.primary.points)]
+    torn = [name for name, pair in problem.pairs.items() if pair.options.cohesion is not None]
     dual = [name for name, pair in problem.pairs.items() if getattr(pair, "multipliers", "") == "dual"]
-    options = {'normals="averaged"': faceted, 'multipliers="standard"': dual}
+    options = {
+        'normals="averaged"': faceted, 'multipliers="standard"': dual,
+        "facets shorter than what is partly torn off or only attracted": torn,
+    }  # fmt: skip
     return "".join(f"{option} for contact {names[0]!r}, " for option, names in options.items() if names)

@@ -59,10 +59,11 @@ class Iterate:
         self.frictional = self.rigid = None
 
     def remember(self, constraints: StackedConstraints, solution: Solution) -> None:
-        """Keep, by pair, which constraints the solution wants active, and its nodal pressures."""
+        """Keep, by pair, which constraints the solution wants active, and its nodal pressures, those of fluid left out."""
         for name, rows in constraints.rows().items():
             self.active[name] = solution.wanted[rows]
-            self.pressure[name] = constraints.parts[name].pressure(solution.multiplier[rows])
+            forces = constraints.parts[name].contact_forces(solution.multiplier[rows])
+            self.pressure[name] = constraints.parts[name].pressure(forces)
 
 
 def pair_surfaces(problem: Problem, state: State, load: StepLoad, iterate: Iterate) -> StackedConstraints:

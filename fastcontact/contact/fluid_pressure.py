@@ -1,7 +1,7 @@
 """Fluid that penetrates between the sides of a contact pair, wherever they are open and connected with its source.
 
-A node is open to the fluid if its gap is, or if what presses it together is no more than the fluid; such nodes of one facet
-are connected. There the force is that of the fluid, on both sides alike, in the place of that of contact.
+A node is open to the fluid if what presses it together is no more than the fluid, and at first if its gap is open; such nodes
+of one facet are connected. There the force is that of the fluid, on both sides alike, in the place of that of contact.
 """
 
 from __future__ import annotations
@@ -52,8 +52,11 @@ def wetted(constraints: Constraints, at: Configuration, side: Surface, source: M
     size = float(np.linalg.norm(np.ptp(points[side.points], axis=0)))
     gaps = constraints.gaps(at.displacement)
     nodal, node = constraints.nodal.weighted_gaps(np.where(constraints.usable, gaps, np.inf))
-    loose = np.zeros(len(nodal), bool) if at.pressure is None else at.pressure <= (1.0 + ALIKE) * at.fluid_pressure
-    nodes = reached(side, source, (nodal > CLOSED * size) | (loose & (nodal > -CLOSED * size)))
+    if at.pressure is None:
+        passable = nodal > CLOSED * size
+    else:  # a node that is pressed together is tight, even if places beside it are what is closed
+        passable = (nodal > -CLOSED * size) & (at.pressure <= (1.0 + ALIKE) * at.fluid_pressure)
+    nodes = reached(side, source, passable)
     rows = nodes[node] & constraints.usable
     far = FAR * size
     none = np.zeros(len(constraints))

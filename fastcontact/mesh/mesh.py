@@ -261,6 +261,8 @@ class Mesh:
             Group of the solid cells that the facets belong to, by default all: it tells faces of two bodies apart that
             coincide.
 
+        Groups of points are made by ``with_groups(points={name: np.flatnonzero(...)})``.
+
         MeshError if there is no such facet, there is a group of points of that name, `of` holds no solid cells, or `where`
         returns anything else.
 
@@ -284,7 +286,7 @@ class Mesh:
             raise MeshError(
                 f"facet group '{name}' would be empty: its function chooses {int(chosen.sum())} points, but no facet{theirs} "
                 f"{'between two cells' if between else 'on the outside'} has all its nodes among them; compare coordinates "
-                "with a tolerance"
+                "with a tolerance, or make a group of points by with_groups"
             )
         return self.with_facets({name: facets})
 

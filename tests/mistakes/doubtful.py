@@ -129,6 +129,9 @@ DOUBTS = [
     ),
     Doubt("strains are large", lambda: block((1.0, 1.0), (2, 2)), of(STEEL, held("BOTTOM", x=0.0, y=0.0), held("TOP", y=0.3)),
           (r"the largest equivalent strain is 0\.\d+, beyond the 0\.1 where linear kinematics hold well",)),
+    Doubt("plastic strains are large", lambda: block((1.0, 1.0), (2, 2)),
+          of(STEEL + 'law = "elastic_plastic"\nyield_stress = 3.0\n', held("LEFT", x=0.0), held("BOTTOM", y=0.0), held("TOP", y=-0.7)),
+          (r"the largest plastic strain is 0\.\d+, beyond the 0\.5 up to which linear kinematics serve: pressures on it are too low",)),
     Doubt(
         "rotations are large",
         lambda: block((1.0, 1.0), (1, 1)),

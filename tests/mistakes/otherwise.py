@@ -147,7 +147,9 @@ OTHERWISE = {
         "springs that regularise rigid motions carry load",
     ),
     "the limit is reached, and the job goes on or ends with an exit code of success": ("too few geometry updates were asked for",),
-    "nothing is said: linear kinematics are used outside their range": ("strains are large", "rotations are large"),
+    "nothing is said: linear kinematics are used outside their range": (
+        "strains are large", "plastic strains are large", "rotations are large",
+    ),
     "nothing is said: the pressure depends on the mesh more than on the bodies": ("the mesh does not resolve the contact",),
     "nothing is said: contact forces are too small": ("a penalty is too soft",),
     "nothing is said: forces that are off by as much, or of a singular matrix": ("a spring that is a thousand times too stiff",),

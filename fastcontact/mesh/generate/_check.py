@@ -104,8 +104,8 @@ def one_of(name: str, value: Any, known: Sequence[str]) -> str:
     return str(value)
 
 
-def unused(element: str, **arguments: Any) -> None:
-    """Raise MeshError if an argument that has no effect with `element` was given (is not None)."""
+def unused(element: str, instead: str = "", **arguments: Any) -> None:
+    """Raise MeshError if an argument without effect with `element` was given (is not None), `instead` of which others are."""
     for name, value in arguments.items():
         if value is not None:
-            raise MeshError(f"{name} = {repr(value)} means nothing to {element} meshes: leave it out")
+            raise MeshError(f"{name} = {repr(value)} means nothing to {element} meshes: leave it out{instead}")

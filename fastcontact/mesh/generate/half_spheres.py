@@ -113,10 +113,12 @@ def quarter_disc(
     one_of("body", body, ("lower", "upper"))
     R = positive("R", R)
     if element in TRIANGLES:
-        unused(element, arc_sizes=arc_sizes, segments=segments, radial_sizes=radial_sizes)
+        instead = ", size, contact_size and contact_radius are theirs"
+        unused(element, instead, arc_sizes=arc_sizes, segments=segments, radial_sizes=radial_sizes)
         linear = _of_triangles(R, _spacing(R, size, contact_size, contact_radius))
     else:
-        unused(element, size=size, contact_size=contact_size, contact_radius=contact_radius)
+        instead = ", arc_sizes, radial_sizes and segments are theirs"
+        unused(element, instead, size=size, contact_size=contact_size, contact_radius=contact_radius)
         linear = _of_quadrangles(R, arc_sizes, segments, radial_sizes)
     disc = in_element(linear, element, [Circle((0.0, -R), R, group) for group in ("CONT1", "D1B1")])
     return disc if body == "lower" else mirrored(disc, "y", rename=_UPPER)
