@@ -101,3 +101,25 @@ def test_what_is_refused():
         model.add_fluid_pressure("sael", 1.0, source="B BOTTOM_LEFT")
     with pytest.raises(fc.ModelError, match="negative"):
         model.add_fluid_pressure("seal", -1.0, source="B BOTTOM_LEFT")
+
+
+@pytest.mark.parametrize("element", ["tri6", "quad8", "quad4"])
+def test_fluid_round_a_disc_comes_as_far_as_the_contact_presses_less(element):
+    """At a curved side, nodes whose places beside them are what is closed have gaps of their own, and are tight."""
+    sizes = {"size": 0.5, "contact_size": 0.2} if element == "tri6" else {"arc_sizes": (0.1, 0.3), "segments": 8}
+    mesh = fc.generate.quarter_disc(element, R=2.5, **sizes)
+    mesh = fc.generate.renamed(mesh, {"CONT1": "ARC", "D1B1": "ARC"})
+    model = fc.Model(mesh, kinematics="plane_strain")
+    model.add_material(fc.LinearElastic(E=100.0, nu=0.3))
+    model.fix("A1A2", "x")
+    model.fix("A1B1", "y")
+    plate = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, -1.0))
+    model.add_obstacle("plate", secondary="ARC", obstacle=plate, motion={"y": -0.1}, ramp=HELD)
+    model.add_fluid_pressure("plate", 1.5, source="B1", ramp=FLUID)
+    last = fc.solve(model, fc.linear_ramp(2, end=2.0))[-1]
+    contact = last.contact["plate"]
+    wet = contact.fluid_pressure > 0.0
+    assert 0 < wet.sum() < len(wet)
+    assert contact.pressure[~wet].min() > 1.5
+    assert contact.gap[wet].min() > 0.0
+    assert abs(last.reaction[mesh.points_of("A1B1"), 1].sum() + contact.force[1]) < 1e-9 * abs(contact.force[1])
