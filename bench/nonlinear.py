@@ -125,17 +125,17 @@ def indentation(size: str = "0.02", steps: str = "40") -> None:
         folder = Path(name)
         timed([sys.executable, "-c", INDENTED, size, steps, str(folder / "problem.npz")])
         deck(folder / "problem.npz", int(steps), folder / "deck.inp")
-        theirs = timed(["ccx", str(folder / "deck")])
+        theirs = timed(["ccx", "deck"], folder)
         totals = [line.split() for line in (folder / "deck.dat").read_text().splitlines() if line.strip()]
     force = -180.0 * float(totals[-1][1])  # of a wedge of two degrees
     print(f"CalculiX: user {theirs[0]:.1f} s, wall {theirs[1]:.1f} s; force: {force}")
     print(f"CalculiX over fastcontact: {theirs[0] / ours[0]:.2f}")
 
 
-def timed(command: list[str]) -> tuple[float, float, str]:
-    """Return user CPU and wall time [s] of a process, and the last line that it prints."""
+def timed(command: list[str], folder: Path | None = None) -> tuple[float, float, str]:
+    """Return user CPU and wall time [s] of a process in a folder, and the last line that it prints."""
     before, begin = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime, time.perf_counter()
-    told = subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip().splitlines()
+    told = subprocess.run(command, check=True, capture_output=True, text=True, cwd=folder).stdout.strip().splitlines()
     after = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
     return after - before, time.perf_counter() - begin, told[-1] if told else ""
 
