@@ -3,6 +3,10 @@
 ``python bench/nonlinear.py block PYTHON_WITH_FELUPE [N] [STEPS]``: a neo-Hookean block of N^3 hex8, drawn by a tenth of its
 height and sheared by as much. FElupe solves by conjugate gradients with Jacobi's preconditioner, which takes less than its
 default, SuperLU.
+
+``python bench/nonlinear.py indentation [SIZE] [STEPS]``: a rigid ball of quad8 pressed into an elastic-plastic block of
+quad8, axisymmetric; SIZE is the length of the facets in contact, 0.02 by default. CalculiX (``ccx``) takes the same mesh,
+CAX8R, and surface-to-surface contact by a penalty, in as many fixed increments; ours has mortar.
 """
 
 from __future__ import annotations
@@ -10,9 +14,12 @@ from __future__ import annotations
 import resource
 import subprocess
 import sys
+import tempfile
 import time
+from pathlib import Path
 
 import numpy as np
+from peers.calculix_deck import contact_surface, node_set, table
 
 OURS = """
 import sys, numpy as np, fastcontact as fc
@@ -53,12 +60,82 @@ for part in np.linspace(0.0, 1.0, steps + 1)[1:]:
 force = found.fun.toarray() if hasattr(found.fun, "toarray") else np.asarray(found.fun)
 print(mesh.points.size, count, *force.reshape(-1, 3)[top].sum(axis=0))
 """
+INDENTED = """
+import sys, numpy as np, fastcontact as fc
+size, steps = float(sys.argv[1]), int(sys.argv[2])
+block = fc.generate.graded_block("quad8", width=6.0, contact_radius=0.6, contact_size=size)
+cap = fc.generate.block((1.0, 1.0), (round(0.8 / size), 2), "quad8", name="BALL")
+angle, radius = 0.4 * cap.points[:, 0], 2.5 - 0.2 * cap.points[:, 1]
+cap = cap.replace(points=np.column_stack([radius * np.sin(angle), 2.5 - radius * np.cos(angle)]))
+cap = fc.generate.renamed(cap, lambda group: {"BALL": "BALL", "BOTTOM": "ARC"}.get(group))
+mesh = fc.generate.union(block, cap)
+model = fc.Model(mesh, "axisymmetric")
+model.add_material(fc.LinearElastic(E=200e3, nu=0.3), "BALL")
+model.add_material(fc.ElasticPlastic(E=200e3, nu=0.3, yield_stress=400.0, hardening=[(0.0, 400.0), (1.0, 1400.0)]), "BLOCK")
+model.fix("BOTTOM", "xy")
+model.fix("SYMMETRY_X", "x")
+model.prescribe("BALL", x=0.0, y=-0.04)
+model.add_contact("ball", secondary="CONTACT", primary="ARC")
+if sys.argv[3:]:
+    np.savez(sys.argv[3], points=mesh.points, cells=mesh.cells["quad8"],
+             of_ball=mesh.split(mesh.cell_groups["BALL"])["quad8"],
+             top=mesh.cells_of("CONTACT")["line3"], arc=mesh.cells_of("ARC")["line3"],
+             **{name: mesh.points_of(name) for name in ("BOTTOM", "SYMMETRY_X", "BALL")})
+    sys.exit()
+found = fc.solve(model, steps)
+print(mesh.points.size, sum(len(s.iterations["history"]) for s in found), -found[-1].contact["ball"].force[1])
+"""
 
 
-def timed(command: list[str]) -> tuple[float, float, str]:
-    """Return user CPU and wall time [s] of a process, and the last line that it prints."""
+def deck(problem: Path, steps: int, path: Path) -> None:
+    """Write the deck of CalculiX for the mesh that INDENTED has saved in `problem`."""
+    given = np.load(problem)
+    cells = given["cells"]
+    ball = np.isin(np.arange(len(cells)), given["of_ball"])
+    with path.open("w") as file:
+        file.write("*NODE,NSET=ALL\n")
+        table(file, np.arange(1, len(given["points"]) + 1), given["points"], "%.16g")
+        for name, chosen in (("BLOCK", ~ball), ("BALLS", ball)):
+            file.write(f"*ELEMENT,TYPE=CAX8R,ELSET={name}\n")
+            table(file, np.flatnonzero(chosen) + 1, cells[chosen] + 1, "%d")
+        for name in ("BOTTOM", "SYMMETRY_X", "BALL"):
+            node_set(file, name, given[name])
+        contact_surface(file, "TOP", cells[:, :4], given["top"][:, :2])
+        contact_surface(file, "ARC", cells[:, :4], given["arc"][:, :2])
+        file.write(
+            "*MATERIAL,NAME=STEEL\n*ELASTIC\n200000.,.3\n*SOLID SECTION,ELSET=BALLS,MATERIAL=STEEL\n"
+            "*MATERIAL,NAME=YIELDS\n*ELASTIC\n200000.,.3\n*PLASTIC\n400.,0.\n1400.,1.\n"
+            "*SOLID SECTION,ELSET=BLOCK,MATERIAL=YIELDS\n"
+            "*SURFACE INTERACTION,NAME=I\n*SURFACE BEHAVIOR,PRESSURE-OVERCLOSURE=LINEAR\n2.E7\n"
+            "*CONTACT PAIR,INTERACTION=I,TYPE=SURFACE TO SURFACE\nTOP,ARC\n"
+            f"*STEP,INC={10 * steps}\n*STATIC,DIRECT\n{1 / steps},1.0\n"
+            "*BOUNDARY\nBOTTOM,1,2,0.0\nSYMMETRY_X,1,1,0.0\nBALL,1,1,0.0\nBALL,2,2,-0.04\n"
+            f"*NODE PRINT,NSET=BALL,TOTALS=ONLY,FREQUENCY={steps}\nRF\n*END STEP\n"
+        )
+
+
+def indentation(size: str = "0.02", steps: str = "40") -> None:
+    """Print times, unknowns, iterations and forces of a pair of runs, after one of ours that compiles."""
+    timed([sys.executable, "-c", INDENTED, "0.1", "1"])
+    ours = timed([sys.executable, "-c", INDENTED, size, steps])
+    print(
+        f"fastcontact: user {ours[0]:.1f} s, wall {ours[1]:.1f} s; unknowns, iterations, force: {ours[2]}", flush=True
+    )
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        timed([sys.executable, "-c", INDENTED, size, steps, str(folder / "problem.npz")])
+        deck(folder / "problem.npz", int(steps), folder / "deck.inp")
+        theirs = timed(["ccx", "deck"], folder)
+        totals = [line.split() for line in (folder / "deck.dat").read_text().splitlines() if line.strip()]
+    force = -180.0 * float(totals[-1][1])  # of a wedge of two degrees
+    print(f"CalculiX: user {theirs[0]:.1f} s, wall {theirs[1]:.1f} s; force: {force}")
+    print(f"CalculiX over fastcontact: {theirs[0] / ours[0]:.2f}")
+
+
+def timed(command: list[str], folder: Path | None = None) -> tuple[float, float, str]:
+    """Return user CPU and wall time [s] of a process in a folder, and the last line that it prints."""
     before, begin = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime, time.perf_counter()
-    told = subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip().splitlines()
+    told = subprocess.run(command, check=True, capture_output=True, text=True, cwd=folder).stdout.strip().splitlines()
     after = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
     return after - before, time.perf_counter() - begin, told[-1] if told else ""
 
@@ -78,4 +155,4 @@ def block(theirs: str, n: str = "31", steps: str = "10") -> None:
 
 
 if __name__ == "__main__":
-    block(*sys.argv[2:])
+    {"block": block, "indentation": indentation}[sys.argv[1]](*sys.argv[2:])
