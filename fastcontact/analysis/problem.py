@@ -221,7 +221,7 @@ class Problem:
             state.obstacles.get(name, still),
             load.clearance_factors.get(name, 1.0),
             state.never_opening.get(name),
-            state.traction.get(name),
+            state.elastic_slip.get(name),
             load.angles.get(name, 0.0),
             state.angles.get(name, 0.0),
             self._worn(name, state),

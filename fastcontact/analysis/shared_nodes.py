@@ -101,7 +101,7 @@ class SharedNodes:
             total = self.summed(stiffness)
             merged["tangential_softness"] = np.divide(1.0, total, out=np.zeros_like(total), where=total > 0.0)
             if constraints.elastic_slip is not None:
-                weight = np.divide(stiffness, total[self.place], out=np.zeros_like(total), where=np.isfinite(stiffness))
+                weight = np.divide(stiffness, total[self.place], out=np.ones_like(total), where=np.isfinite(stiffness))
                 merged["elastic_slip"] = self._mean(constraints.elastic_slip.T, weight).T
         if constraints.slip0 is not None:
             merged["slip0"] = self._mean(constraints.slip0.T, self.along).T

@@ -42,9 +42,9 @@ class State:
         By contact pair, the slip of its secondary nodes so far [length].
     never_opening : dict of str to (ndarray (m, dim), ndarray of bool (m,))
         By contact pair that is bilateral once closed, places of constraints [length] and which of them are closed for good.
-    traction : dict of str to (ndarray (m, dim), ndarray (m, dim))
-        By contact pair that slips a little before it slides, places of constraints [length] and the tangential tractions
-        there [pressure].
+    elastic_slip : dict of str to (ndarray (m, dim), ndarray (m, dim))
+        By contact pair whose sticking constraints have a compliance of their own, places of constraints and the slips by
+        which they give way to the present forces [length].
     first_contact : dict of str to (ndarray (dim,), ndarray (dim,))
         By contact pair in space, where the bodies met first [length] and the normal there [-].
     bonds : dict of str to Bond
@@ -90,7 +90,7 @@ class State:
     slipped: Mapping[str, Array] = field(default_factory=dict)
     never_opening: Mapping[str, tuple[Array, Mask]] = field(default_factory=dict)
     first_contact: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
-    traction: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
+    elastic_slip: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
     bonds: Mapping[str, Bond] = field(default_factory=dict)
     locked: Mapping[str, Any] = field(default_factory=dict)
     extrapolation: Extrapolation = field(default_factory=Extrapolation)
@@ -137,7 +137,7 @@ class State:
                     "closed": _listed(self.never_opening.get(name)),
                     "now": self.obstacles[name].copy() if name in self.obstacles else None,
                     "first_contact": _listed(self.first_contact.get(name)),
-                    "traction": _listed(self.traction.get(name)),
+                    "elastic_slip": _listed(self.elastic_slip.get(name)),
                     "angle": self.angles.get(name),
                     "slipped": self.slipped.get(name),
                     "worn": [self.worn[name].depth, self.worn[name].pressure, self.worn[name].pace]
@@ -166,7 +166,7 @@ class State:
         pairs, numbers = kept["pairs"], kept["numbers"]
         values = {
             key: {name: own[key] for name, own in pairs.items() if own.get(key) is not None}
-            for key in ("closed", "now", "first_contact", "traction", "angle", "slipped", "worn")
+            for key in ("closed", "now", "first_contact", "elastic_slip", "angle", "slipped", "worn")
         }
         return cls(
             u,
@@ -183,7 +183,7 @@ class State:
             slipped=dict(values["slipped"]),
             never_opening={name: (both[0], both[1]) for name, both in values["closed"].items()},
             first_contact={name: (both[0], both[1]) for name, both in values["first_contact"].items()},
-            traction={name: (both[0], both[1]) for name, both in values["traction"].items()},
+            elastic_slip={name: (both[0], both[1]) for name, both in values["elastic_slip"].items()},
             locked=dict(kept.get("locked", {})),
             bonds={name: Bond(**own) for name, own in kept.get("bonds", {}).items()},
             work=Work(**kept["work"]) if kept.get("work") else None,

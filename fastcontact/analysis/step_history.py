@@ -37,7 +37,7 @@ def save_contact_history(problem: Problem, start: State, load: StepLoad, settled
         end, active=settled.iterate.active, pressure=settled.iterate.pressure, rigid=settled.iterate.rigid,
         last_change=settled.last_change, first_contact=first_contacts(problem, start, load, end.u),
         extrapolation=start.extrapolation.converged(end.u, gaps_and_forces(settled.constraints, settled.solution)),
-        never_opening=never_opening(problem, start, settled), traction=tractions(problem, settled),
+        never_opening=never_opening(problem, start, settled), elastic_slip=elastic_slips(settled),
         bonds=bonds(settled, end.u),
     )  # fmt: skip
 
@@ -102,16 +102,16 @@ def never_opening(problem: Problem, start: State, settled: SettledContact) -> di
     return positions
 
 
-def tractions(problem: Problem, settled: SettledContact) -> dict[str, tuple[Array, Array]]:
-    """Return, for pairs with a tangential penalty, the positions of their constraints and the tangential tractions there."""
-    tractions_of_pairs = {}
+def elastic_slips(settled: SettledContact) -> dict[str, tuple[Array, Array]]:
+    """Return, for pairs whose sticking constraints give way, their positions and by how much they do, as `State` keeps it."""
+    given, solution = {}, settled.solution
     for name, rows in settled.constraints.rows().items():
-        constraints, solution = settled.constraints.parts[name], settled.solution
-        if problem.pairs[name].options.tangential_penalty is not None and isinstance(solution, FrictionalEquilibrium):
-            assert constraints.areas is not None
-            forces = np.einsum("nk,ndk->nd", solution.tangential[rows], np.stack(constraints.directions, axis=2))
-            tractions_of_pairs[name] = constraints.positions, forces / constraints.areas[:, None]
-    return tractions_of_pairs
+        constraints = settled.constraints.parts[name]
+        gives = constraints.compliance is not None or constraints.tangential_softness is not None
+        if gives and constraints.tangents and isinstance(solution, FrictionalEquilibrium):
+            slips = constraints.elastic_slips(solution.multiplier[rows], solution.tangential[rows])
+            given[name] = constraints.positions, slips
+    return given
 
 
 def bonds(settled: SettledContact, u: Array) -> dict[str, Bond]:

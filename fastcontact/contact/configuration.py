@@ -28,9 +28,9 @@ class Configuration:
     never_opening : (ndarray (k, dim), ndarray of bool (k,)), optional
         Reference places of constraints at the end of the load step before [length], and which of them never open again;
         None where all may open.
-    traction : (ndarray (k, dim), ndarray (k, dim)), optional
-        Reference places of constraints at the end of the load step before [length], and the tangential tractions there
-        [pressure]; None where nothing depends on them.
+    elastic_slip : (ndarray (k, dim), ndarray (k, dim)), optional
+        Reference places of constraints at the end of the load step before, and the slips by which their own compliance gave
+        way to the forces there [length]; None where nothing gives.
     angle, angle_start : float
         By which a rigid obstacle has turned, likewise [radian].
     worn : ndarray (n_points,), optional
@@ -53,7 +53,7 @@ class Configuration:
     obstacle_start: Array
     clearance_factor: float = 1.0
     never_opening: tuple[Array, Mask] | None = None
-    traction: tuple[Array, Array] | None = None
+    elastic_slip: tuple[Array, Array] | None = None
     angle: float = 0.0
     angle_start: float = 0.0
     worn: Array | None = None

@@ -11,6 +11,7 @@ from scipy.sparse import csr_array, diags_array, vstack
 
 from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.contact.overclosure import OverclosureLaw
+from fastcontact.contact.pairing import normals
 from fastcontact.linear.field_compliance import FieldCompliance
 
 
@@ -150,7 +151,8 @@ class Constraints:
     tangential_softness : ndarray (m,), optional
         Compliance of each constraint along its tangents [length / force]; None stands for zero.
     elastic_slip : ndarray (len(tangents), m), optional
-        What the forces along the tangents at the beginning of the step take from its slip by that compliance [length].
+        What the forces at the beginning of the step take from its slip by their own compliance: only what forces have
+        changed by since then makes constraints give way [length].
     low_rank_compliance : ndarray (1 + len(tangents), m, h), optional
         Z of a compliance ``Z Z.T`` beside C, of normal forces and then of tangential ones; None stands for zero.
     driven : ndarray of bool (m,), optional
@@ -250,6 +252,21 @@ class Constraints:
     def contact_forces(self, multiplier: Array) -> Array:
         """Return multipliers (m,) without those of fluid [force]."""
         return multiplier if self.wetted is None else np.where(self.wetted.rows, 0.0, multiplier)
+
+    def elastic_slips(self, multiplier: Array, tangential: Array) -> Array:
+        """Return the slips (m, dim) by which constraints give way to normal forces (m,) and tangential ones (m, k) [length].
+
+        That is their own compliance times these forces, along the tangents.
+        """
+        slips = np.zeros_like(tangential)
+        if self.tangential_softness is not None:
+            slips += self.tangential_softness[:, None] * tangential
+        if self.compliance is not None:
+            along = self.coupled_directions or self.directions
+            forces = multiplier[:, None] * normals(along) + np.einsum("mk,kmd->md", tangential, np.stack(along))
+            gives = np.column_stack([self.compliance.apply(component) for component in forces.T])
+            slips += np.einsum("md,kmd->mk", gives, np.stack(along))
+        return np.einsum("mk,kmd->md", slips, np.stack(self.directions))
 
     def pressure(self, multiplier: Array) -> Array:
         """Return nodal pressures (n_nodes,) per reference area from the multipliers (m,) [pressure]."""

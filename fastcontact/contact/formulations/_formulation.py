@@ -169,6 +169,10 @@ class Formulation(ABC):
         constraints = self.unilateral(at)
         if self.options.cohesion is None:
             constraints = self._softened(constraints, at)
+        if at.elastic_slip is not None and constraints.tangents:
+            before = _at_places(at.elastic_slip, constraints.positions)
+            given = np.stack([-np.einsum("md,md->m", t, before) for t in constraints.directions])
+            constraints = replace(constraints, elastic_slip=given)
         if constraints.friction is not None and at.friction_factor != 1.0:
             constraints = replace(constraints, friction=at.friction_factor * constraints.friction)
         if self.options.gap_only:
@@ -204,11 +208,7 @@ class Formulation(ABC):
             constraints = replace(constraints, softness=np.asarray(1.0 / (normal * areas)))
         if tangential is None or not constraints.tangents:
             return constraints
-        give, elastic = 1.0 / tangential(constraints.positions), np.zeros((len(constraints.tangents), len(constraints)))
-        if at.traction is not None:
-            before = _at_places(at.traction, constraints.positions)
-            elastic = np.stack([-give * np.einsum("md,md->m", t, before) for t in constraints.directions])
-        return replace(constraints, tangential_softness=give / areas, elastic_slip=elastic)
+        return replace(constraints, tangential_softness=1.0 / (tangential(constraints.positions) * areas))
 
     @cached_property
     def _gaps_as_they_lie(self) -> tuple[Array, Array]:

@@ -301,7 +301,7 @@ def test_all_that_a_step_changes_is_kept_or_set_anew():
     heat = {"rise", "instant"}  # where heat is conducted: see test_heat
     names = {"u": "obstacles"}
     names |= dict.fromkeys(("gap_round_off", "largest_force", "largest_rigid_force", "halved"), "numbers")
-    of_pairs = {"traction": "traction", "obstacles": "now", "angles": "angle", "never_opening": "closed"}
+    of_pairs = {"elastic_slip": "elastic_slip", "obstacles": "now", "angles": "angle", "never_opening": "closed"}
     of_pairs |= {"first_contact": "first_contact", "worn": "worn", "slipped": "slipped"}
     (step,) = fc.solve(spheres(), fc.linear_ramp(1), linear_solver="amg")
     for field in fields(State):
