@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from two_bodies import blocks, boxes, touching
 
 import fastcontact as fc
-from two_bodies import blocks, boxes, touching
 
 RAMP = fc.Ramp((0.5, 1.0, 2.0, 3.0, 4.0), ((0.0, 0.0), (1.0, 1.0), (9.0, 1.0)))
 FORMULATIONS = [
