@@ -41,6 +41,10 @@ class Criteria:
         with nonlinear bodies; these continue with substeps of that size, doubled after each one that took few iterations.
         Substeps are complete load steps, along whose path friction slides, but only the instants of the ramp yield
         results; ``iterations["substeps"]`` lists the ends of the substeps. 0: never.
+    friction_while_touching : float, optional
+        A load step in which nodes that close within it do more than this fraction of the frictional work so far is halved,
+        too, at most `max_halvings` times: shear and frictional work depend on where nodes come into contact, which a step
+        does not know of nodes that do so within it. By default steps are not halved for this [-].
 
     Examples
     --------
@@ -58,6 +62,7 @@ class Criteria:
     max_geometry_updates: int = 60
     max_active_set_iterations: int = 200
     max_halvings: int = 4
+    friction_while_touching: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("relative", "geometry"):
@@ -76,6 +81,10 @@ class Criteria:
             raise ModelError(f"the convergence criterion absolute = {self.absolute} must be a force >= 0, or None")
         if self.max_halvings < 0 or int(self.max_halvings) != self.max_halvings:
             raise ModelError(f"max_halvings = {self.max_halvings} must be a whole number >= 0")
+        if self.friction_while_touching is not None and not 0 < self.friction_while_touching <= 1:
+            raise ModelError(
+                f"friction_while_touching = {self.friction_while_touching} must be a fraction, above 0, up to 1"
+            )
         if self.keep_pairing and self.geometry_updates:
             raise ModelError(
                 f"keep_pairing leaves no room for geometry_updates = {self.geometry_updates}: give one or the other"

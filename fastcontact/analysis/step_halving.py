@@ -1,4 +1,6 @@
-"""Bisection of load steps that do not converge; a failed step leaves the state unchanged.
+"""Bisection of load steps that do not converge, or whose nodes slide too far while they touch.
+
+A step that is cut leaves the state unchanged.
 
 Parts of steps of nonlinear bodies keep the size of the last one, and double after one that took few iterations.
 """
@@ -25,7 +27,7 @@ FEW = 6
 
 
 def advance(problem: Problem, state: State, index: int, begin: float, end: float) -> tuple[State, StepResult]:
-    """Compute the step `index` from instant `begin` to `end`, in halves of halves where it does not converge.
+    """Compute the step `index` from instant `begin` to `end`, in halves of halves where it needs them.
 
     Parts of the step are steps of their own: friction slides along their path. The result is that at `end`, with the
     iterations and the dissipation of all parts; ``iterations["substeps"]`` lists the instants of their ends where it was cut.
@@ -46,11 +48,12 @@ def _parts(
     middle = 0.5 * (begin + end)
     if halved < state.halved and begin < middle < end:
         return _both(problem, state, index, (begin, middle, end), halved)
+    most = problem.criteria.max_halvings * (1 if problem.bodies is None else 2)
     try:
-        state, result = load_step(problem, state, index, end)
-        return _sized(problem, state, result, halved), [result]
+        after, result = load_step(problem, state, index, end)
+        if halved == most or not begin < middle < end or not _slides_while_touching(problem, state, after):
+            return _sized(problem, after, result, halved), [result]
     except ConvergenceError as error:
-        most = problem.criteria.max_halvings * (1 if problem.bodies is None else 2)
         if halved >= most or not begin < middle < end or not error.smaller_steps_help:
             where = f"from {begin:.6g} to {end:.6g}"
             often = "once" if halved == 1 else f"{halved} times"
@@ -75,6 +78,14 @@ def _both(
     state, first = _parts(problem, state, index, (begin, middle), halved + 1)
     state, second = _parts(problem, state, index, (middle, end), halved + 1)
     return state, first + second
+
+
+def _slides_while_touching(problem: Problem, state: State, after: State) -> bool:
+    """Return whether nodes that close in a step do more of the work of friction than `Criteria` allows."""
+    allowed = problem.criteria.friction_while_touching
+    if allowed is None or state.work is None or after.work is None:
+        return False
+    return after.work.touching - state.work.touching > allowed * after.work.friction
 
 
 def _sized(problem: Problem, state: State, result: StepResult, halved: int) -> State:

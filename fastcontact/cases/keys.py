@@ -19,7 +19,7 @@ RAMP = {"steps": int, "end": NUMBER, "instants": list, "table": list}
 SOLVE: dict[str, Any] = {
     "linear_solver": str,
     "keep_pairing": bool,
-    **dict.fromkeys(("linear_tolerance", "relative", "absolute", "geometry"), NUMBER),
+    **dict.fromkeys(("linear_tolerance", "relative", "absolute", "geometry", "friction_while_touching"), NUMBER),
     **dict.fromkeys(("geometry_updates", "max_geometry_updates", "max_active_set_iterations", "max_halvings"), int),
 }
 # A rigid surface: the facets of a group of a file, or of the mesh of the model.

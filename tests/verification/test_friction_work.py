@@ -189,3 +189,27 @@ def test_works_that_do_not_add_up_are_told(count):
     assert told == (count == 1)
     # The springs give back what they hold, 1/2 k u^2 at three nodes.
     assert abs(steps[-1].work["imbalance"]) < (0.1 if told else 0.005) * 0.5 * 300.0 * 0.5**2
+
+
+@pytest.mark.parametrize("formulation", ["continuous", "mortar", "node_to_segment"])
+def test_steps_are_cut_where_nodes_slide_while_they_touch(formulation):
+    """A ball pressed into a block: five steps, cut, have the work and the shear of eighty; left whole, twice the work."""
+    mesh = fc.generate.graded_block("quad4", width=10.0, depth=10.0, contact_radius=1.2, contact_size=0.1)
+    model = elastic_model(mesh, "axisymmetric")
+    model.fix("SYMMETRY_X", "x")
+    model.fix("BOTTOM", "xy")
+    ball = fc.obstacles.Sphere(centre=(0, 10.0), R=10.0)
+    options = {"formulation": formulation, "friction": 0.3}
+    model.add_obstacle("ball", secondary="CONTACT", obstacle=ball, motion={"y": -0.1}, **options)
+    fine, whole = (fc.solve(model, fc.linear_ramp(n))[-1] for n in (80, 5))
+    steps = fc.solve(model, fc.linear_ramp(5), criteria=fc.Criteria(friction_while_touching=0.02, max_halvings=5))
+    assert whole.work["friction_work"] > 2.0 * fine.work["friction_work"]
+    assert steps[-1].work["friction_work"] == pytest.approx(fine.work["friction_work"], rel=0.1)
+    shear, cut = (step.contact["ball"].shear for step in (fine, steps[-1]))
+    assert np.abs(cut - shear).max() < 0.05 * np.abs(shear).max()
+    assert sum(step.contact["ball"].dissipation for step in steps) == pytest.approx(steps[-1].work["friction_work"])
+
+
+def test_fraction_while_touching_is_checked():
+    with pytest.raises(fc.ModelError, match="friction_while_touching = 0 must be a fraction"):
+        fc.Criteria(friction_while_touching=0)
