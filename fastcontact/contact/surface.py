@@ -49,9 +49,9 @@ class Surface:
         The nodes; in order along the line where the facets form one open line, else ascending.
     abscissa : ndarray (m,)
         Length along the surface to each node [length]; zero where there is no such order.
-    periodic_ends : tuple of (ndarray of int (k,), ndarray of int (k,), ndarray (dim, dim))
+    periodic_ends : tuple of (ndarray of int (k,), ndarray of int (k,), ndarray (dim, dim) or (k, dim, dim))
         Positions in `points` at both ends of a part that repeats itself, and the turn [-] from the first to the second: there
-        the surface goes on.
+        the surface goes on. In a plane of symmetry both ends are the same nodes, and the turn is a reflection.
     """
 
     group: str
@@ -72,8 +72,8 @@ class Surface:
     def add_across_ends(self, vectors: Array) -> None:
         """Add up vectors (m, dim), sums over the facets at each end of an interface, over the facets of both ends."""
         for first, second, turn in self.periodic_ends:
-            vectors[first] += vectors[second] @ turn
-            vectors[second] = vectors[first] @ turn.T
+            vectors[first] += (vectors[second][:, None] @ turn)[:, 0]
+            vectors[second] = (vectors[first][:, None] @ np.swapaxes(turn, -1, -2))[:, 0]
 
     @property
     def n_facets(self) -> int:

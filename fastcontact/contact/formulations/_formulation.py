@@ -36,6 +36,8 @@ SLIPS = ("symmetric", "primary")
 ON_SYMMETRY = 0.05
 # In 3D a body that slides leaves edges and planes of symmetry node by node; a node that is dropped earlier comes and goes.
 LEAVING = 0.5
+# Sine of the angle to a plane of symmetry from which on a surface has a corner there.
+LEANING = 0.38
 
 
 @dataclass(eq=False)
@@ -113,6 +115,9 @@ class Formulation(ABC):
             raise ContactError(
                 "surface_smoothing corrects two meshed sides against each other: leave it out at an obstacle"
             )
+        if self.friction:
+            self.secondary = self._mirrored(self.secondary)
+            self.primary = self._mirrored(self.primary) if isinstance(self.primary, Surface) else self.primary
 
     @cached_property
     def smoothing(self) -> Smoothing | None:
@@ -358,18 +363,18 @@ class Formulation(ABC):
         both = without(both, moved, ALIKE * max(np.abs(at.displacement).max(), np.abs(at.start).max()))
         held = np.zeros((len(self.secondary.points), *both.shape[1:]))
         held[nodes] = both
-        return alike(self._without_whole_facets(held), self.points[self.secondary.points])
+        return alike(_without_whole_facets(held, self.secondary), self.points[self.secondary.points])
 
-    def _without_whole_facets(self, held: Array) -> Array:
-        """Return projectors (n_nodes, dim, dim) without the directions in which all nodes of a facet are held."""
-        whole = np.zeros_like(held)
-        for block in self.secondary.blocks:
-            around = held[block.local]
-            vectors = np.linalg.eigh(around.mean(axis=1))[1]
-            least = np.einsum("fdk,fnde,fek->fnk", vectors, around, vectors).min(axis=1) >= TOGETHER**2
-            vectors = np.where(least[:, None], vectors, 0.0)
-            np.add.at(whole, block.local, (vectors @ vectors.transpose(0, 2, 1))[:, None])
-        return spanned(held - held @ spanned(whole, 0.5) @ held, 0.5)
+    def _mirrored(self, side: Surface) -> Surface:
+        """Return a side whose averaged normals are those of the whole where supports hold its edge in a plane of symmetry."""
+        if self.held is None or not np.isin(side.points, self.held.nodes).any():
+            return side
+        held = _without_whole_facets(self.held.at(side.points), side)
+        normal = nodal_normals(side, self.points)
+        across = np.linalg.norm(np.einsum("nde,ne->nd", held, normal), axis=1)
+        nodes = np.flatnonzero(held.any(axis=(1, 2)) & (across < LEANING))
+        reflections = np.eye(self.points.shape[1]) - 2.0 * held[nodes]
+        return replace(side, periodic_ends=(*side.periodic_ends, (nodes, nodes, reflections)))
 
     def _closing_slip(
         self, candidates: Candidates, pairing: Pairing, directions: Sequence[Array], at: Configuration
@@ -426,6 +431,18 @@ class Formulation(ABC):
             gap0 += self.added_gap(nodes, pairing, at)
         u = at.displacement if displacement is None else displacement
         return np.where(pairing.paired, gap0 + G @ u.ravel(), np.inf), pairing.normal
+
+
+def _without_whole_facets(held: Array, side: Surface) -> Array:
+    """Return projectors (n_nodes, dim, dim) without the directions in which all nodes of a facet of a side are held."""
+    whole = np.zeros_like(held)
+    for block in side.blocks:
+        around = held[block.local]
+        vectors = np.linalg.eigh(around.mean(axis=1))[1]
+        least = np.einsum("fdk,fnde,fek->fnk", vectors, around, vectors).min(axis=1) >= TOGETHER**2
+        vectors = np.where(least[:, None], vectors, 0.0)
+        np.add.at(whole, block.local, (vectors @ vectors.transpose(0, 2, 1))[:, None])
+    return spanned(held - held @ spanned(whole, 0.5) @ held, 0.5)
 
 
 def _at_places(known: tuple[Array, AnyArray], positions: Array) -> AnyArray:
