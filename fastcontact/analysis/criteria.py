@@ -42,9 +42,9 @@ class Criteria:
         Substeps are complete load steps, along whose path friction slides, but only the instants of the ramp yield
         results; ``iterations["substeps"]`` lists the ends of the substeps. 0: never.
     friction_while_touching : float, optional
-        A step is halved, too, if nodes that close within it do more than this fraction of the work of friction so far: shear
-        and work of friction depend on where nodes first touch, which is unknown within a step. By default steps are not
-        halved for this [-].
+        A load step in which nodes that close within it do more than this fraction of the frictional work so far is halved,
+        too, at most `max_halvings` times: shear and frictional work depend on where nodes come into contact, which a step
+        does not know of nodes that do so within it. By default steps are not halved for this [-].
 
     Examples
     --------

@@ -21,6 +21,7 @@ from fastcontact.analysis.friction.slip_directions import GIVING, aligning, idle
 from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
+from fastcontact.contact.pairing import normals
 from fastcontact.linear.delassus import MOST_ROWS_WITH_FRICTION, check_rows
 from fastcontact.linear.protocol import Loaded, LoadedNonsymmetric
 
@@ -181,10 +182,7 @@ def _turned(C: Array, along: Array) -> Array:
     along : ndarray (k, m, dim)
         Tangents, zero without friction.
     """
-    if len(along) == 1:
-        normal = np.column_stack([-along[0, :, 1], along[0, :, 0]])
-    else:
-        normal = np.cross(along[0], along[1])
+    normal = normals(list(along))
     normal[~along.any(axis=(0, 2)), 0] = 1.0  # where nothing turns
     frame = np.concatenate([normal[None], along]).reshape(-1, normal.shape[1])
     parts = len(along) + 1
