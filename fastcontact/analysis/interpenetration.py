@@ -124,8 +124,8 @@ def _through_obstacles(problem: Problem, state: State, last: StepResult) -> list
         if not isinstance(pair.primary, RigidSide) or pair.options.wear:  # what is worn off is still in the mesh
             continue
         nodes = pair.secondary.points
-        beside = [block[np.isin(block, nodes).any(axis=1)].ravel() for block in outer_facets(mesh).values()]
-        points = np.setdiff1d(np.concatenate(beside), nodes)
+        facets = [block[np.isin(block, nodes).any(axis=1)].ravel() for block in outer_facets(mesh).values()]
+        points = np.setdiff1d(np.concatenate(facets), nodes)
         if not len(points):
             continue
         at_rest = pair.primary.facing(mesh.points[points], Pose(np.zeros(mesh.dim)))[0]

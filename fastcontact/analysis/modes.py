@@ -236,13 +236,13 @@ def _modes(vibration: _Vibration, values: Array, vectors: Array) -> Modes:
     )  # fmt: skip
 
 
-def _of_ring(vibration: _Vibration, sectors: Sectors, found: list[tuple[Wave, Array, AnyArray]]) -> Modes:
+def _of_ring(vibration: _Vibration, sectors: Sectors, waves: list[tuple[Wave, Array, AnyArray]]) -> Modes:
     """Return the modes of the whole ring from eigenvalues (n,) and displacements (n_dofs, n) of each wave."""
     momentum, number = _momentum(vibration), sectors.number
     turns = [np.linalg.matrix_power(sectors.turn, k) for k in range(number)]
     values: list[float] = []
     shapes, participation, diameters, twins = [], [], [], []
-    for wave, eigenvalues, vectors in found:
+    for wave, eigenvalues, vectors in waves:
         vectors = (_upright(vectors) if wave.single else np.sqrt(2.0) * vectors) / np.sqrt(number)
         phases = np.exp(1j * wave.angle * np.arange(number))
         ring = np.einsum("nd,k,ked->ne", vectors.T @ momentum, phases, turns)

@@ -208,9 +208,9 @@ def _reach(problem: Problem, start: State, u: Array, target: Array) -> tuple[Arr
     """
     fraction = 1.0
     for _ in range(HALVINGS):
-        there = target if fraction == 1.0 else u + fraction * (target - u)
+        end = target if fraction == 1.0 else u + fraction * (target - u)
         try:
-            return there, problem.deformed(there, start), fraction
+            return end, problem.deformed(end, start), fraction
         except ConvergenceError as error:
             failed = error
         fraction *= 0.5
@@ -231,17 +231,17 @@ def _searched(
         out = problem.internal(bodies, u, load)[0] - contact_force - load.force
         return float(problem.system.reduced(out) @ along)
 
-    (u, here), (target, there) = begin, end
+    (u, here), (target, u_end) = begin, end
     along = problem.system.unknowns(target - u)
-    first, last, fraction = slope(u, here), slope(target, there), 1.0
+    first, last, fraction = slope(u, here), slope(target, u_end), 1.0
     for _ in range(SEARCHES):
         if not last > OVERSHOT * abs(first):
             break
         fraction *= max(abs(first) / (abs(first) + last), LEAST)
         target = u + fraction * (end[0] - u)
-        there = problem.deformed(target, start)
-        last = slope(target, there)
-    return target, there, fraction
+        u_end = problem.deformed(target, start)
+        last = slope(target, u_end)
+    return target, u_end, fraction
 
 
 def _told(iterate: Iterate, change: float, balanced: Balance, fraction: float) -> dict[str, Any]:

@@ -157,10 +157,10 @@ def _loose(problem: Problem, last: StepResult) -> Iterator[str]:
 def _carrying_springs(problem: Problem, state: State) -> Iterator[str]:
     if problem.floating_bodies is None or state.rigid is None:
         return
-    told = problem.floating_bodies.report(state.rigid, state.largest_rigid_force)
-    if told["relative_to_load"] > problem.criteria.relative:
+    report = problem.floating_bodies.report(state.rigid, state.largest_rigid_force)
+    if report["relative_to_load"] > problem.criteria.relative:
         yield (
-            f"the springs that regularise {'; '.join(told['motions'])} still carry {told['relative_to_load']:.1e} of "
+            f"the springs that regularise {'; '.join(report['motions'])} still carry {report['relative_to_load']:.1e} of "
             "the load: rigid motions are so much larger than deformations that round-off leaves no more"
         )
 

@@ -60,9 +60,9 @@ def _parts(
             part = (
                 f"step {index} was cut in halves {often}, the part {where} fails" if halved else f"step {index} {where}"
             )
-            told = ConvergenceError(f"{error} ({part})", error.history, smaller_steps_help=False)
+            final = ConvergenceError(f"{error} ({part})", error.history, smaller_steps_help=False)
             # As raised where it was found: the same words twice, in two tracebacks, would tell nothing more.
-            raise told.with_traceback(error.__traceback__) from None
+            raise final.with_traceback(error.__traceback__) from None
         reason = str(error).split(". ")[0]
         for listener in listeners:
             listener(index, begin, end)

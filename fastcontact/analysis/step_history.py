@@ -50,29 +50,29 @@ def keep_path(
 
     `energy` is that of deformation, elastic and plastic [energy].
     """
-    displacement, told, works = problem.displacement(end.u), dict(results), np.zeros(3)
+    displacement, results_so_far, works = problem.displacement(end.u), dict(results), np.zeros(3)
     worn, slipped, forces = dict(start.worn), dict(start.slipped), dict(start.forces)
     for name, rows in settled.constraints.rows().items():
         pair, contact, constraints = problem.pairs[name], results[name], settled.constraints.parts[name]
         at = problem.configuration(name, start, load, displacement, end.u)
         slip = slip_in_step(pair, at, contact)
         slipped[name] = slip + start.slipped.get(name, 0.0)
-        told[name] = replace(contact, slip=slip, slip_total=slipped[name])
+        results_so_far[name] = replace(contact, slip=slip, slip_total=slipped[name])
         if pair.options.wear is not None:
             before = start.worn.get(name, Worn.nothing(len(contact.points)))
             worn[name] = before.after(pair, at, contact, pair.options.wear)
-            told[name] = replace(told[name], wear=worn[name].depth)
+            results_so_far[name] = replace(results_so_far[name], wear=worn[name].depth)
         if name in end.bonds:
-            told[name] = replace(told[name], damage=end.bonds[name].at(contact.coordinates)[1])
+            results_so_far[name] = replace(results_so_far[name], damage=end.bonds[name].at(contact.coordinates)[1])
         elif not (pair.options.tied or pair.options.gap_only):
             given = constraints, settled.solution, rows, at, contact, start.forces.get(name)
             forces[name], work_of_pair = contact_work(pair, *given)
-            told[name] = replace(told[name], dissipation=work_of_pair[0])
+            results_so_far[name] = replace(results_so_far[name], dissipation=work_of_pair[0])
             works += work_of_pair
     stored = sum(entry.stored for entry in forces.values()) + sum(entry.stored for entry in end.bonds.values())
     released = sum(entry.released for entry in end.bonds.values())
     work = None if start.work is None else start.work.after(energy, stored, works.tolist(), released)
-    return replace(end, worn=worn, slipped=slipped, forces=forces, work=work), told
+    return replace(end, worn=worn, slipped=slipped, forces=forces, work=work), results_so_far
 
 
 def first_contacts(problem: Problem, start: State, load: StepLoad, u: Array) -> dict[str, tuple[Array, Array]]:

@@ -49,13 +49,13 @@ def recover(
         problem.factors(own, instant[1]) for own in (problem.model.temperatures, problem.model.initial_states)
     )
     factors = {"temperature_factors": temperature, "initial_factors": initial}
-    iterations = {**iterations, **{key: found for key, found in factors.items() if found}}
+    iterations = {**iterations, **{key: pretension for key, pretension in factors.items() if pretension}}
     heat = None if end.rise is None else problem.model.reference_temperature + end.rise
     sections = problem.model.pretensions
     if sections:
         pulls = [multiplier(own.ramp, problem.ramp, instant[1]) for own in sections]
-        found = section_results(sections, u, reaction.reshape(-1, mesh.dim), pulls)
-        iterations = {**iterations, "pretension": found}
+        pretension = section_results(sections, u, reaction.reshape(-1, mesh.dim), pulls)
+        iterations = {**iterations, "pretension": pretension}
     if bodies is None:
         at_places = recovery.nodal_stress(
             mesh, problem.model.kinematics, problem.field.moduli, problem.field.loops, u, problem.field.treatment,

@@ -129,20 +129,20 @@ def nonlinear_scatter_warnings(problem: Problem, state: State) -> list[str]:
 
 def scatter_warnings(problem: Problem, step: StepResult) -> list[str]:
     """Return a warning where the stresses of linear cells are far from recovered ones."""
-    found = StressScatter(problem, step)
-    names = " and ".join(found.elements)
-    if found.pressure > ALTERNATING:
+    measure = StressScatter(problem, step)
+    names = " and ".join(measure.elements)
+    if measure.pressure > ALTERNATING:
         return [
-            f"{names} cells lock: at nu = {found.nu:g} their mean stress scatters by {found.pressure:.0%} about its averages "
-            "at the nodes, and contact pressures with it; use quadrangles or hexahedra, or quadratic elements "
+            f"{names} cells lock: at nu = {measure.nu:g} their mean stress scatters by {measure.pressure:.0%} about its "
+            "averages at the nodes, and contact pressures with it; use quadrangles or hexahedra, or quadratic elements "
             "(generate.to_quadratic)"
         ]
     if (
-        found.energy > BENDING and problem.model.kinematics != "axisymmetric"
+        measure.energy > BENDING and problem.model.kinematics != "axisymmetric"
     ):  # where cells at the axis scatter by as much
         return [
-            f"{names} cells are too stiff, as where thin parts bend: their stress is off by {found.energy:.0%} (energy norm "
-            "of the difference from stress recovered at the nodes); use hexahedra or quadrangles with "
+            f"{names} cells are too stiff, as where thin parts bend: their stress is off by {measure.energy:.0%} (energy "
+            "norm of the difference from stress recovered at the nodes); use hexahedra or quadrangles with "
             "LinearElastic(incompatible_modes=True), quadratic elements (generate.to_quadratic), or smaller ones"
         ]
     return []

@@ -55,12 +55,12 @@ def support_forces(model: Model, step: StepResult) -> dict[str, Array]:
     _check(model, step)
     n, (held, _) = model.n_dofs, model.prescribed()
     related = [relation for _, relation in model.related_supports]
-    coupling = [relation for relation in model.relations if not any(relation is own for own in related)]
+    coupling = [relation for relation in model.relations if not any(relation is resultant for resultant in related)]
     reaction = step.reaction.ravel() - ground_force(model.springs, step.displacement.ravel())
     rows = [relation.rows for relation in (*related, *coupling)]
     rows += [section.row(n) for section in model.pretensions]  # which may be locked
     forces = multipliers(reaction, rows, held.ravel())
-    reaction = reaction - sum((own.T @ force for own, force in zip(rows, forces, strict=True)), np.zeros(n))
+    reaction = reaction - sum((resultant.T @ force for resultant, force in zip(rows, forces, strict=True)), np.zeros(n))
     by_support: dict[str, Array] = {}
     left = np.where(held, reaction.reshape(held.shape), 0.0)
     for support in model.supports:
@@ -68,8 +68,8 @@ def support_forces(model: Model, step: StepResult) -> dict[str, Array]:
         by_support.setdefault(support.group, np.zeros(held.shape[1]))[k] += left[nodes, k].sum()
         left[nodes, k] = 0.0
     for (group, relation), force in zip(model.related_supports, forces, strict=False):
-        own = (relation.rows.T @ force).reshape(held.shape).sum(axis=0)
-        by_support[group] = by_support.get(group, 0.0) + own
+        resultant = (relation.rows.T @ force).reshape(held.shape).sum(axis=0)
+        by_support[group] = by_support.get(group, 0.0) + resultant
     return by_support
 
 

@@ -147,16 +147,16 @@ def _conducted(problem: Problem, start: State, load: StepLoad, instant: float, e
         if law is not None:
             h, facing = np.zeros(len(gap)), own.area > 0.0
             h[facing] = law(force[facing] / own.area[facing], gap[facing])
-            there = 0.0
+            obstacle_rise = 0.0
             if pair.options.obstacle_temperature is None:
                 matrix = csr_array(matrix + own.matrix(h))
             else:
-                there = pair.options.obstacle_temperature - problem.model.reference_temperature
+                obstacle_rise = pair.options.obstacle_temperature - problem.model.reference_temperature
                 obstacles, given = (
                     csr_array(obstacles + own.matrix(h)),
-                    given + own.secondary.T @ (h * own.area * there),
+                    given + own.secondary.T @ (h * own.area * obstacle_rise),
                 )
-            crossings[name] = own, constraints.nodal, h, there
+            crossings[name] = own, constraints.nodal, h, obstacle_rise
         if pair.options.friction_heat and isinstance(solution, FrictionalEquilibrium):
             work = np.maximum(-(solution.tangential[rows] * solution.slip[rows]).sum(axis=1), 0.0)
             rubbed += own.shared(pair.options.friction_heat * work / (instant - start.instant))

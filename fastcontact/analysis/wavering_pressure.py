@@ -25,14 +25,14 @@ def wavering(pair: Formulation, contact: ContactResult) -> Iterator[str]:
     """
     if pair.options.always_closed or pair.options.cohesion is not None:
         return
-    beside = pair.secondary.beside
+    neighbours = pair.secondary.beside
     # A node is among its own neighbours here: so many less one are the others.
-    others = np.asarray(beside.sum(axis=1)).ravel() - 1.0
-    inside = contact.active & (beside @ ~contact.active == 0) & (others > 0)
+    others = np.asarray(neighbours.sum(axis=1)).ravel() - 1.0
+    inside = contact.active & (neighbours @ ~contact.active == 0) & (others > 0)
     if inside.sum() < MANY:
         return
     pressure = contact.pressure[inside]
-    apart = pressure - ((beside @ contact.pressure)[inside] - pressure) / others[inside]
+    apart = pressure - ((neighbours @ contact.pressure)[inside] - pressure) / others[inside]
     size, mean = float(np.median(np.abs(apart))), float(pressure.mean())
     if not size > WAVERING * mean > 0.0:
         return

@@ -128,8 +128,8 @@ def at(where: str) -> Iterator[None]:
     except FastcontactError as error:
         if where.replace(".", " '", 1) + "'" in str(error):  # it names the place already
             raise
-        if told := _of_key(where, str(error)):
-            raise CaseError(told) from error
+        if message := _of_key(where, str(error)):
+            raise CaseError(message) from error
         raise type(error)(f"{where}: {error}") from error
 
 

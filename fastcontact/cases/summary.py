@@ -308,11 +308,11 @@ def _edge(inside: float | None, outside: float | None, unit: Mapping[str, str]) 
     return f"radius {inside:.4g} to {valued(outside, unit, 'length')}"
 
 
-def _regularised_line(told: Mapping[str, Any], unit: Mapping[str, str]) -> str:
+def _regularised_line(report: Mapping[str, Any], unit: Mapping[str, str]) -> str:
     return (
-        f"  held by contact alone: {'; '.join(told['motions'])}. Regularised by springs of "
-        f"{valued(told['spring_stiffness'], unit, 'stiffness', 3)}, which carry {told['relative_to_load']:.1e} of the load "
-        "in the end"
+        f"  held by contact alone: {'; '.join(report['motions'])}. Regularised by springs of "
+        f"{valued(report['spring_stiffness'], unit, 'stiffness', 3)}, which carry {report['relative_to_load']:.1e} of the "
+        "load in the end"
     )
 
 
@@ -332,12 +332,12 @@ def _theory_lines(pair: str, theory: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _sensitivity_lines(told: Mapping[str, Any]) -> list[str]:
-    quantity = " ".join(map(str, told["quantity"]))
-    if "refused" in told:
-        return [f"  no sensitivities of {quantity}: {told['refused']}"]
-    changes = ", ".join(f"{' '.join(map(str, d['by']))} {d['value']:.6g}" for d in told["derivatives"])
-    return [f"  sensitivities of {quantity}, now {told['value']:.6g}: by {changes}"]
+def _sensitivity_lines(report: Mapping[str, Any]) -> list[str]:
+    quantity = " ".join(map(str, report["quantity"]))
+    if "refused" in report:
+        return [f"  no sensitivities of {quantity}: {report['refused']}"]
+    changes = ", ".join(f"{' '.join(map(str, d['by']))} {d['value']:.6g}" for d in report["derivatives"])
+    return [f"  sensitivities of {quantity}, now {report['value']:.6g}: by {changes}"]
 
 
 def _check_line(check: Mapping[str, Any], unit: Mapping[str, str]) -> str:

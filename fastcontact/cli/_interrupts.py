@@ -80,12 +80,12 @@ def _lost_ones_come_again(raised: list[int], heard: list[float]) -> Iterator[Non
     """Repeat an interruption that Python would print and forget; once one was `raised`, finalisers have nothing to say."""
     before = sys.unraisablehook
 
-    def lost(found: sys.UnraisableHookArgs) -> None:
-        if issubclass(found.exc_type, KeyboardInterrupt):
+    def lost(unraisable: sys.UnraisableHookArgs) -> None:
+        if issubclass(unraisable.exc_type, KeyboardInterrupt):
             heard.clear()
             _again(raised[-1] if raised else signal.SIGINT)
         elif not raised:
-            before(found)
+            before(unraisable)
 
     sys.unraisablehook = lost
     try:

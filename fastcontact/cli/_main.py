@@ -128,8 +128,8 @@ def _run(given: list[str]) -> int:
     handler = _Printable()
     log.handlers[:] = [handler]
     log.setLevel(logging.INFO if arguments.verbose else logging.WARNING)
-    told = somebody_watches() and not (arguments.quiet or arguments.verbose)  # the log tells it with -v
-    compiling.listeners[:] = [_say_compiling] if told else []
+    notify = somebody_watches() and not (arguments.quiet or arguments.verbose)  # the log tells it with -v
+    compiling.listeners[:] = [_say_compiling] if notify else []
     with warnings_shown():
         return int(arguments.run(arguments) or 0)
 

@@ -74,8 +74,8 @@ def _adaptive(options: argparse.Namespace) -> int:
     return 0 if study.reached else 2
 
 
-def _only(text: str | None, what: str) -> str | None:
+def _only(text: str | None, option: str) -> str | None:
     names = _study.names(text) or []
     if len(names) > 1:
-        raise CaseError(f"adaptive meshes take one {what}, not {len(names)}: {text}")
+        raise CaseError(f"adaptive meshes take one {option}, not {len(names)}: {text}")
     return names[0] if names else None

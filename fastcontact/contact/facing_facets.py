@@ -189,10 +189,10 @@ def _faced_by(
     facet, other = owner[ours], np.flatnonzero(rest)[closest.facet]
     apart = point[ours] - closest.position
     gap = np.einsum("nd,nd->n", apart, closest.normal)
-    beside = np.linalg.norm(apart - gap[:, None] * closest.normal, axis=1)
+    offset = np.linalg.norm(apart - gap[:, None] * closest.normal, axis=1)
     larger = np.maximum(size[facet], size[other])
     opposed = np.einsum("nd,nd->n", normal[ours], closest.normal) <= -np.cos(np.radians(angle))
     near = closest.distance <= (larger if distance is None else distance) + LENGTH_ROUND_OFF * larger
-    ahead = beside <= np.abs(gap) * np.tan(np.radians(angle)) + LENGTH_ROUND_OFF * larger
+    ahead = offset <= np.abs(gap) * np.tan(np.radians(angle)) + LENGTH_ROUND_OFF * larger
     kept = opposed & near & ahead
     return facet[kept], other[kept], gap[kept]

@@ -266,8 +266,8 @@ def _pairs(
         second, reason = _secondary(outside, ends, stiff)
         ends, numbers = (ends, pair) if second == 0 else (ends[:, ::-1], pair[::-1])
         face = outside.smooth_face[ends[:, 0]]
-        for number, one in enumerate(order := np.unique(face), start=1):
-            mine = face == one
+        for number, surface in enumerate(order := np.unique(face), start=1):
+            mine = face == surface
             gap, spacing = search.gap[rows[mine]], _spacing(outside, ends[mine])
             sides = np.unique(ends[mine, 0]), np.unique(ends[mine, 1])
             both = names[numbers[0]], names[numbers[1]]

@@ -58,8 +58,8 @@ class Projection:
             return np.zeros((len(rows), len(rows)))
         areas = self.areas[rows]
         P = self.P[rows].toarray() * (areas > 0)[:, None]
-        own = np.divide(1.0, areas, out=np.zeros_like(areas), where=areas > 0)
-        return (np.diag(own) - P @ self.mass.solve(np.ascontiguousarray(P.T))) / self.rho
+        inverse = np.divide(1.0, areas, out=np.zeros_like(areas), where=areas > 0)
+        return (np.diag(inverse) - P @ self.mass.solve(np.ascontiguousarray(P.T))) / self.rho
 
     def among(self, rows: Indices) -> Array | FieldCompliance:
         """Return C among `rows`; see `Compliance`."""
@@ -75,8 +75,8 @@ class Projection:
     def apply(self, multiplier: Array) -> Array:
         """Return ``C multiplier``."""
         inside = self.areas > 0
-        own = np.divide(multiplier, self.areas, out=np.zeros_like(multiplier), where=inside)
-        return np.where(inside, own - self.P @ self.field(np.where(inside, multiplier, 0.0)), 0.0) / self.rho
+        pressure = np.divide(multiplier, self.areas, out=np.zeros_like(multiplier), where=inside)
+        return np.where(inside, pressure - self.P @ self.field(np.where(inside, multiplier, 0.0)), 0.0) / self.rho
 
     def field(self, multiplier: Array) -> Array:
         """Return the independent values (k,) of the multiplier field [pressure] for point forces (m,) [force]."""

@@ -242,9 +242,9 @@ def check_law(law: Material, strain: str) -> None:
     if law.incompatible_modes and (strain == "finite" or isinstance(law, NonlinearElastic)):
         raise ModelError("incompatible modes are there for linear bodies alone: leave incompatible_modes out")
     if strain == "finite" and not isinstance(law, NonlinearElastic) and law.averaged:
-        told = "NeoHookean(E=..., nu=...)" if isinstance(law, LinearElastic) else "a hyperelastic law"
+        example = "NeoHookean(E=..., nu=...)" if isinstance(law, LinearElastic) else "a hyperelastic law"
         raise ModelError(
-            f"a nearly incompressible material ({law.described}) locks in elements of finite strains: take {told}"
+            f"a nearly incompressible material ({law.described}) locks in elements of finite strains: take {example}"
         )
 
 

@@ -187,16 +187,16 @@ def too_stiff(K: bsr_array, springs: Sequence[Springs]) -> list[str]:
         ratio, body = _stiffer(spring, K.diagonal(), dim)
         if ratio <= STIFF:
             continue
-        told = f"{spring.name} is {ratio:.1e} times as stiff as the body at one of its ends ({body:.3g})"
+        text = f"{spring.name} is {ratio:.1e} times as stiff as the body at one of its ends ({body:.3g})"
         instead = (
             f"take {0.1 * STIFF * body:.0e} or less, or a relation (relate, relate_groups), which is rigid and exact"
         )
         lost = round(math.log10(ratio))
         if ratio > STIFFEST:
             left = "no digit" if lost >= DIGITS else f"{DIGITS - lost} of {DIGITS} digits"
-            raise ModelError(f"{told}: {left} would be left of results; {instead}")
+            raise ModelError(f"{text}: {left} would be left of results; {instead}")
         texts.append(
-            f"{told}: results lose up to {lost} of {DIGITS} digits, and beside contact its force is off by as many times the "
+            f"{text}: results lose up to {lost} of {DIGITS} digits, and beside contact its force is off by as many times the "
             f"criteria; {instead}"
         )
     return texts

@@ -124,7 +124,7 @@ def _contact(model: Any, pair: ContactPair) -> str:
     law = {"tied": "tied", "gap_only": "only watched, without forces"}.get(kind, law if kind == "unilateral" else kind)
     opposite = f"'{pair.primary}'" if pair.obstacle is None else pair.opposite
     others = sorted({*pair.options} - {"friction", "kind", "multipliers"})
-    told = f" (further options: {', '.join(others)})" if others else ""
+    text = f" (further options: {', '.join(others)})" if others else ""
     if pair.fluid is not None:
-        told += f", fluid of pressure {pair.fluid.pressure:g} from '{pair.fluid.source}'{_history(pair.fluid.ramp)}"
-    return f"'{pair.secondary}' ({nodes} points) on {opposite}, {pair.method}, {law}{told}"
+        text += f", fluid of pressure {pair.fluid.pressure:g} from '{pair.fluid.source}'{_history(pair.fluid.ramp)}"
+    return f"'{pair.secondary}' ({nodes} points) on {opposite}, {pair.method}, {law}{text}"

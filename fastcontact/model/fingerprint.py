@@ -73,7 +73,7 @@ def formulation_behind(model: Model, name: str, digest: str | None) -> str | Non
 
     None where it is not: pairs that named none had other defaults in earlier versions.
     """
-    (pair,) = (one for one in model.contact if one.name == name)
+    (pair,) = (candidate for candidate in model.contact if candidate.name == name)
     plain = _without(_without(pair, "surface_smoothing"), "multipliers")
     for formulation, options in _choices():
         other = dataclasses.replace(plain, formulation=formulation, options={**plain.options, **options})

@@ -141,7 +141,7 @@ class SpreadForce(Load):
             force[axis] = value
         points, weight = shares_of(mesh, kinematics, self.group, self.spread)
         places = mesh.points[points]
-        found = weight[:, None] * force
+        nodal = weight[:, None] * force
         arm = np.array(self.spread.place) - weight @ places
         moment = (
             np.atleast_1d(np.cross(arm, force)) if mesh.dim == 3 else np.array([arm[0] * force[1] - arm[1] * force[0]])
@@ -149,10 +149,10 @@ class SpreadForce(Load):
         size = float(np.ptp(mesh.points, axis=0).max())
         if np.abs(moment).max() > ROUND_OFF * np.abs(force).max() * size:
             try:
-                found = found + turned(weight, places, moment)
+                nodal = nodal + turned(weight, places, moment)
             except ModelError as error:
                 raise ModelError(f"{self.name}: {error}") from error
-        forces[points] += found
+        forces[points] += nodal
 
 
 def spread_of(name: str, point: Sequence[float] | None, weighting: str, radius: float | None) -> Spread | None:

@@ -140,9 +140,9 @@ class CommittedFile(DriverFile):
         """Return the part of a write that changes the file, from its first byte to its last."""
         if len(data) > COMPARED:
             return offset, data
-        there = bytearray(len(data))
-        super()._get(offset, there)
-        differs = np.flatnonzero(np.frombuffer(data, np.uint8) != np.frombuffer(there, np.uint8))
+        stored = bytearray(len(data))
+        super()._get(offset, stored)
+        differs = np.flatnonzero(np.frombuffer(data, np.uint8) != np.frombuffer(stored, np.uint8))
         if not len(differs):
             return offset, b""
         return offset + int(differs[0]), data[differs[0] : differs[-1] + 1]

@@ -205,8 +205,8 @@ class ContactResult:
         }
 
     def __repr__(self) -> str:
-        told = ", ".join(f"{name} {text}" for name, text in self.shown.items())
-        return f"ContactResult('{self.name}', {self.formulation}: {told})"
+        texts = ", ".join(f"{name} {text}" for name, text in self.shown.items())
+        return f"ContactResult('{self.name}', {self.formulation}: {texts})"
 
     def _repr_html_(self) -> str:
         """Return a table for notebooks."""
@@ -363,8 +363,8 @@ class StepResult:
             f"'{c.name}': force {c.shown['force']}, largest pressure {c.shown['largest pressure']}"
             for c in self.contact.values()
         ]
-        told = [f"largest displacement {self.shown['largest displacement']}", *pairs]
-        return f"StepResult({self.index}, load factor {self.load_factor:.6g}; {'; '.join(told)})"
+        texts = [f"largest displacement {self.shown['largest displacement']}", *pairs]
+        return f"StepResult({self.index}, load factor {self.load_factor:.6g}; {'; '.join(texts)})"
 
     def _repr_html_(self) -> str:
         """Return tables of the step and of its contact pairs for notebooks."""

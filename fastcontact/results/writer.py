@@ -372,12 +372,12 @@ class ResultWriter:
                 failure = self._committed.failure if self._committed is not None else None
                 if isinstance(error, (FastcontactError, MemoryError)):
                     raise
-                told = failure or error
-                if not isinstance(told, Exception):
-                    raise told from None
-                reason = getattr(told, "strerror", None) or next(iter(str(told).splitlines()), type(told).__name__)
+                cause = failure or error
+                if not isinstance(cause, Exception):
+                    raise cause from None
+                reason = getattr(cause, "strerror", None) or next(iter(str(cause).splitlines()), type(cause).__name__)
                 remedy = "see whether the disk is full or the folder protected"
-                if not isinstance(told, (OSError, RuntimeError)):
+                if not isinstance(cause, (OSError, RuntimeError)):
                     remedy = "its tables are damaged: name another file, or start anew without resuming"
                 raise FileError(
                     f"'{self.path}' cannot be {action} ({reason}), {self.n_steps} steps are complete: {remedy}"

@@ -129,8 +129,8 @@ class AdaptiveStudy(Report):
         """Return a matplotlib figure: errors over degrees of freedom, and the last mesh coloured by its error."""
         heading = f"{self.title}: {self.combination}, refined for the {title(self.quantity)}"
         width, height = np.ptp(self.case.mesh.points, axis=0)
-        beside = float(np.clip(4.2 * width / height, 2.0, 8.0)) + 1.3  # [inch], the scale of colours included
-        errors, mesh = panels(1, 2, (6.2 + beside, 5.2), heading, widths=(6.2, beside))[0]
+        height_of_axes = float(np.clip(4.2 * width / height, 2.0, 8.0)) + 1.3  # [inch], the scale of colours included
+        errors, mesh = panels(1, 2, (6.2 + height_of_axes, 5.2), heading, widths=(6.2, height_of_axes))[0]
         self._draw_errors(errors)
         self._draw_mesh(mesh)
         return mesh.figure

@@ -39,8 +39,8 @@ def level_rows(series: Series, units: Mapping[str, str], quantities: Sequence[st
 def limit_rows(series: Series, units: Mapping[str, str]) -> Rows:
     """Return header and rows: limit, order, theory and errors of every quantity with a limit."""
     cells = [[column(title(name), name, units), *_cells(series, name, OF_LIMITS)] for name in series.limits]
-    told = [any(row[index] != "-" for row in cells) for index in range(len(OF_LIMITS) + 1)]
-    return [list(itertools.compress(row, told)) for row in (["quantity", *OF_LIMITS], *cells)]
+    shown = [any(row[index] != "-" for row in cells) for index in range(len(OF_LIMITS) + 1)]
+    return [list(itertools.compress(row, shown)) for row in (["quantity", *OF_LIMITS], *cells)]
 
 
 def comparison_rows(all_series: Sequence[Series], quantities: Sequence[str], units: Mapping[str, str]) -> Rows:

@@ -215,7 +215,7 @@ def _squares(
 def _exact(theory: Theory, places: Array, n_components: int) -> tuple[Array, Array]:
     """Return displacements and stresses (n_cells, n_q, ...) of the theory at `places` (n_cells, n_q, dim)."""
     points = places.reshape(-1, places.shape[2])
-    found = []
+    at_points = []
     for name, size in (("displacement", points.shape[1]), ("stress", n_components)):
         values = np.asarray(getattr(theory, name)(points), float)
         if values.shape != (len(points), size):
@@ -223,5 +223,5 @@ def _exact(theory: Theory, places: Array, n_components: int) -> tuple[Array, Arr
         if not np.isfinite(values).all():
             where = points[np.flatnonzero(~np.isfinite(values).all(axis=1))[0]]
             raise ModelError(f"the theory's {name} is not finite at {where}")
-        found.append(values.reshape(*places.shape[:2], size))
-    return found[0], found[1]
+        at_points.append(values.reshape(*places.shape[:2], size))
+    return at_points[0], at_points[1]

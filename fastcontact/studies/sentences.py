@@ -24,8 +24,8 @@ def _about_quantity(series: Series, quantity: str) -> list[str]:
     split, name = series.split(quantity), title(quantity)
     if split is None:
         off = percent(series.errors(quantity)[-1])
-        told = f"{series.combination}: the mesh error of the {name} is {off} on the finest mesh."
-        return [told, *_about_settling(series, quantity, name)]
+        text = f"{series.combination}: the mesh error of the {name} is {off} on the finest mesh."
+        return [text, *_about_settling(series, quantity, name)]
     start = (
         f"{series.combination}: the {name}"
         if series.exact_theory

@@ -103,8 +103,8 @@ def newton(
         settled = off <= exact * largest + problem.round_off
         if settled or uphill > UPHILL or iteration == patience:
             break
-        there, gaps_there = problem.step(y, gaps, *law.state(y, gaps))
-        step, change = there - y, gaps_there - gaps
+        trial, gaps_there = problem.step(y, gaps, *law.state(y, gaps))
+        step, change = trial - y, gaps_there - gaps
         damping = 1.0
         while (
             line_search
@@ -114,7 +114,7 @@ def newton(
             if damping < SHORTEST:  # at a kink no step may go down: the whole one leads elsewhere
                 damping, uphill = 1.0, uphill + 1
                 break
-        y, gaps = (there, gaps_there) if damping == 1.0 else (y + damping * step, gaps + damping * change)
+        y, gaps = (trial, gaps_there) if damping == 1.0 else (y + damping * step, gaps + damping * change)
         residual = law.residual(y, gaps)
         size = float(np.linalg.norm(residual))
     if not settled:

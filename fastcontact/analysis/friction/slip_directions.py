@@ -67,11 +67,14 @@ def _to_axes(one: Array, other: Array) -> Array:
     return np.asarray(np.arctan2((first * other).sum(axis=1), (first * one).sum(axis=1)))
 
 
-def idle(own: Array) -> Mask:
+def idle(directions: Array) -> Mask:
     """Return the tangents (k, m) along which supports leave no motion, or none but that of the gap.
 
     At an axis and in a plane of symmetry friction has nothing to do there, and its equation would be no equation.
     """
-    k = len(own) - 1
-    along = own[np.arange(1, k + 1), np.arange(1, k + 1)]
-    return np.asarray(along * own[0, 0] - own[1:, 0] ** 2 <= IDLE * own[0, 0] * np.maximum(along, own[0, 0]))
+    k = len(directions) - 1
+    along = directions[np.arange(1, k + 1), np.arange(1, k + 1)]
+    return np.asarray(
+        along * directions[0, 0] - directions[1:, 0] ** 2
+        <= IDLE * directions[0, 0] * np.maximum(along, directions[0, 0])
+    )

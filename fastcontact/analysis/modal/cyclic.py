@@ -70,11 +70,11 @@ class Sectors:
             if asked != "all":
                 raise ModelError(f"nodal_diameters = '{asked}': write \"all\", or whole numbers from 0 to {most}")
             return list(range(most + 1))
-        found = sorted({asked} if isinstance(asked, int) else set(asked))
-        wrong = [d for d in found if not 0 <= d <= most]
-        if wrong or not found:
+        diameters = sorted({asked} if isinstance(asked, int) else set(asked))
+        wrong = [d for d in diameters if not 0 <= d <= most]
+        if wrong or not diameters:
             raise ModelError(f"nodal_diameters = {asked}: a ring of {self.number} sectors has those from 0 to {most}")
-        return found
+        return diameters
 
 
 def _sense(interface: PeriodicInterface, turn: Array) -> int:
@@ -110,9 +110,9 @@ class Wave:
 
     def real(self, A: AnyArray) -> csr_array:
         """Return the real form of a sparse matrix (m, n), complex or not."""
-        found = csr_array(A.real if self.single else bmat([[A.real, -A.imag], [A.imag, A.real]], format="csr"))
-        found.eliminate_zeros()
-        return found
+        blocks = csr_array(A.real if self.single else bmat([[A.real, -A.imag], [A.imag, A.real]], format="csr"))
+        blocks.eliminate_zeros()
+        return blocks
 
     def twice(self, K: bsr_array) -> bsr_array:
         """Return the real form of a real matrix (n, n) with its blocks."""
@@ -168,8 +168,8 @@ class Wave:
         rows, columns, values = [np.arange(len(rest))], [rest], [np.ones(len(rest), complex)]
         kept, count = [rest], len(rest)
         for block, like, among in blocks:
-            place = count + np.arange(len(block))
-            rows.append(np.repeat(place, len(among)))
+            ends = count + np.arange(len(block))
+            rows.append(np.repeat(ends, len(among)))
             columns.append(np.tile(among, len(block)))
             values.append(block.ravel())
             kept.append(like[: len(block)])
@@ -204,9 +204,9 @@ def without_ends(model: Model, sectors: Sectors) -> Model:
     """Return the model without the relations of the ends of its sector."""
     made = copy.copy(model)
     made.relations = [
-        own
-        for own in model.relations
-        if not any(own is interface.relation for interface in sectors.periodic_interfaces)
+        relation
+        for relation in model.relations
+        if not any(relation is interface.relation for interface in sectors.periodic_interfaces)
     ]
     return made
 
@@ -222,10 +222,10 @@ def pairs_of(vectors: Array, K: bsr_array, M: bsr_array, n: int) -> tuple[Array,
     weight, basis = np.linalg.eigh(heavy)
     there = weight > 1e-8 * weight.max()
     basis = basis[:, there] / np.sqrt(weight[there])
-    values, own = np.linalg.eigh(basis.conj().T @ stiff @ basis)
-    found = Z @ (basis @ own[:, :n])
-    largest = found[np.abs(found).argmax(axis=0), np.arange(found.shape[1])]
-    return values[:n], found * (np.abs(largest) / largest)
+    values, eigenvectors = np.linalg.eigh(basis.conj().T @ stiff @ basis)
+    shapes = Z @ (basis @ eigenvectors[:, :n])
+    largest = shapes[np.abs(shapes).argmax(axis=0), np.arange(shapes.shape[1])]
+    return values[:n], shapes * (np.abs(largest) / largest)
 
 
 def _complex(vectors: Array) -> AnyArray:

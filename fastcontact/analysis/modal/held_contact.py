@@ -91,7 +91,7 @@ def joined(
 
 def held_contact(model: Model, step: StepResult | None, held: HeldMotions, hold_sliding: bool) -> list[Conditions]:
     """Return the conditions of all pairs at the end of a step; without one those of tied and bilateral pairs, at rest."""
-    found: list[Conditions] = []
+    conditions: list[Conditions] = []
     for pair in model.contact:
         bound, contact = model.bind(pair, held, sectors_alike=False), None if step is None else step.contact[pair.name]
         if bound.options.gap_only:
@@ -101,8 +101,8 @@ def held_contact(model: Model, step: StepResult | None, held: HeldMotions, hold_
         at = _configuration(model, step, contact)
         position = at.obstacle if contact is not None else np.zeros(model.mesh.dim)
         constraints = model.force_driven.constraints(pair.name, bound.constraints(at), position)
-        found += _conditions(bound, constraints, contact, hold_sliding)
-    return found
+        conditions += _conditions(bound, constraints, contact, hold_sliding)
+    return conditions
 
 
 def _configuration(model: Model, step: StepResult | None, contact: ContactResult | None) -> Configuration:

@@ -270,8 +270,8 @@ def _apart(dofs: Indices, reached: csr_array, dim: int) -> list[Indices]:
     further = _ones(csr_array(around @ around))
     colour: dict[int, int] = {}
     for point in points.tolist():
-        beside = further.indices[further.indptr[point] : further.indptr[point + 1]].tolist()
-        taken = {colour[other] for other in beside if other in colour}
+        neighbours = further.indices[further.indptr[point] : further.indptr[point + 1]].tolist()
+        taken = {colour[other] for other in neighbours if other in colour}
         colour[point] = next(c for c in range(len(points)) if c not in taken)
     groups: list[Indices] = []
     for c in range(max(colour.values(), default=-1) + 1):

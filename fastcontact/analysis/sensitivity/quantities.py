@@ -132,12 +132,12 @@ def _pressure(contact: MovingContact, none: Gradient, step: StepResult, asked: A
     contact = replace(contact, pair=name, closed=result.active)
     multiplier, by_multiplier = contact.solution.multiplier, none.multiplier
     rows_of_pair, rows = contact.constraints.rows()[name], contact.active
-    step = CHANGED * (float(np.abs(multiplier[rows_of_pair]).max(initial=0.0)) or 1.0)
+    change = CHANGED * (float(np.abs(multiplier[rows_of_pair]).max(initial=0.0)) or 1.0)
     base = contact.pressure(multiplier)[row]
     for k in np.flatnonzero((rows >= rows_of_pair.start) & (rows < rows_of_pair.stop)):
         more = multiplier.copy()
-        more[rows[k]] += step
-        by_multiplier[k] = (contact.pressure(more)[row] - base) / step
+        more[rows[k]] += change
+        by_multiplier[k] = (contact.pressure(more)[row] - base) / change
     sample = np.zeros(len(contact.u) + len(rows) + len(result.points))
     sample[len(contact.u) + len(rows) + row] = 1.0
     return contact, replace(none, value=float(base), sample=sample)

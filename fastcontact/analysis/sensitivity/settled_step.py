@@ -50,7 +50,7 @@ def settled_step(
 
 def _check_path(model: Model, step: StepResult, criteria: Criteria) -> None:
     for pair in model.contact:
-        for option, what in (
+        for option, meaning in (
             ("friction", "friction"),
             ("wear", "wear"),
             ("cohesion", "a cohesive layer"),
@@ -58,8 +58,8 @@ def _check_path(model: Model, step: StepResult, criteria: Criteria) -> None:
         ):
             if pair.options.get(option):
                 raise ModelError(
-                    f"contact '{pair.name}' has {what}: its results depend on all load steps, and sensitivities are those of "
-                    f"one. Take differences of two solutions, or leave out {option}"
+                    f"contact '{pair.name}' has {meaning}: its results depend on all load steps, and sensitivities are those "
+                    f"of one. Take differences of two solutions, or leave out {option}"
                 )
         if pair.fluid is not None:
             raise ModelError(f"contact '{pair.name}' has a fluid, whose place sensitivities do not know: leave it out")

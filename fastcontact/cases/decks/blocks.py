@@ -64,11 +64,11 @@ class Row:
             raise self.location.refuse(f"'{self.text(index)[:LONGEST_QUOTED]}' is no whole number")
         return int(value)
 
-    def positive(self, index: int, what: str) -> float:
-        """Return an entry as a positive number; `what` it is says the error."""
+    def positive(self, index: int, quantity: str) -> float:
+        """Return an entry as a positive number; `quantity` it is says the error."""
         value = self.number(index)
         if not value > 0:
-            raise self.location.refuse(f"the {what} {value:g} must be positive")
+            raise self.location.refuse(f"the {quantity} {value:g} must be positive")
         return value
 
 

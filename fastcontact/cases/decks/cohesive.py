@@ -103,12 +103,12 @@ def _evolution(block: Block, given: dict[str, Any], stiffness: float | None) -> 
     return {"energy": 0.5 * strength * end}
 
 
-def _in_modes(block: Block, what: str) -> tuple[float, float]:
+def _in_modes(block: Block, quantity: str) -> tuple[float, float]:
     """Return numbers for opening and for sliding, which is the same along both directions."""
     row = block.only("modes or fields")
     values = [row.positive(index, "number") for index in range(3)]
     if values[1] != values[2]:
         raise row.location.refuse(
-            f"the {what} along both shear directions must be the same, not {values[1]:g} and {values[2]:g}"
+            f"the {quantity} along both shear directions must be the same, not {values[1]:g} and {values[2]:g}"
         )
     return values[0], values[1]

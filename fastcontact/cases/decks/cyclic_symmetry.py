@@ -36,9 +36,9 @@ def cyclic_symmetry_model(content: Content, block: Block) -> None:
     content.sectors.append(Sectors(block.location, int(text), block.get("TIE"), points))
 
 
-def add_sectors(model: Model, found: DeckMesh) -> list[MultiPointConstraint]:
+def add_sectors(model: Model, deck_mesh: DeckMesh) -> list[MultiPointConstraint]:
     """Add the cyclic symmetries of the deck to the model; return their relations."""
-    content, before = found.made.content, len(model.relations)
+    content, before = deck_mesh.made.content, len(model.relations)
     used: set[int] = set()
     for sectors in content.sectors:
         ends = _ends(content, sectors)
@@ -48,8 +48,8 @@ def add_sectors(model: Model, found: DeckMesh) -> list[MultiPointConstraint]:
         if model.mesh.dim == 2 and np.abs(direction[:2]).max() > 1e-9:
             raise sectors.location.refuse("the axis of a plane model is along z: give two points above each other")
         for name in ends.surfaces:
-            found.made.faces(name, ends.location)
-        groups = [group_of_surface(found, name) for name in ends.surfaces]
+            deck_mesh.made.faces(name, ends.location)
+        groups = [group_of_surface(deck_mesh, name) for name in ends.surfaces]
         with refusing(sectors.location):
             model.add_cyclic_symmetry(
                 groups[0], groups[1], sectors=sectors.count, origin=tuple(first[: model.mesh.dim].tolist()),

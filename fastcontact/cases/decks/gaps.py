@@ -57,9 +57,9 @@ def check_discrete(made: Assembled, kind: str, given: Mapping[str, Any], needed:
             raise element.cell.location.refuse(f"element {element.number} of type {kind} has no {needed}")
 
 
-def gap_groups(found: DeckMesh) -> list[GapGroup]:
+def gap_groups(deck_mesh: DeckMesh) -> list[GapGroup]:
     """Make groups of the facets around the nodes of gap elements; CaseError where these make up no whole facets."""
-    made, groups = found.made, []
+    made, groups = deck_mesh.made, []
     check_discrete(made, "GAPUNI", made.content.gaps, "*GAP")
     for name, (location, clearance, vector) in made.content.gaps.items():
         gap_elements = made.elements_of(name, location)
@@ -70,26 +70,26 @@ def gap_groups(found: DeckMesh) -> list[GapGroup]:
         bodies = all(point in made.of_solids for point in ends[:, 1].tolist())
         groups.append(
             GapGroup(
-                shown, location, clearance, np.array(vector)[: found.dim] / np.linalg.norm(vector), ends,
-                _whole(found, f"{shown} facets", ends[:, 0], location),
-                _whole(found, f"{shown} opposite facets", ends[:, 1], location) if bodies else "",
+                shown, location, clearance, np.array(vector)[: deck_mesh.dim] / np.linalg.norm(vector), ends,
+                _whole(deck_mesh, f"{shown} facets", ends[:, 0], location),
+                _whole(deck_mesh, f"{shown} opposite facets", ends[:, 1], location) if bodies else "",
             )
         )  # fmt: skip
     return groups
 
 
-def _whole(found: DeckMesh, group: str, points: Indices, location: Location) -> str:
+def _whole(deck_mesh: DeckMesh, group: str, points: Indices, location: Location) -> str:
     """Make a group of the facets all of whose nodes are among points; CaseError where points belong to none of them."""
     chosen = set(points.tolist())
-    faces = found.made.faces_within(chosen)
+    faces = deck_mesh.made.faces_within(chosen)
     if {p for face in faces for p in facet_points(*face)} != chosen:
         raise location.refuse(
             "gap elements are supported on all nodes of whole faces only, from a body to another or to held nodes"
         )
-    return found.add_facets(group, faces)
+    return deck_mesh.add_facets(group, faces)
 
 
-def add_gap(model: Model, found: DeckMesh, gap: GapGroup, conditions: Conditions) -> dict[str, dict[int, int]]:
+def add_gap(model: Model, deck_mesh: DeckMesh, gap: GapGroup, conditions: Conditions) -> dict[str, dict[int, int]]:
     """Add the contact of gap elements to a model; return by its name the held nodes behind those of the body."""
     first, second = model.mesh.points[gap.ends[:, 0]], model.mesh.points[gap.ends[:, 1]]
     size = TOUCHING * float(np.ptp(model.mesh.points, axis=0).max())

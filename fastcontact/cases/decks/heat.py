@@ -167,8 +167,8 @@ class Exchange:
 class HeatConditions:
     """Prescribed temperatures, heat at nodes, fluxes and films of a deck with their histories."""
 
-    def __init__(self, found: DeckMesh, initial: Mapping[int, float]) -> None:
-        self.found, self.made = found, found.made
+    def __init__(self, deck_mesh: DeckMesh, initial: Mapping[int, float]) -> None:
+        self.found, self.made = deck_mesh, deck_mesh.made
         content = self.made.content
         self.reference = _reference(self.made, initial) if content.heat else 0.0
         self.rest: dict[Exchange, float] = {}

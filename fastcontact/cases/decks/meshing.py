@@ -129,61 +129,61 @@ def begun(made: Assembled) -> DeckMesh:
         raise made.solids[0].cell.location.refuse(
             f"elements of type {first.name} lie in the plane z = const, but z differs"
         )
-    found = DeckMesh(made, first.kinematics, dim)
-    _name_sets(found)
-    return found
+    deck_mesh = DeckMesh(made, first.kinematics, dim)
+    _name_sets(deck_mesh)
+    return deck_mesh
 
 
-def _name_sets(found: DeckMesh) -> None:
+def _name_sets(deck_mesh: DeckMesh) -> None:
     """Name groups after the sets and surfaces of the deck; those of parts after ``Instance.name``."""
-    made = found.made
+    made = deck_mesh.made
     for scope in made.scopes:
         part = made.part(scope)
         prefix = f"{made.content.instances[scope].name}." if scope else ""
         for name, members in part.node_sets.items():
             points = made.members_of("node", scope, name, members[0].location) if members else []
-            found.point_groups[prefix + part.set_names[name]] = sorted(set(points))
+            deck_mesh.point_groups[prefix + part.set_names[name]] = sorted(set(points))
         for name, definition in part.surfaces.items():
             if definition.of_nodes and definition.faces:
-                _name_nodes(found, prefix + definition.name, definition, scope)
+                _name_nodes(deck_mesh, prefix + definition.name, definition, scope)
             elif definition.faces:  # one that nothing uses may be empty
                 faces = made.faces(f"{scope}.{name}" if scope else name, definition.location)
-                found.add_facets(prefix + definition.name, faces)
+                deck_mesh.add_facets(prefix + definition.name, faces)
         for name, members in part.element_sets.items():
             if name not in part.surfaces and members:
-                found.add_solids(
+                deck_mesh.add_solids(
                     prefix + part.set_names[name], made.members_of("element", scope, name, members[0].location)
                 )
 
 
-def _name_nodes(found: DeckMesh, group: str, definition: SurfaceDefinition, scope: str) -> None:
+def _name_nodes(deck_mesh: DeckMesh, group: str, definition: SurfaceDefinition, scope: str) -> None:
     """Name the facets around the nodes of a surface; where they make up no whole ones, its further points are `loose`."""
-    whole, further, left = found.made.faces_of_nodes(definition, scope)
+    whole, further, left = deck_mesh.made.faces_of_nodes(definition, scope)
     if not (whole or further):  # nodes of no solid
         return
-    found.add_facets(group, [*whole, *further])
+    deck_mesh.add_facets(group, [*whole, *further])
     if left:
         points = {point for face in (*whole, *further) for point in facet_points(*face)}
-        found.loose[group] = sorted(points.difference(found.made.surface_nodes(definition, scope)))
+        deck_mesh.loose[group] = sorted(points.difference(deck_mesh.made.surface_nodes(definition, scope)))
 
 
-def secondary_group(found: DeckMesh, name: str, location: Location) -> str:
+def secondary_group(deck_mesh: DeckMesh, name: str, location: Location) -> str:
     """Return the group of a surface as the secondary side of a pair, which may be one of nodes; CaseError for lone nodes."""
-    definition, scope = found.made.surface(name, location)
+    definition, scope = deck_mesh.made.surface(name, location)
     if not definition.of_nodes:
-        return group_of_surface(found, name)
-    whole, further, _ = found.made.faces_of_nodes(definition, scope)
+        return group_of_surface(deck_mesh, name)
+    whole, further, _ = deck_mesh.made.faces_of_nodes(definition, scope)
     carried = {point for face in (*whole, *further) for point in facet_points(*face)}
-    for point in found.made.surface_nodes(definition, scope):
+    for point in deck_mesh.made.surface_nodes(definition, scope):
         if point not in carried:
             raise definition.location.refuse(
-                f"node {found.made.number_of(point)} of surface '{definition.name}' is on no outer face of a solid: contact "
-                "needs nodes of bodies, so leave it out"
+                f"node {deck_mesh.made.number_of(point)} of surface '{definition.name}' is on no outer face of a solid: "
+                "contact needs nodes of bodies, so leave it out"
             )
-    return group_of_surface(found, name)
+    return group_of_surface(deck_mesh, name)
 
 
-def group_of_surface(found: DeckMesh, name: str) -> str:
+def group_of_surface(deck_mesh: DeckMesh, name: str) -> str:
     """Return the name of the group of a surface, however a pair writes it."""
     wanted = folded(name)
-    return next(group for group in found.groups if folded(group) == wanted)
+    return next(group for group in deck_mesh.groups if folded(group) == wanted)

@@ -15,16 +15,16 @@ LEAST = {"PLANE": 4, "STRAIGHT": 3, "MEANROT": 3}
 FLAT = 1e-9
 
 
-def multi_point_rows(found: DeckMesh, constraint: MultiPoint) -> list[list[Term]]:
+def multi_point_rows(deck_mesh: DeckMesh, constraint: MultiPoint) -> list[list[Term]]:
     """Return the equations of a multi-point constraint; CaseError where its nodes do not determine it."""
-    nodes = [point for name in constraint.nodes for point in found.made.nodes(name, constraint.location)]
+    nodes = [point for name in constraint.nodes for point in deck_mesh.made.nodes(name, constraint.location)]
     nodes = [*dict.fromkeys(nodes[:-1] if constraint.kind == "MEANROT" else nodes), *nodes[-1:]]
     nodes = nodes if constraint.kind == "MEANROT" else nodes[:-1]
-    if len(nodes) < LEAST[constraint.kind] or found.dim == 2:
+    if len(nodes) < LEAST[constraint.kind] or deck_mesh.dim == 2:
         raise constraint.location.refuse(
             f"{constraint.kind} needs {LEAST[constraint.kind]} different nodes or more, in space"
         )
-    where = found.made.points[nodes]
+    where = deck_mesh.made.points[nodes]
     if constraint.kind == "MEANROT":
         return [_mean_rotation(constraint, nodes, where)]
     first = where[1] - where[0]

@@ -74,30 +74,30 @@ class Locks:
         return True
 
 
-def cut_sections(found: DeckMesh, mesh: Mesh) -> Mesh:
+def cut_sections(deck_mesh: DeckMesh, mesh: Mesh) -> Mesh:
     """Return the mesh cut along all pretension sections."""
     sections: set[str] = set()
-    for section in found.made.content.pretensions:
-        found.made.faces(section.surface, section.location)
-        group = group_of_surface(found, section.surface)
+    for section in deck_mesh.made.content.pretensions:
+        deck_mesh.made.faces(section.surface, section.location)
+        group = group_of_surface(deck_mesh, section.surface)
         if group in sections:
             raise section.location.refuse(f"surface '{group}' has a pretension section already")
         sections.add(group)
-        normal = None if section.normal is None else section.normal[: found.dim]
+        normal = None if section.normal is None else section.normal[: deck_mesh.dim]
         with refusing(section.location):
             mesh = cut(mesh, group, normal)
     return mesh
 
 
-def add_sections(model: Model, found: DeckMesh, locks: Locks) -> list[MultiPointConstraint]:
+def add_sections(model: Model, deck_mesh: DeckMesh, locks: Locks) -> list[MultiPointConstraint]:
     """Add the pretension sections to a model; return all relations that they have at any time, and those to their nodes."""
     before, links, locked = len(model.relations), [], []
     for point, section in locks.points.items():
-        group, location = group_of_surface(found, section.surface), section.location
-        normal = None if section.normal is None else section.normal[: found.dim]
+        group, location = group_of_surface(deck_mesh, section.surface), section.location
+        normal = None if section.normal is None else section.normal[: deck_mesh.dim]
         model.add_pretension(group, group, force=0.0, locked_from=locks.begins.get(point), normal=normal)
-        row = _side(found, section) * model.pretensions[-1].row(model.n_dofs)
-        node = csr_array((np.ones(1), ([0], [point * found.dim])), shape=row.shape)
+        row = _side(deck_mesh, section) * model.pretensions[-1].row(model.n_dofs)
+        node = csr_array((np.ones(1), ([0], [point * deck_mesh.dim])), shape=row.shape)
         links.append(MultiPointConstraint(f"*{location.keyword} of line {location.line}", csr_array(row - node)))
         if point in locks.begins:
             locked.append(MultiPointConstraint(f"the locked length of line {location.line}", row))
@@ -105,14 +105,14 @@ def add_sections(model: Model, found: DeckMesh, locks: Locks) -> list[MultiPoint
     return [*model.relations[before:], *locked]
 
 
-def _side(found: DeckMesh, section: PretensionSection) -> float:
+def _side(deck_mesh: DeckMesh, section: PretensionSection) -> float:
     """Return whether the normal of a section points out of the elements that its surface names (1.0) or into them (-1.0).
 
     A positive force acts along the normal on these elements: it pulls the sides together in the first case alone.
     """
     if section.normal is None:
         return 1.0
-    points, outward = found.made.points, np.zeros(3)
-    for solid, facet in found.made.faces(section.surface, section.location):
+    points, outward = deck_mesh.made.points, np.zeros(3)
+    for solid, facet in deck_mesh.made.faces(section.surface, section.location):
         outward += points[list(facet_points(solid, facet))].mean(axis=0) - points[list(solid.points)].mean(axis=0)
     return float(np.copysign(1.0, outward @ np.array(section.normal)))

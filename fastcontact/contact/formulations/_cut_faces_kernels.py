@@ -99,12 +99,12 @@ def _clip(subject, count, window, n_window, spare):
         for k in range(count):
             m = (k + 1) % count
             here = (bx - ax) * (subject[k, 1] - ay) - (by - ay) * (subject[k, 0] - ax)
-            there = (bx - ax) * (subject[m, 1] - ay) - (by - ay) * (subject[m, 0] - ax)
+            next_side = (bx - ax) * (subject[m, 1] - ay) - (by - ay) * (subject[m, 0] - ax)
             if here >= 0.0:
                 spare[kept, 0], spare[kept, 1] = subject[k, 0], subject[k, 1]
                 kept += 1
-            if (here > 0.0 and there < 0.0) or (here < 0.0 and there > 0.0):
-                t = here / (here - there)
+            if (here > 0.0 and next_side < 0.0) or (here < 0.0 and next_side > 0.0):
+                t = here / (here - next_side)
                 spare[kept, 0] = subject[k, 0] + t * (subject[m, 0] - subject[k, 0])
                 spare[kept, 1] = subject[k, 1] + t * (subject[m, 1] - subject[k, 1])
                 kept += 1

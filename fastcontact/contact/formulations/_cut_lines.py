@@ -106,11 +106,11 @@ def _opposite_nodes(block: FacetBlock, primary: Surface, deformed: Array, normal
     smooth = inner & ~_corners(primary, deformed, normals)[ends]
     inside = np.flatnonzero((opposite.overhang == 0.0) & (np.abs(along) < 1.0 - SLIVER) & ~smooth)
     rows = np.flatnonzero(inner)
-    beside = np.column_stack([opposite.facet[rows], line_neighbours(block.local)[opposite.facet[rows]]])
-    crossed = _across(deformed[block.facets[beside]], foot[rows][:, None], normal[rows][:, None])
-    crossed[beside < 0] = 1.0
+    facets = np.column_stack([opposite.facet[rows], line_neighbours(block.local)[opposite.facet[rows]]])
+    crossed = _across(deformed[block.facets[facets]], foot[rows][:, None], normal[rows][:, None])
+    crossed[facets < 0] = 1.0
     row, xi = _zeros(crossed.reshape(-1, block.facets.shape[1]))
-    return np.concatenate([opposite.facet[inside], beside.ravel()[row]]), np.concatenate([along[inside], xi])
+    return np.concatenate([opposite.facet[inside], facets.ravel()[row]]), np.concatenate([along[inside], xi])
 
 
 def _corners(side: Surface, coordinates: Array, normals: Array) -> Mask:

@@ -90,14 +90,14 @@ def determined(
     excluded : ndarray of bool (m,)
         Nodes that have no value of their own.
     """
-    degrees = [one.degrees(mass) for one, mass in zip(whole, masses, strict=True)]
+    degrees = [field.degrees(mass) for field, mass in zip(whole, masses, strict=True)]
     kept = np.zeros(len(side.points), bool)
-    for one, degree in zip(whole, degrees, strict=True):
-        kept[one.block.local[degree == 2]] = True
-        kept[one.block.local[degree == 1][:, : len(one.to_corners)]] = True
+    for field, degree in zip(whole, degrees, strict=True):
+        kept[field.block.local[degree == 2]] = True
+        kept[field.block.local[degree == 1][:, : len(field.to_corners)]] = True
     kept &= ~excluded
-    for one, degree, mass in zip(whole, degrees, masses, strict=True):
-        _give_each_a_value(kept, one.block.local[degree >= 0], mass[degree >= 0], excluded)
+    for field, degree, mass in zip(whole, degrees, masses, strict=True):
+        _give_each_a_value(kept, field.block.local[degree >= 0], mass[degree >= 0], excluded)
     independent = np.flatnonzero(kept)
     values = spread(side, excluded, independent) if excluded.any() else csr_array(diags_array(kept.astype(float)))
     if any((degree[degree >= 0] < 2).any() for degree in degrees):
@@ -122,9 +122,9 @@ def _interpolated(
     """
     m = len(with_value)
     pairs = []
-    for one, degree in zip(whole, degrees, strict=True):
-        local = one.block.local[degree >= 0]
-        corners = local[:, : len(one.to_corners)]
+    for field, degree in zip(whole, degrees, strict=True):
+        local = field.block.local[degree >= 0]
+        corners = local[:, : len(field.to_corners)]
         row, column = np.repeat(corners, local.shape[1], axis=1).ravel(), np.tile(local, corners.shape[1]).ravel()
         kept = ~with_value[row] & ~excluded[row] & with_value[column]
         pairs.append(np.column_stack([row[kept], column[kept]]))
@@ -138,9 +138,9 @@ def _interpolated(
 def _between_corners(whole: list[WholeFacets], degrees: list[Indices], done: Mask) -> csr_array:
     """Return the rows (m, m) of nodes between corners that are not `done` (m,): linear between those."""
     between = lil_array((len(done), len(done)))
-    for one, degree in zip(whole, degrees, strict=True):
-        corners = len(one.to_corners)
-        facet, k = np.nonzero(~done[one.block.local[:, corners:]] & (degree >= 0)[:, None])
-        for nodes, node in zip(one.block.local[facet], k + corners, strict=True):
-            between[nodes[node], nodes[:corners]] = one.to_corners[:, node]  # the same from either side
+    for field, degree in zip(whole, degrees, strict=True):
+        corners = len(field.to_corners)
+        facet, k = np.nonzero(~done[field.block.local[:, corners:]] & (degree >= 0)[:, None])
+        for nodes, node in zip(field.block.local[facet], k + corners, strict=True):
+            between[nodes[node], nodes[:corners]] = field.to_corners[:, node]  # the same from either side
     return csr_array(between)

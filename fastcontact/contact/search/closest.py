@@ -60,7 +60,7 @@ def closest_of_kinds(points: Array, kinds: Sequence[Array]) -> Closest:
         return closest(points, kinds[0])
     first = np.cumsum([0] + [len(corners) for corners in kinds])
     by_kind = [closest(points, corners) for corners in kinds]
-    nearest = np.argmin([one.distance for one in by_kind], axis=0)
+    nearest = np.argmin([candidate.distance for candidate in by_kind], axis=0)
     facet, *others = (np.stack(values)[nearest, np.arange(len(points))] for values in zip(*by_kind, strict=True))
     return Closest(facet + first[nearest], *others)
 

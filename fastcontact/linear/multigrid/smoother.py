@@ -41,7 +41,7 @@ def largest_eigenvalue(level: Level) -> float:
     scratch, zero = np.empty_like(r), np.zeros_like(r)
     if level.eliminated is not None:
         level.eliminated.move_forces(r)
-    diagonal, beside = [], []
+    diagonal, off_diagonal = [], []
     old_alpha, beta, rz = 1.0, 0.0, 0.0
     kind = r.dtype.type
     for step in range(min(LANCZOS_STEPS, level.n)):
@@ -60,8 +60,8 @@ def largest_eigenvalue(level: Level) -> float:
         q *= -1
         alpha = rz / float(p @ q)
         diagonal.append(1 / alpha + beta / old_alpha)
-        beside.append(np.sqrt(beta) / old_alpha)
+        off_diagonal.append(np.sqrt(beta) / old_alpha)
         r -= kind(alpha) * q
         old_alpha = alpha
-    T = np.diag(diagonal) + np.diag(beside[1:], 1) + np.diag(beside[1:], -1)
+    T = np.diag(diagonal) + np.diag(off_diagonal[1:], 1) + np.diag(off_diagonal[1:], -1)
     return float(np.linalg.eigvalsh(T).max()) if diagonal else 1.0

@@ -174,7 +174,7 @@ def _check_before(path: Path, file_format: str) -> None:
 def files_of(path: Path) -> list[Path]:
     """Return a mesh file and all files that are read with it; FileError if one of XDMF cannot be read."""
     if path.suffix.lower() in (".xdmf", ".xmf"):
-        return [path, *(beside for beside, _ in _references(path))]
+        return [path, *(reference for reference, _ in _references(path))]
     other = {".node": ".ele", ".ele": ".node"}.get(path.suffix)  # the two files of TetGen
     return [path, path.with_suffix(other)] if other else [path]
 
@@ -195,12 +195,12 @@ def _references(path: Path) -> Iterator[tuple[Path, str]]:
 def _check_references(path: Path) -> None:
     """Refuse an XDMF file that refers to files in other folders, or to HDF5 files that do."""
     folder = path.resolve().parent
-    for beside, kind in _references(path):
-        if folder not in (beside.resolve().parent, beside.resolve()):
-            raise _refusal("read", path, f"it refers to the file '{beside.resolve()}', which is not beside it")
-        existing_file(beside)
+    for reference, kind in _references(path):
+        if folder not in (reference.resolve().parent, reference.resolve()):
+            raise _refusal("read", path, f"it refers to the file '{reference.resolve()}', which is not beside it")
+        existing_file(reference)
         if kind == "HDF":
-            with hdf5.opened(beside):
+            with hdf5.opened(reference):
                 pass
 
 

@@ -71,9 +71,9 @@ def _pattern(name: str) -> _Pattern:
     lattice = np.array(points)
     on_edge, along = np.full(len(points), -1), np.zeros(len(points), int)
     for number, (a, b) in enumerate(element.edges):
-        start, way = element.nodes[a], element.nodes[b] - element.nodes[a]
-        fraction = (lattice - start) @ way / (way @ way)
-        there = np.abs(lattice - start - fraction[:, None] * way).max(axis=1) < 1e-12
+        start, edge = element.nodes[a], element.nodes[b] - element.nodes[a]
+        fraction = (lattice - start) @ edge / (edge @ edge)
+        there = np.abs(lattice - start - fraction[:, None] * edge).max(axis=1) < 1e-12
         there[: element.n_nodes] = False
         on_edge[there], along[there] = number, np.round(4 * fraction[there]).astype(int)
     return _Pattern(element.shape(lattice), np.array(children), on_edge, along)

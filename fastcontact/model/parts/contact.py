@@ -391,8 +391,8 @@ class ModelContact(ModelConnections):
         specific = {key: value for key, value in pair.options.items() if key not in SHARED_OPTIONS}
         check_fields(f"contact '{pair.name}'", specific, kind, ContactError)
         ends = [
-            (one.first, one.second, np.eye(self.mesh.dim) if one.turn is None else one.turn)
-            for one in self.periodic_interfaces
+            (interface.first, interface.second, np.eye(self.mesh.dim) if interface.turn is None else interface.turn)
+            for interface in self.periodic_interfaces
         ]
         secondary = surface(self.mesh, pair.secondary).with_periodic_ends(ends)
         options = pair_options(
@@ -411,7 +411,7 @@ class ModelContact(ModelConnections):
             check_sides(self.mesh, pair.name, secondary, primary, options.excluded)
         modulus = min((m.contact_modulus for m, _ in self.materials), default=1.0)
         axisymmetric = self.kinematics == "axisymmetric"
-        interfaces = [one for one in self.periodic_interfaces if one.turn is None or sectors_alike]
+        interfaces = [interface for interface in self.periodic_interfaces if interface.turn is None or sectors_alike]
         turning = next(
             (e.rotation for e in interfaces if e.rotation and np.isin(e.second, secondary.points).any()), None
         )

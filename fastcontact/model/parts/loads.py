@@ -226,8 +226,8 @@ class ModelLoads(ModelHeat):
         """
         name = "xyz"[self.mesh.dim - 1] if axis is None else axis
         (along,) = axes_of(f"the hydrostatic pressure on '{group}'", {name: 1.0}, self.mesh.dim)
-        for what, value in (("weight", weight), ("level", level)):
-            check_number(f"the {what} of the hydrostatic pressure on '{group}'", value)
+        for quantity, value in (("weight", weight), ("level", level)):
+            check_number(f"the {quantity} of the hydrostatic pressure on '{group}'", value)
         self.add_pressure(group, Hydrostatic(float(weight), float(level), along), ramp=ramp)
 
     @typed(ModelError)

@@ -114,10 +114,10 @@ def stresses_on_axis(mesh: Mesh, step: StepResult, pair: str) -> tuple[Array, ND
     tolerance = 1e-9 * np.ptp(mesh.points, axis=0).max()
     used = np.unique(np.concatenate([block.ravel() for block in mesh.solids.values()]))
     height = (mesh.points[used] - pole) @ direction
-    beside = (mesh.points[used] - pole) @ np.array([direction[1], -direction[0]])
+    offset = (mesh.points[used] - pole) @ np.array([direction[1], -direction[0]])
     # The normal of a deformed facet is that of the surface but for a few thousandths.
     leaning = 0.0 if np.abs(direction).max() == 1.0 else 2e-3
-    on_axis = np.abs(beside) <= tolerance + leaning * np.abs(height)
+    on_axis = np.abs(offset) <= tolerance + leaning * np.abs(height)
     nodes, height = used[on_axis], height[on_axis]
     if len(nodes) < 2:
         raise FastcontactError(

@@ -99,9 +99,9 @@ def is_seen(shown: Field, points: Array, view: tuple[float, float]) -> bool:
     return not bool(screen.hidden(points[[shown.extreme]])[0])
 
 
-def view_of_extreme(shown: Field, place: Array) -> tuple[float, float]:
+def view_of_extreme(shown: Field, position: Array) -> tuple[float, float]:
     """Return from where to look: the first of VIEWS from which the extreme value of a field is seen."""
-    return next((view for view in VIEWS if is_seen(shown, place, view)), VIEWS[0])
+    return next((view for view in VIEWS if is_seen(shown, position, view)), VIEWS[0])
 
 
 def towards(view: tuple[float, float]) -> Array:
