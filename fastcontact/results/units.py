@@ -37,7 +37,8 @@ def units_of_results(units: Mapping[str, str], kinematics: str) -> dict[str, str
     >>> units_of_results({"length": "m", "force": "N"}, "3d")
     {'length': 'm', 'force': 'N', 'pressure': '', 'penalty': '', 'moment': 'N m', 'stiffness': 'N/m'}
     """
-    length, force, pressure = (known := known_units(units)).values()
+    known = known_units(units)
+    length, force, pressure = known["length"], known["force"], known["pressure"]
     known["penalty"] = f"{pressure}/{length}" if pressure and length else ""
     if not (length and force):
         return {**known, "moment": "", "stiffness": ""}

@@ -1,6 +1,5 @@
 """Pictures: what is drawn of a solid, and where; looked at through the artists and through the pixels."""
 
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -96,5 +95,10 @@ def test_the_stress_along_normals_in_space_is_that_of_the_tensor():
     stress = np.zeros((9, 6))
     points = np.array([8, 1, 3, 5, 7, 0])
     stress[points] = tensor[:, [0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]]
-    contact, step = SimpleNamespace(points=points, normal=normal), SimpleNamespace(stress=stress)
+    zeros, vectors = np.zeros(6), np.zeros((6, 3))
+    contact = fc.ContactResult(
+        "c", "mortar", points, vectors, zeros, zeros, zeros, zeros, vectors, normal, zeros > 0, vectors[0], (0.0, 0.0)
+    )
+    moved = np.zeros((9, 3))
+    step = fc.StepResult(1, 1.0, moved, stress, np.zeros(9), np.zeros(9), moved)
     np.testing.assert_allclose(normal_stress(contact, step), -np.arange(6.0), atol=1e-14)
