@@ -1,6 +1,5 @@
 """Pictures: what is drawn of a solid, and where; looked at through the artists and through the pixels."""
 
-
 import numpy as np
 import pytest
 from matplotlib_pictures import polygons_of, step_of
