@@ -231,17 +231,17 @@ def _searched(
         out = problem.internal(bodies, u, load)[0] - contact_force - load.force
         return float(problem.system.reduced(out) @ along)
 
-    (u, here), (target, u_end) = begin, end
+    (u, here), (target, bodies) = begin, end
     along = problem.system.unknowns(target - u)
-    first, last, fraction = slope(u, here), slope(target, u_end), 1.0
+    first, last, fraction = slope(u, here), slope(target, bodies), 1.0
     for _ in range(SEARCHES):
         if not last > OVERSHOT * abs(first):
             break
         fraction *= max(abs(first) / (abs(first) + last), LEAST)
         target = u + fraction * (end[0] - u)
-        u_end = problem.deformed(target, start)
-        last = slope(target, u_end)
-    return target, u_end, fraction
+        bodies = problem.deformed(target, start)
+        last = slope(target, bodies)
+    return target, bodies, fraction
 
 
 def _told(iterate: Iterate, change: float, balanced: Balance, fraction: float) -> dict[str, Any]:

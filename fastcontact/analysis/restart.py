@@ -95,11 +95,10 @@ def put_back(problem: Problem, step: StepResult, touched: frozenset[str]) -> Sta
 def _of_tractions(problem: Problem, pairs: Mapping[str, Any]) -> dict[str, tuple[Array, Array]]:
     """Return the elastic slips [length] by pair of files that hold tangential tractions instead, of pairs with a penalty."""
     slips = {}
-    for name, (positions, traction) in (
-        (name, kept["traction"]) for name, kept in pairs.items() if kept.get("traction")
-    ):
-        stiffness = problem.pairs[name].options.tangential_penalty
-        assert stiffness is not None
+    for name in [name for name, kept in pairs.items() if kept.get("traction")]:
+        (positions, traction), stiffness = pairs[name]["traction"], problem.pairs[name].options.tangential_penalty
+        if stiffness is None:
+            raise ValueError(f"tractions of contact '{name}', which has no tangential penalty")
         slips[name] = positions, traction / stiffness(positions)[:, None]
     return slips
 

@@ -28,6 +28,7 @@ from fastcontact.errors import ModelError
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import RampLike, ramp_of
 from fastcontact.results.step import StepResult
+from fastcontact.round_off import TINY
 
 # What points between two facets may make of a derivative, relative to it.
 BETWEEN = 1e-6
@@ -166,9 +167,7 @@ def _derivatives(contact: MovingContact, gradient: Gradient, changes: Sequence[C
         other = Adjoint(contact, gradient, csr_array(0.5 * (forward + backward) + kinks))
         off = np.abs([other.derivative(change) for change in changes] - values)
         if (off > BETWEEN * np.abs(values)).any():
-            raise ModelError(
-                _between(contact, kinks, float((off / np.maximum(np.abs(values), np.finfo(float).tiny)).max()))
-            )
+            raise ModelError(_between(contact, kinks, float((off / np.maximum(np.abs(values), TINY)).max())))
     return values, adjoint.solutions
 
 

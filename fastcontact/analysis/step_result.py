@@ -49,7 +49,7 @@ def recover(
         problem.factors(own, instant[1]) for own in (problem.model.temperatures, problem.model.initial_states)
     )
     factors = {"temperature_factors": temperature, "initial_factors": initial}
-    iterations = {**iterations, **{key: pretension for key, pretension in factors.items() if pretension}}
+    iterations = {**iterations, **{key: multipliers for key, multipliers in factors.items() if multipliers}}
     heat = None if end.rise is None else problem.model.reference_temperature + end.rise
     sections = problem.model.pretensions
     if sections:

@@ -55,12 +55,12 @@ def support_forces(model: Model, step: StepResult) -> dict[str, Array]:
     _check(model, step)
     n, (held, _) = model.n_dofs, model.prescribed()
     related = [relation for _, relation in model.related_supports]
-    coupling = [relation for relation in model.relations if not any(relation is resultant for resultant in related)]
+    coupling = [relation for relation in model.relations if not any(relation is other for other in related)]
     reaction = step.reaction.ravel() - ground_force(model.springs, step.displacement.ravel())
     rows = [relation.rows for relation in (*related, *coupling)]
     rows += [section.row(n) for section in model.pretensions]  # which may be locked
     forces = multipliers(reaction, rows, held.ravel())
-    reaction = reaction - sum((resultant.T @ force for resultant, force in zip(rows, forces, strict=True)), np.zeros(n))
+    reaction = reaction - sum((R.T @ force for R, force in zip(rows, forces, strict=True)), np.zeros(n))
     by_support: dict[str, Array] = {}
     left = np.where(held, reaction.reshape(held.shape), 0.0)
     for support in model.supports:

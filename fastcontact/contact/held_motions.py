@@ -121,6 +121,7 @@ def _from_nearest(directions: Array, origin: Array, places: Array) -> Array:
 
 
 def _distances(one: Array, other: Array) -> Array:
+    """Return the distances (n, m) between points (n, dim) and others (m, dim), more than zero [length]."""
     from scipy.spatial.distance import cdist
 
     return np.maximum(cdist(one, other), TINY)

@@ -175,17 +175,17 @@ class ContactResult:
             )
         dim = self.coordinates.shape[1]
         defaults = {  # places are those of a file from before they were measured from the middle
-            "middle": np.zeros(dim),
-            "place": np.abs(self.coordinates[:, 0]) if dim == 2 else np.array(self.abscissa),
-            "primary_points": np.empty(0, np.int32),
-            "primary_force_vectors": np.empty((0, dim)),
-            "shear": np.zeros_like(self.coordinates),
-            "sticking": np.array(self.active),
-            **dict.fromkeys(("slip", "slip_total"), np.full_like(self.coordinates, np.nan)),
+            "middle": lambda: np.zeros(dim),
+            "place": lambda: np.abs(self.coordinates[:, 0]) if dim == 2 else np.array(self.abscissa),
+            "primary_points": lambda: np.empty(0, np.int32),
+            "primary_force_vectors": lambda: np.empty((0, dim)),
+            "shear": lambda: np.zeros_like(self.coordinates),
+            "sticking": lambda: np.array(self.active),
+            **dict.fromkeys(("slip", "slip_total"), lambda: np.full_like(self.coordinates, np.nan)),
         }
-        for name, value in defaults.items():
+        for name, default in defaults.items():
             if getattr(self, name) is None:
-                object.__setattr__(self, name, value)
+                object.__setattr__(self, name, default())
 
     @property
     def shown(self) -> dict[str, str]:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.round_off import TINY
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,5 +51,5 @@ class Law:
     def slide(self, y: Array, gaps: Array, sliding: Indices) -> tuple[Array, Array]:
         """Return the directions (k, q) in which constraints `sliding` (q,) slide, and how much of a turn t follows (q,)."""
         _, t, reach, radius = self.trial(y, gaps)
-        along = np.maximum(reach[sliding], np.finfo(float).tiny)
+        along = np.maximum(reach[sliding], TINY)
         return t[:, sliding] / along, np.minimum(radius[sliding] / along, 1.0)

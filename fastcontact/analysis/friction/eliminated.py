@@ -23,6 +23,7 @@ from fastcontact.errors import ConvergenceError
 from fastcontact.linear.protocol import MILD, FrictionTerms, LoadedNonsymmetric
 from fastcontact.linear.sparse_rows import scaled, taken
 from fastcontact.linear.springs import Springs
+from fastcontact.round_off import TINY
 
 # Bound of the tangential stiffness across a slip, which is unbounded as the slip vanishes, in units of the stiffness of the
 # constraint. The solution does not depend on it, since nothing slips across there.
@@ -218,7 +219,7 @@ class Eliminated:
             return _Sliding(at, pull)
         across = np.stack([-d[1], d[0]])
         rows = sum(scaled(taken(T, at), factor) for factor, T in zip(across, self._rows[1:], strict=True))
-        spring = np.minimum(turning / np.maximum(1.0 - turning, np.finfo(float).tiny), STIFFEST) * self._unit[at] ** 2
+        spring = np.minimum(turning / np.maximum(1.0 - turning, TINY), STIFFEST) * self._unit[at] ** 2
         spring = spring / (1.0 + spring * self._gives[1, at])  # behind that of the constraint itself
         return _Sliding(
             at, pull, _Across(across, Springs(csr_array(rows), spring), (across * self._free[1:, at]).sum(axis=0))

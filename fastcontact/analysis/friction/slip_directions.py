@@ -9,6 +9,7 @@ import numpy as np
 from scipy.sparse import block_array, csr_array, diags_array
 
 from fastcontact.arrays import Array, Mask
+from fastcontact.round_off import TINY
 
 # A direction of slip whose compliance, relative to that of the gap, is less than this is held.
 IDLE = 1e-10
@@ -47,7 +48,7 @@ def aligning(compliance: Array, directions: tuple[Array, ...] = ()) -> csr_array
     None where nothing turns.
     """
     m = compliance.shape[2]
-    gap = np.maximum(compliance[0, 0], np.finfo(float).tiny)
+    gap = np.maximum(compliance[0, 0], TINY)
     first, second = compliance[1, 1] - compliance[1, 0] ** 2 / gap, compliance[2, 2] - compliance[2, 0] ** 2 / gap
     mixed = compliance[1, 2] - compliance[1, 0] * compliance[2, 0] / gap
     apart = np.hypot(0.5 * (first - second), mixed)

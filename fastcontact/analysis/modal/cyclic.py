@@ -168,8 +168,7 @@ class Wave:
         rows, columns, values = [np.arange(len(rest))], [rest], [np.ones(len(rest), complex)]
         kept, count = [rest], len(rest)
         for block, like, among in blocks:
-            ends = count + np.arange(len(block))
-            rows.append(np.repeat(ends, len(among)))
+            rows.append(np.repeat(count + np.arange(len(block)), len(among)))
             columns.append(np.tile(among, len(block)))
             values.append(block.ravel())
             kept.append(like[: len(block)])

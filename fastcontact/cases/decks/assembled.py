@@ -147,16 +147,14 @@ class Assembled:
         numbers = entry.numbers
         if not isinstance(numbers, range):
             return self._all_existing(kind, scope, entry)
-        location = self._there(kind, scope)
+        there = self._there(kind, scope)
         numbers_there = [
-            n
-            for n in (numbers if len(numbers) <= len(location) else sorted(location))
-            if n in location and n in numbers
+            n for n in (numbers if len(numbers) <= len(there) else sorted(there)) if n in there and n in numbers
         ]
         if len(numbers_there) < len(numbers):
             absent = f"{len(numbers) - len(numbers_there)} of the {len(numbers)} numbers {numbers[0]} to {numbers[-1]}"
             self.content.note(entry.location, f"{absent} are no {kind}s and left out")
-        return (location[n] for n in numbers_there)
+        return (there[n] for n in numbers_there)
 
     def _all_existing(self, kind: str, scope: str, entry: Members) -> Iterator[Any]:
         there = self._there(kind, scope)

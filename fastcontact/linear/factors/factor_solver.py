@@ -42,7 +42,7 @@ class FactorSolver(LinearSolver):
     name: str
     iterative = False
 
-    def __init__(self, tolerance: float = 1e-14) -> None:
+    def __init__(self, tolerance: float = ATTAINABLE) -> None:
         self.tolerance = ATTAINABLE  # whatever was asked
         self.counters = Counters()
         self.n = 0
