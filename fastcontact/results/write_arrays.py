@@ -281,15 +281,9 @@ def _append_contact(pair: Any, number: int, contact: ContactResult | None) -> No
         for name in table.dtype.names or ():
             table[name] = getattr(contact, name)
         row["first"], row["count"] = len(pair["rows"]), len(table)
-        row["force"], row["radius"] = contact.force, contact.radius
-        row["dissipation"] = contact.dissipation
-        moved = contact.obstacle_displacement
-        row["obstacle_displacement"] = np.nan if moved is None else moved
-        for name in {"obstacle_angle", "torque"} & set(row.dtype.names or ()):  # likewise in newer files alone
+        for name in set(row.dtype.names or ()).difference(layout.PLACES):
             value = getattr(contact, name)
             row[name] = np.nan if value is None else value
-        if "tangent" in (row.dtype.names or ()):  # not in a file of an earlier schema that is resumed
-            row["middle"], row["tangent"] = contact.middle, np.nan if contact.tangent is None else contact.tangent
         _extend(pair["rows"], table)
         if "primary" in pair:  # not in files begun before there was such a table
             faced = np.zeros(len(contact.primary_points), pair["primary"].dtype)
