@@ -136,7 +136,6 @@ class ElasticPlastic(NonlinearElastic):
         table = [value for row in self.hardening for value in row]
         return [PLASTIC, self.shear_modulus, self.bulk_modulus, self.kinematic, len(self.hardening), *table]
 
-    @typed(ModelError)
     def yield_at(self, plastic_strain: Array) -> Array:
         """Return the yield stress (...) [pressure] at the equivalent plastic strains `plastic_strain` (...) [-]."""
         return np.interp(plastic_strain, *np.transpose(self.hardening))

@@ -37,6 +37,7 @@ PUBLIC = (
 )  # fmt: skip
 
 
+@typed(ModelError)
 class Model(ModelSupports):
     """An elastic contact problem.
 
@@ -107,7 +108,6 @@ class Model(ModelSupports):
         """
         return "\n".join(sentences(self))
 
-    @typed(ModelError)
     def check(self, ramp: Ramp | None = None) -> None:
         """Check the whole model and the consistency of its histories with `ramp`; `solve` begins with this check.
 

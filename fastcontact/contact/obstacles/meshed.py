@@ -90,7 +90,6 @@ class MeshedSurface:
                 f"point {shared[0]}): a rigid surface stands apart, so give it points of its own or a mesh of its own"
             )
 
-    @typed(ContactError)
     def distance(self, points: Array) -> tuple[Array, Array]:
         """See `Obstacle.distance`; infinite beyond the border of an open surface."""
         dim = self.mesh.dim

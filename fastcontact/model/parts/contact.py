@@ -39,10 +39,10 @@ from fastcontact.model.repeated_pairs import check_repeated, joined_already
 log = logging.getLogger("fastcontact")
 
 
+@typed(ModelError)
 class ModelContact(ModelConnections):
     """A model with contact pairs."""
 
-    @typed(ModelError)
     def add_contact(
         self,
         name: str,
@@ -126,7 +126,6 @@ class ModelContact(ModelConnections):
             log.info("contact '%s': %s, since %s", name, method(formulation, given), reason)
         self._add_pair(ContactPair(name, secondary, primary, formulation, given))
 
-    @typed(ModelError)
     def add_contacts(
         self,
         *,
@@ -190,7 +189,6 @@ class ModelContact(ModelConnections):
             checked.add_contact("contacts", formulation=formulation, secondary=secondary, primary=primary, **options)
         return FoundContacts(self.mesh, tuple(added))
 
-    @typed(ModelError)
     def add_fluid_pressure(self, contact: str, pressure: float, *, source: str, ramp: History = None) -> None:
         """Let a fluid penetrate a contact pair: it acts on both sides wherever they are open and connected to its source.
 
@@ -228,7 +226,6 @@ class ModelContact(ModelConnections):
         self.bind(changed)
         self.contact[index] = changed
 
-    @typed(ModelError)
     def add_obstacle(
         self,
         name: str,
@@ -373,7 +370,6 @@ class ModelContact(ModelConnections):
             check_repeated(self.mesh, pair, other)
         self.contact.append(pair)
 
-    @typed(ModelError)
     def bind(self, pair: ContactPair, held: HeldMotions | None = None, *, sectors_alike: bool = True) -> Formulation:
         """Return the formulation of a contact pair on this mesh; see `add_contact` for the errors.
 

@@ -27,10 +27,10 @@ from fastcontact.model.rigid_motions import body_name
 HEAT_FLUX = ("heat_flux_x", "heat_flux_y", "heat_flux_z")
 
 
+@typed(ModelError)
 class ModelHeat(ModelMaterials):
     """A model that may conduct heat; steps then tell temperatures and fluxes, and materials with an expansion expand."""
 
-    @typed(ModelError)
     def fix_temperature(self, group: str, value: Value, *, ramp: History = None) -> None:
         """Prescribe the temperature of all nodes of a group.
 
@@ -50,7 +50,6 @@ class ModelHeat(ModelMaterials):
         """
         self._heat(FixedTemperature(group, value, table_of(ramp, f"the ramp of the temperature on '{group}'")))
 
-    @typed(ModelError)
     def add_heat_flux(self, group: str, value: Value, *, ramp: History = None) -> None:
         """Apply a heat flux to a group of facets.
 
@@ -70,7 +69,6 @@ class ModelHeat(ModelMaterials):
         """
         self._heat(HeatFlux(group, value, table_of(ramp, f"the ramp of the heat flux on '{group}'")))
 
-    @typed(ModelError)
     def add_heat_source(self, value: Value, groups: Sequence[str] | str | None = None, *, ramp: History = None) -> None:
         """Apply a heat source to groups of solid cells.
 
@@ -91,7 +89,6 @@ class ModelHeat(ModelMaterials):
         """
         self._heat(HeatSource(group_names(groups), value, table_of(ramp, "the ramp of the heat source")))
 
-    @typed(ModelError)
     def add_nodal_heat(self, group: str, value: Value, *, ramp: History = None) -> None:
         """Apply a concentrated heat source to every node of a group.
 
@@ -111,7 +108,6 @@ class ModelHeat(ModelMaterials):
         """
         self._heat(NodalHeat(group, value, table_of(ramp, f"the ramp of the heat at nodes of '{group}'")))
 
-    @typed(ModelError)
     def add_film(self, group: str, coefficient: Value, ambient: Value, *, ramp: History = None) -> None:
         """Apply convection to a group of facets: the outward flux is ``coefficient * (temperature - ambient)``.
 

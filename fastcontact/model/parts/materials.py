@@ -17,10 +17,10 @@ from fastcontact.errors import ModelError
 from fastcontact.model.parts.base import ModelBase
 
 
+@typed(ModelError)
 class ModelMaterials(ModelBase):
     """A model with materials."""
 
-    @typed(ModelError)
     def add_material(self, material: Material, groups: Sequence[str] | str | None = None) -> None:
         """Assign a material to groups of solid cells.
 
@@ -117,7 +117,6 @@ class ModelMaterials(ModelBase):
         named = f", in {', '.join(repr(g) for g in groups)}" if groups else ""
         raise ModelError(f"{total} solid cells have no material{named}: add_material for their groups")
 
-    @typed(ModelError)
     def internal_forces(self, displacement: Array) -> Array:
         """Return the internal nodal forces (n_points, dim) [force] of the solid cells at a displacement.
 
