@@ -9,11 +9,10 @@ import numpy as np
 
 from fastcontact._jit.decorators import inlined_kernel, innermost_kernel, kernel
 from fastcontact.contact.search.box_tree_kernels import DEPTH
+from fastcontact.round_off import ROUND_OFF
 
 # A polygon of up to 4 corners clipped by one of up to 4 has at most 8.
 MOST = 12
-# Pieces smaller than this fraction of the facet are rounding errors of the cut.
-SLIVER = 1e-12
 # Newton's method on a facet; its error is the square of the last step.
 MAX_ITERATIONS, STEP = 30, 1e-8
 
@@ -125,7 +124,7 @@ def _common(corners, count, others, n_others, origin, axes, subject, window, spa
     for k in range(n_others):  # facets that face each other turn opposite ways
         window[k, 0], window[k, 1] = spare[n_others - 1 - k, 0], spare[n_others - 1 - k, 1]
     count = _clip(subject, count, window, n_others, spare)
-    if count < 3 or _area(subject, count) <= SLIVER * whole:
+    if count < 3 or _area(subject, count) <= ROUND_OFF * whole:
         return 0
     return count
 

@@ -22,8 +22,6 @@ Precondition = Callable[[Array, float, Array], None]
 # iterations leave more of the residual than SLOWLY, as many more are kept, up to MOST_KEPT: friction of nearly incompressible
 # bodies stands still without them; elsewhere they cost more than they save.
 KEPT, SLOWLY, MOST_KEPT = 20, 0.1, 100
-# A step of conjugate residuals that leaves more of the residual than this is lost.
-LOST = 0.98
 
 
 class Iteration:
@@ -115,7 +113,6 @@ class ConjugateResiduals(Iteration):
         self._kept: deque[tuple[Array, Array]] = deque()
         self._spare: list[tuple[Array, Array]] = []
         self._room, self._made, self._before = KEPT, 0, 0.0
-        self._lost = False  # the last step
 
     @property
     def nbytes(self) -> int:
@@ -128,15 +125,11 @@ class ConjugateResiduals(Iteration):
         self._spare = [*self._spare, *self._kept][:KEPT]
         self._kept.clear()
         self._room, self._made, self._before = KEPT, 0, self.norm
-        self._lost = False
 
     def step(self, multiply: Multiply, precondition: Precondition) -> bool:
         """Make one iteration; return False where no direction is left that reduces the residual."""
-        z, q, norm = self.z, self.q, self.norm
-        if self._lost:
-            precondition(self._kept[-1][1], 1.0, z)
-        else:
-            precondition(self.r, norm, z)
+        z, q = self.z, self.q
+        precondition(self.r, self.norm, z)
         multiply(z, q)
         square = before = self.dot(q, q)
         for direction, image in self._kept:
@@ -145,7 +138,6 @@ class ConjugateResiduals(Iteration):
             return False
         self._advance(self.dot(self.r, q) / square, z, q)
         self._keep(z, q, float(np.sqrt(square)))
-        self._lost = self.norm > LOST * norm
         return True
 
     def _keep(self, z: Array, q: Array, size: float) -> None:
