@@ -17,6 +17,7 @@ from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.floating_bodies import FIRM, SOFT, STIFF, FloatingBodies, RigidPosition
 from fastcontact.analysis.heat import Heat, prepared_heat
 from fastcontact.analysis.state import State
+from fastcontact.analysis.wear import at_points
 from fastcontact.analysis.work import Work
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.contact.configuration import Configuration
@@ -213,7 +214,7 @@ class Problem:
         u : ndarray (n_dofs,)
             All displacements, for the obstacles that forces drive [length].
         """
-        still = np.zeros(self.model.mesh.dim)
+        still, worn = np.zeros(self.model.mesh.dim), state.worn.get(name)
         return Configuration(
             displacement,
             self.displacement(state.u),
@@ -224,19 +225,13 @@ class Problem:
             state.elastic_slip.get(name),
             load.angles.get(name, 0.0),
             state.angles.get(name, 0.0),
-            self._worn(name, state),
+            None
+            if worn is None
+            else at_points(self.pairs[name].secondary.points, worn.depth, self.model.mesh.n_points),
             state.bonds.get(name),
             load.fluids.get(name, 0.0),
             friction_factor=load.friction_factors.get(name, 1.0),
         )
-
-    def _worn(self, name: str, state: State) -> Array | None:
-        """Return the wear depth of a contact pair at all points (n_points,) [length], None without wear."""
-        if name not in state.worn:
-            return None
-        depth = np.zeros(self.model.mesh.n_points)
-        depth[self.pairs[name].secondary.points] = state.worn[name].depth
-        return depth
 
     def deformed(self, u: Array, start: State, *, geometric: int = WHOLE) -> DeformedBodies:
         """Return `NonlinearBodies.at` displacements u (n_dofs,) [length], in a load step that begins at `start`."""

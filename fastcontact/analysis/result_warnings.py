@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.facet_sag import sag_warnings
 from fastcontact.analysis.interpenetration import interpenetration
 from fastcontact.analysis.problem import Problem
@@ -26,9 +27,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# Penetration under a penalty that is worth a warning, relative to the largest displacement.
-DEEP = 0.01
-# Equivalent strain beyond which linear kinematics are worth a warning.
+# Equivalent strain, and worn depth by the size of the model, beyond which linear kinematics are worth a warning.
 STRAIN = 0.1
 # Plastic strain, which concentrates in a few cells, likewise: under a ball without hardening the mean contact pressure falls
 # from 2.6 times the yield stress, where it reaches 0.1, to 2.3 at 0.5 and 2.1 at 1.1.
@@ -37,12 +36,8 @@ PLASTIC_STRAIN = 0.5
 ROTATION = 0.3
 # Steps to take in the place of one; more of them are no remedy, but the sign of a wrong coefficient.
 MANY_STEPS = 1000
-# Worn depth by the size of the model, likewise.
-WORN = 0.1
 # Elements across the radius of a contact that resolve its pressure.
 ACROSS = 4
-# Change of the displacement by the last of a fixed number of geometry updates, relative to its largest component.
-UNSETTLED = 1e-2
 # What criteria may leave, of the displacement or of the forces, before it is worth a warning.
 LOOSE = 1e-4
 # Part of the largest energy or work that may be missing in the balance of works.
@@ -75,10 +70,10 @@ def _deep(pair: Formulation, contact: ContactResult, displacement: Array) -> Ite
     """Yield a warning where a penalty lets the sides penetrate by much of the largest displacement."""
     size = float(np.abs(displacement).max(initial=0.0))
     penalty, depth = pair.options.penalty, contact.penetration
-    if isinstance(penalty, float) and depth > DEEP * size:
+    if isinstance(penalty, float) and depth > NOTABLE * size:
         yield (
             f"contact '{contact.name}' penetrates by {depth:.4g}, which is {depth / size:.1%} of the largest displacement: "
-            f"raise its penalty from {penalty:.4g} to about {penalty * depth / (DEEP * size):.2g}, or leave it out"
+            f"raise its penalty from {penalty:.4g} to about {penalty * depth / (NOTABLE * size):.2g}, or leave it out"
         )
 
 
@@ -87,7 +82,7 @@ def _too_fast(name: str, pair: Formulation, state: State) -> Iterator[str]:
     if name not in state.worn or (many := too_fast(pair, state.worn[name])) <= 1.0:
         return
     depth, size = float(state.worn[name].depth.max()), float(np.ptp(pair.points, axis=0).max())
-    if many > MANY_STEPS or depth > WORN * size:
+    if many > MANY_STEPS or depth > STRAIN * size:
         yield (
             f"contact '{name}' wears off {depth:.3g}, {depth / size:.2g} times the size of the model, in steps "
             f"{many:.2g} times as long as pressures can follow: is its wear Archard's coefficient by the hardness, in the "
@@ -115,7 +110,7 @@ def _unbalanced(state: State) -> Iterator[str]:
 def _unsettled(state: State) -> Iterator[str]:
     """Yield a warning where the last of a fixed number of geometry updates still changed much."""
     update, change = state.last_change or (0, 0.0)
-    if change > UNSETTLED:
+    if change > NOTABLE:
         yield (
             f"the contact geometry had not settled after the {update} updates asked for: the last one changed the "
             f"displacement by {change:.1%} of its largest component. Allow more geometry_updates, or leave them out"
