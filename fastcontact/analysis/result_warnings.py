@@ -57,7 +57,7 @@ def result_warnings(problem: Problem, state: State, last: StepResult) -> list[st
     if problem.bodies is None:
         warnings += locking_warning(problem, state.u) or scatter_warnings(problem, last)
     else:
-        warnings += nonlinear_scatter_warnings(problem, state)
+        warnings += nonlinear_scatter_warnings(problem, state, last)
     warnings += [problem.solver.gave_up] if problem.solver.gave_up else []
     load = problem.load_at(last.load_factor)
     loaded, sagging = bool(load.force.any() or load.lift.any()), sag_warnings(problem, state, last)

@@ -132,8 +132,8 @@ class Model(ModelSupports):
         fastcontact.errors.ModelError: 1 rigid-body motion is not supported: body 'BLOCK': translation along x. ...
         """
         self.material_numbers()
-        if self.temperatures or self.initial_states:
-            self.refuse_nonlinear("temperatures and initial states are")
+        if self.initial_states:
+            self.refuse_nonlinear("initial stresses and strains are")
         fixed, prescribed = self.prescribed_by_ramp()
         self._tell_axis()
         forces = self.forces_by_ramp()

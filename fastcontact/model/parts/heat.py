@@ -200,7 +200,6 @@ class ModelHeat(ModelMaterials):
             raise ModelError(
                 "temperatures are both given by add_temperature and conducted: prescribe them by fix_temperature"
             )
-        self.refuse_nonlinear("conduction of heat is")
         if self.interpolated:
             raise ModelError(
                 f"{self.interpolated[0]} joins meshes that differ, which no heat crosses: mesh its ends alike"
