@@ -150,8 +150,8 @@ def _take_object(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: A
         fields = [field for field in fields if not field.name.startswith("rotation")]
     if isinstance(value, TemporaryHeat):
         fields = [field for field in fields if field.name not in ("begins", "ends", "reached") or value.temporary]
-    if isinstance(value, ContactPair) and value.fluid is None:
-        fields = [field for field in fields if field.name != "fluid"]
+    if isinstance(value, ContactPair):
+        fields = [f for f in fields if f.name != "found_gap" and (f.name != "fluid" or value.fluid is not None)]
     if isinstance(value, LinearElastic):  # what the choice comes to, and nothing where it is plain, as in older files
         fields = [field for field in fields if field.name != "volumetric"]
         add(b"mean dilatation" if value.averaged else b"")
