@@ -7,7 +7,7 @@ for generalised equations). So iterations converge quadratically, and few matric
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,7 @@ from fastcontact.analysis.inequalities import StepContext
 from fastcontact.analysis.iterate import Iterate
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
+from fastcontact.analysis.step_equilibrium import StepEquilibrium
 from fastcontact.arrays import Array
 from fastcontact.elasticity.nonlinear_bodies import WHOLE, DeformedBodies
 from fastcontact.errors import ConvergenceError, ModelError
@@ -41,36 +42,9 @@ FORCING = 1e-3
 UNCHANGED, SCATTER, STAYS = 1e-9, 1e-6, 0.3
 
 
-@dataclass(frozen=True, eq=False)
-class NewtonSolution:
-    """The end of a load step with nonlinear bodies.
-
-    Attributes
-    ----------
-    settled : SettledContact, optional
-        None without contact.
-    u : ndarray (n_dofs,)
-        [length]
-    balance : Balance
-    bodies : DeformedBodies
-    history : list of dict
-        An entry for each iteration.
-    """
-
-    settled: SettledContact | None
-    u: Array
-    balance: Balance
-    bodies: DeformedBodies
-    history: list[dict[str, Any]]
-
-    @property
-    def counts(self) -> dict[str, int]:
-        """Pairings and active-set iterations of all iterations, see `StepResult.iterations`."""
-        names = {"geometry_updates": "pairings", "active_set_iterations": "active_set_iterations"}
-        return {name: sum(entry[key] for entry in self.history) for name, key in names.items()}
-
-
-def newton(problem: Problem, start: State, load: StepLoad, expected: float) -> NewtonSolution:
+def newton(
+    problem: Problem, start: State, load: StepLoad, expected: float, before: StepEquilibrium | None = None
+) -> StepEquilibrium:
     """Return the equilibrium of a load step.
 
     Parameters
@@ -82,31 +56,34 @@ def newton(problem: Problem, start: State, load: StepLoad, expected: float) -> N
     load : StepLoad
     expected : float
         Displacement to expect in the first step, if forces alone act [length].
+    before : StepEquilibrium, optional
+        Of the same step, under about the same load.
 
     Raises
     ------
     ConvergenceError
         If the iterations do not end, or a cell turns inside out.
     """
-    if start.extrapolation.ratio:
+    if before is not None or start.extrapolation.ratio:
+        origin = start.extrapolation.displacement(start.u) if before is None else before.u
         try:
-            return _iterated(problem, start, load, expected, start.extrapolation.displacement(start.u))
+            return _iterated(problem, start, load, expected, origin)
         except ConvergenceError as error:
-            log.info("the step starts anew, not from an extrapolated displacement: %s", error)
+            log.info("the step starts anew, not from an expected displacement: %s", error)
     return _iterated(problem, start, load, expected, start.u)
 
 
-def _iterated(problem: Problem, start: State, load: StepLoad, expected: float, origin: Array) -> NewtonSolution:
+def _iterated(problem: Problem, start: State, load: StepLoad, expected: float, origin: Array) -> StepEquilibrium:
     """Return the equilibrium of a load step by iterations that begin at displacements `origin` (n_dofs,) [length]."""
     iterate = Iterate.of(start)
     history: list[dict[str, Any]] = []
-    u, bodies, changes = origin, problem.deformed(origin, start), [1.0]
+    u, bodies, changes = origin, problem.deformed(origin, start, load.rise), [1.0]
     settled = None
     for _ in range(MOST):
         scale = expected, changes[-1]
         settled, target, force = _solve(problem, start, load, (bodies, u), iterate, scale, settled)
         before, here = u, bodies
-        u, bodies, fraction = _reach(problem, start, u, target)
+        u, bodies, fraction = _reach(problem, start, load, u, target)
         balanced = _balanced(problem, start, load, (u, bodies), force)
         if history and fraction == 1.0 and balanced.excess > 1.0:
             u, bodies, fraction = _searched(problem, start, load, (before, here), (u, bodies), force)
@@ -115,7 +92,7 @@ def _iterated(problem: Problem, start: State, load: StepLoad, expected: float, o
         changes.append(moved / size if size else 0.0)
         history.append(_told(iterate, changes[-1], balanced, fraction))
         if fraction == 1.0 and balanced.excess <= 1.0 and (_still(problem, changes) or moved <= start.gap_round_off):
-            return NewtonSolution(settled, u, balanced, bodies, history)
+            return StepEquilibrium(settled, u, balanced, bodies, history)
         if len(changes) > PATIENCE and min(changes[-PATIENCE:]) > FALL * min(changes[:-PATIENCE]):
             break
     raise ConvergenceError(
@@ -160,7 +137,7 @@ def _solve(
     attempts += [(less, None, stiff) for less in range(WHOLE)[::-1]]
     for geometric, rows, firm in attempts:
         if geometric < WHOLE:
-            bodies = problem.deformed(u, start, geometric=geometric)
+            bodies = problem.deformed(u, start, load.rise, geometric=geometric)
         try:
             return _linear_contact(problem, start, load, (bodies, u), iterate, scale, rows, firm)
         except (ModelError, ConvergenceError) as error:
@@ -201,7 +178,9 @@ def _linear_contact(
     return settled, *solve_displacements(tangent, start, linear, loaded, settled)
 
 
-def _reach(problem: Problem, start: State, u: Array, target: Array) -> tuple[Array, DeformedBodies, float]:
+def _reach(
+    problem: Problem, start: State, load: StepLoad, u: Array, target: Array
+) -> tuple[Array, DeformedBodies, float]:
     """Return the displacements to go on from, the bodies there, and the part of the way to the `target` (n_dofs,) [length].
 
     Half of the way, of that half, and so on, is gone where cells turn inside out farther on.
@@ -210,7 +189,7 @@ def _reach(problem: Problem, start: State, u: Array, target: Array) -> tuple[Arr
     for _ in range(HALVINGS):
         end = target if fraction == 1.0 else u + fraction * (target - u)
         try:
-            return end, problem.deformed(end, start), fraction
+            return end, problem.deformed(end, start, load.rise), fraction
         except ConvergenceError as error:
             failed = error
         fraction *= 0.5
@@ -239,7 +218,7 @@ def _searched(
             break
         fraction *= max(abs(first) / (abs(first) + last), LEAST)
         target = u + fraction * (end[0] - u)
-        bodies = problem.deformed(target, start)
+        bodies = problem.deformed(target, start, load.rise)
         last = slope(target, bodies)
     return target, bodies, fraction
 

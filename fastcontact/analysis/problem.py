@@ -69,6 +69,8 @@ class StepLoad:
         By contact pair, what its coefficient of friction is multiplied with, where it changes.
     fluids : dict of str to float
         By contact pair, the pressure of the fluid at its source [pressure].
+    rise : ndarray (n_points,), optional
+        Of the temperature, by which nonlinear bodies expand [temperature]; that of linear ones is in the forces.
     """
 
     lift: Array
@@ -79,6 +81,7 @@ class StepLoad:
     following: tuple[float, ...] = ()
     friction_factors: Mapping[str, float] = field(default_factory=dict)
     fluids: Mapping[str, float] = field(default_factory=dict)
+    rise: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +177,10 @@ class Problem:
             pair.name: pair.fluid.pressure * multiplier(pair.fluid.ramp, self.ramp, instant)
             for pair in self.model.contact if pair.fluid is not None
         }  # fmt: skip
-        return StepLoad(lift, force, obstacles, clearances, angles, following, frictions, fluids)
+        temperatures, rise = self.model.temperatures, None
+        if self.bodies is not None:
+            rise = self.model.temperature_rise(self.factors(temperatures, instant))
+        return StepLoad(lift, force, obstacles, clearances, angles, following, frictions, fluids, rise)
 
     def factors(self, histories: Iterable[Temperature | InitialState], instant: float) -> list[float]:
         """Return the load factors of temperatures or initial states at an instant of the ramp [-]."""
@@ -233,10 +239,14 @@ class Problem:
             friction_factor=load.friction_factors.get(name, 1.0),
         )
 
-    def deformed(self, u: Array, start: State, *, geometric: int = WHOLE) -> DeformedBodies:
-        """Return `NonlinearBodies.at` displacements u (n_dofs,) [length], in a load step that begins at `start`."""
+    def deformed(self, u: Array, start: State, rise: Array | None, *, geometric: int = WHOLE) -> DeformedBodies:
+        """Return `NonlinearBodies.at` displacements u (n_dofs,) [length], in a load step that begins at `start`.
+
+        `rise` (n_points,) is that of the temperature at its end [temperature].
+        """
         assert self.bodies is not None
-        return self.bodies.at(self.displacement(u), start.history or self.bodies.beginning, geometric=geometric)
+        before = start.history or self.bodies.beginning
+        return self.bodies.at(self.displacement(u), before, rise=rise, geometric=geometric)
 
     def internal(self, bodies: DeformedBodies, u: Array, load: StepLoad) -> tuple[Array, tuple[float, float]]:
         """Return forces (n_dofs,) [force] of nonlinear bodies and springs, their elastic energy and plastic work [energy].
@@ -394,9 +404,13 @@ def active_dofs(
 
 
 def _forces(model: Model) -> dict[Table | None, Array]:
-    """Return by history the nodal forces (n_points, dim) of loads, heat and initial states at multiplier 1 [force]."""
+    """Return by history the nodal forces (n_points, dim) of loads, heat and initial states at multiplier 1 [force].
+
+    Heat expands nonlinear bodies by strains, not by forces.
+    """
     forces = model.forces_by_ramp()
-    for table, values in (*model.thermal_forces_by_ramp().items(), *model.initial_forces_by_ramp().items()):
+    thermal = {} if model.nonlinear else model.thermal_forces_by_ramp()
+    for table, values in (*thermal.items(), *model.initial_forces_by_ramp().items()):
         forces[table] = forces[table] + values if table in forces else values
     return forces
 

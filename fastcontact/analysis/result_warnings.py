@@ -52,15 +52,17 @@ def result_warnings(problem: Problem, state: State, last: StepResult) -> list[st
     if problem.bodies is None:
         warnings += locking_warning(problem, state.u) or scatter_warnings(problem, last)
     else:
-        warnings += nonlinear_scatter_warnings(problem, state)
+        warnings += nonlinear_scatter_warnings(problem, state, last)
     warnings += [problem.solver.gave_up] if problem.solver.gave_up else []
     load = problem.load_at(last.load_factor)
     loaded, sagging = bool(load.force.any() or load.lift.any()), sag_warnings(problem, state, last)
+    clearances = _clearances(problem, state)
     for name, pair in problem.pairs.items():
         contact = last.contact[name]
         if pair.options.gap_only:
             continue
-        warnings += [*_deep(pair, contact, state.u), *_lost(pair, contact, name in state.touched, loaded)]
+        lost = [] if name in clearances else _lost(pair, contact, name in state.touched, loaded)
+        warnings += [*_deep(pair, contact, state.u), *lost]
         warnings += [sagging[name]] if name in sagging else _unresolved(name, pair, contact)
         warnings += [*wavering(pair, contact), *_too_fast(name, pair, state)]
     return [*warnings, *_unsettled(state), *_loose(problem, last), *_unbalanced(state)]
@@ -234,6 +236,15 @@ def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
         if most > square:
             square, point = most, mesh.points[block[row]].mean(axis=0)
     return float(square**0.5), point
+
+
+def _clearances(problem: Problem, state: State) -> set[str]:
+    """Return the names of found pairs that were apart and never closed, as a shank in its hole, where others closed."""
+    found = {pair.name: pair.found_gap for pair in problem.model.contact if pair.found_gap is not None}
+    if not state.touched & found.keys():
+        return set()
+    apart = LENGTH_ROUND_OFF * float(np.ptp(problem.model.mesh.points, axis=0).max())
+    return {name for name, gap in found.items() if gap > apart and name not in state.touched}
 
 
 def _lost(pair: Formulation, contact: ContactResult, touched: bool, loaded: bool) -> Iterator[str]:

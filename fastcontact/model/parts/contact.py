@@ -182,6 +182,7 @@ class ModelContact(ModelConnections):
                 log.info("contact '%s' is left out, since another one joins its facets already", pair.name)
                 continue
             self.add_contact(pair.name, secondary=secondary, primary=primary, formulation=formulation, **options)
+            self.contact[-1] = dataclasses.replace(self.contact[-1], found_gap=pair.gap[0])
             added.append(pair)
         if not added and options:  # they are wrong or right all the same
             checked = copy.copy(self)

@@ -232,6 +232,15 @@ class ModelInitialStates(ModelLoads):
         ]
         return np.asarray(np.sum(rises, axis=0))
 
+    def expanding_rise(self, temperature_factors: Sequence[float], temperature: Array | None) -> Array | None:
+        """Return the rise of the temperature (n_points,) by which cells expand [temperature]; None where none does.
+
+        Both arguments as of `stress_offset`.
+        """
+        if temperature is not None and self.expands:
+            return np.asarray(temperature - self.reference_temperature)
+        return self.temperature_rise(temperature_factors)
+
     def stress_offset(
         self, temperature_factors: Sequence[float] = (), initial_factors: Sequence[float] = (),
         field: MaterialField | None = None, temperature: Array | None = None,
@@ -241,9 +250,7 @@ class ModelInitialStates(ModelLoads):
         The factors are those of a step result, `StepResult.iterations`; `field` is the `material_field`, where it is known;
         `temperature` (n_points,) [temperature] that of the step result, where heat is conducted.
         """
-        rise, states = self.temperature_rise(temperature_factors), []
-        if temperature is not None and self.expands:
-            rise = temperature - self.reference_temperature
+        rise, states = self.expanding_rise(temperature_factors, temperature), []
         if len(initial_factors):
             states = list(zip(initial_factors, self.initial_states, strict=True))
         if rise is None and not states:
