@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.sparse import bsr_array, csr_array, diags_array, eye_array, kron
+from scipy.sparse import bsr_array, csr_array, eye_array, kron
 
 from fastcontact._jit import parallel
 from fastcontact.analysis.active_dofs import ActiveDofs, SurfaceDofs
@@ -119,6 +119,8 @@ class Problem:
         Pressures in finite strain; `forces` hold them as they are before any displacement.
     heat : Heat, optional
         Where heat is conducted.
+    linearised_at : ndarray (n_dofs,), optional
+        Displacements at which `system` is the tangent of bodies in finite strain [length].
     """
 
     model: Model
@@ -140,6 +142,7 @@ class Problem:
     bodies: NonlinearBodies | None = None
     following: Sequence[tuple[FollowingPressure, Table | None]] = ()
     heat: Heat | None = None
+    linearised_at: Array | None = None
 
     @cached_property
     def material_of_cells(self) -> Numbers:
@@ -227,6 +230,7 @@ class Problem:
             self._worn(name, state),
             state.bonds.get(name),
             load.fluids.get(name, 0.0),
+            linearised=None if self.linearised_at is None else self.displacement(self.linearised_at),
             friction_factor=load.friction_factors.get(name, 1.0),
         )
 
@@ -276,19 +280,19 @@ class Problem:
         u: Array,
         load: StepLoad,
         rigid: RigidPosition | None,
-        held: csr_array | None = None,
+        added: csr_array | None = None,
         stiff: bool = False,
     ) -> tuple[Problem, StepLoad]:
         """Return the problem with the tangent of nonlinear bodies, at displacements u (n_dofs,) [length], and its loads.
 
-        The tangent has springs along the rows `held` (k, n_dofs), slack at u; those of floating bodies are `stiff`.
+        The tangent has the stiffness `added` (n_dofs, n_dofs), of forces that vanish or are known at u [force / length];
+        the springs of floating bodies are `stiff`.
         """
         force, K = -self.internal(bodies, u, load)[0], stiffened(bodies.K, self.model.springs)
         for (pressure, _), factor in zip(self.following, load.following, strict=True):
-            K = bsr_array(K + (factor * pressure.at(self.displacement(u))[1]).tobsr(K.blocksize))
-            K.sort_indices()
+            K = _sum(K, factor * pressure.at(self.displacement(u))[1])
         K = self.force_driven.stiffness(K)
-        system = self.system.renewed(K if held is None else _stiffened_along(K, held))
+        system = self.system.renewed(K if added is None else _sum(K, added))
         force += load.force + system.K @ u
         floating = self._floating(system, u, rigid, stiff)
         if floating is not None and rigid is not None:  # turned bodies under load are not free to turn
@@ -298,7 +302,8 @@ class Problem:
         modes = self.force_driven.near_nullspace(near_nullspace(self.model, self.displacement(u)))
         involved = _prepare_solver(solver, system, floating, modes, involved)
         dofs = active_dofs(system, self.contact_dofs, involved, self.pairs, floating, solver)
-        tangent = replace(self, system=system, solver=solver, dofs=dofs, floating_bodies=floating)
+        at = u if self.bodies is not None and self.bodies.finite else None
+        tangent = replace(self, system=system, solver=solver, dofs=dofs, floating_bodies=floating, linearised_at=at)
         return tangent, replace(load, force=force)
 
     def initial_state(self) -> State:
@@ -368,10 +373,9 @@ def prepare(
     )  # fmt: skip
 
 
-def _stiffened_along(K: bsr_array, rows: csr_array) -> bsr_array:
-    """Return K (n, n) with springs along `rows` (k, n), as stiff as its diagonal at most [force / length]."""
-    stiffness = float(K.diagonal().max()) / np.asarray(rows.multiply(rows).sum(axis=1)).ravel()
-    total = bsr_array(K + csr_array(rows.T @ diags_array(stiffness) @ rows).tobsr(K.blocksize))
+def _sum(K: bsr_array, more: csr_array) -> bsr_array:
+    """Return the sum of two matrices (n, n), blocks sorted."""
+    total = bsr_array(K + more.tobsr(K.blocksize))
     total.sort_indices()
     return total
 
