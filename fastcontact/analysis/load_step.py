@@ -167,7 +167,7 @@ def equilibrium(
         dofs = problem.dofs.for_step(start.u, load.lift)
         step = StepContext(problem, start, load, dofs.loaded(loaded), dofs)
         settled = settle_geometry(step, start.extrapolation, expected, previous_try.iterate if previous_try else None)
-    u, contact_force = solve_displacements(problem, start, load, loaded, settled)
+    u, contact_force = solve_displacements(problem, load, loaded, settled, start.u)
     balanced = balance(problem, u, contact_force, load.force, start.largest_force)
     if settled is not None:
         settled.iterate.history[-1]["residual"] = balanced.relative

@@ -38,6 +38,8 @@ PATIENCE, FALL = 12, 0.5
 # Stiffness of springs along closed gaps beside the largest of the bodies. What contact does not hold, such as gaps between
 # values of a pressure field, creeps with stiff ones: an O-ring takes 5, 7, 11 iterations with 5e-5, 2e-4, 1e-3.
 HELD = 5e-5, 1e-3
+# After changes of the displacement up to this, relative to its size, a tangent serves a second iteration.
+SMALL = 1e-3
 # Contact geometry of the linearised bodies settles to this part of the last relative change of the displacement.
 FORCING = 1e-3
 # Relative error of the displacement below which iterations end. Changes below SCATTER that do not fall to the part STAYS of
@@ -119,6 +121,7 @@ class _Newton:
         self._problem, self._start, self._load, self._expected = problem, start, load, expected
         self._iterate = Iterate.of(start)
         self._settled: SettledContact | None = None
+        self._kept: Problem | None = None  # the last tangent, where another iteration may use it
         self._held = False  # whether the last tangent needed springs along closed gaps
 
     def iterated(self, origin: Array) -> NewtonSolution:
@@ -165,11 +168,11 @@ class _Newton:
         soft springs first: this leaves the iterations quadratic but for what contact does not hold. Where that does not help,
         parts of the geometric stiffness are left out. Once springs have helped, they are tried first.
         """
-        tangents = self._tangents()
-        for tangent in tangents:
+        failed: Exception | None = None
+        for tangent in self._tangents():
             if self._held and tangent.geometric == WHOLE and not tangent.held:
                 continue  # it failed an iteration ago
-            if tangent.geometric < WHOLE:
+            if failed or tangent.geometric < WHOLE:  # the stiffness of the bodies is taken apart by now
                 bodies = self._problem.deformed(u, self._start, geometric=tangent.geometric)
             try:
                 solution = self._linear_contact(bodies, u, change, tangent)
@@ -198,8 +201,14 @@ class _Newton:
     ) -> tuple[Array, Array]:
         """Return the result of `_solve` for a tangent, and keep the contact."""
         start, iterate = self._start, self._iterate
-        added = self._added(tangent.held * float(bodies.K.diagonal().max()), u) if tangent.geometric == WHOLE else None
-        problem, load = self._problem.linearised(bodies, u, self._load, iterate.rigid, added, tangent.stiff)
+        problem, self._kept = (self._kept, None) if change <= SMALL else (None, None)
+        if problem is None:
+            scale = tangent.held and tangent.held * float(bodies.K.diagonal().max())
+            added = self._added(scale, u) if tangent.geometric == WHOLE else None
+            problem = self._problem.linearised(bodies, u, self._load, iterate.rigid, added, tangent.stiff)
+            if tangent.geometric == WHOLE and not problem.pairs:  # where there is contact, its geometry goes on
+                self._kept = problem
+        load = problem.about(bodies, u, self._load, iterate.rigid)
         iterate.u, iterate.history = u.copy(), []
         loaded, settled = with_loads(problem, load), None
         if problem.pairs:
@@ -208,7 +217,7 @@ class _Newton:
             dofs = problem.dofs.for_step(iterate.u, load.lift)
             step = StepContext(inner, start, load, dofs.loaded(loaded), dofs)
             settled = settle_geometry(step, Extrapolation(), self._expected, iterate)
-        solution = solve_displacements(problem, start, load, loaded, settled)
+        solution = solve_displacements(problem, load, loaded, settled, u)
         self._settled = settled
         return solution
 

@@ -282,29 +282,32 @@ class Problem:
         rigid: RigidPosition | None,
         added: csr_array | None = None,
         stiff: bool = False,
-    ) -> tuple[Problem, StepLoad]:
-        """Return the problem with the tangent of nonlinear bodies, at displacements u (n_dofs,) [length], and its loads.
+    ) -> Problem:
+        """Return the problem with the tangent of nonlinear bodies, at displacements u (n_dofs,) [length].
 
         The tangent has the stiffness `added` (n_dofs, n_dofs), of forces that vanish or are known at u [force / length];
         the springs of floating bodies are `stiff`.
         """
-        force, K = -self.internal(bodies, u, load)[0], stiffened(bodies.K, self.model.springs)
+        K = stiffened(bodies.K, self.model.springs)
         for (pressure, _), factor in zip(self.following, load.following, strict=True):
             K = _sum(K, factor * pressure.at(self.displacement(u))[1])
         K = self.force_driven.stiffness(K)
         system = self.system.renewed(K if added is None else _sum(K, added))
-        force += load.force + system.K @ u
         floating = self._floating(system, u, rigid, stiff)
-        if floating is not None and rigid is not None:  # turned bodies under load are not free to turn
-            force -= system.K @ floating.rigid(u[floating.dofs])
         solver = copy.copy(self.solver)
         involved = system.involved(self.contact_dofs)
         modes = self.force_driven.near_nullspace(near_nullspace(self.model, self.displacement(u)))
         involved = _prepare_solver(solver, system, floating, modes, involved)
         dofs = active_dofs(system, self.contact_dofs, involved, self.pairs, floating, solver)
         at = u if self.bodies is not None and self.bodies.finite else None
-        tangent = replace(self, system=system, solver=solver, dofs=dofs, floating_bodies=floating, linearised_at=at)
-        return tangent, replace(load, force=force)
+        return replace(self, system=system, solver=solver, dofs=dofs, floating_bodies=floating, linearised_at=at)
+
+    def about(self, bodies: DeformedBodies, u: Array, load: StepLoad, rigid: RigidPosition | None) -> StepLoad:
+        """Return the loads of this tangent about the bodies at displacements u (n_dofs,) [length]."""
+        force = load.force - self.internal(bodies, u, load)[0] + self.system.K @ u
+        if self.floating_bodies is not None and rigid is not None:  # turned bodies under load are not free to turn
+            force -= self.system.K @ self.floating_bodies.rigid(u[self.floating_bodies.dofs])
+        return replace(load, force=force)
 
     def initial_state(self) -> State:
         """Return the state before the first load step."""

@@ -196,7 +196,8 @@ class ModelContact(ModelConnections):
 
         Starting at the source, the fluid advances from facet to facet where the sides are open, or where their contact
         pressure does not exceed its own. There it acts on the secondary side along its own normals, in finite strain those
-        of the deformed surface, and on the primary side along its own (``fluid_pressure`` of the results). Its action on other surfaces is a load, see `add_pressure`.
+        of the deformed surface, and on the primary side along its own (``fluid_pressure`` of the results). Its action on
+        other surfaces is a load, see `add_pressure`.
 
         Parameters
         ----------
