@@ -163,7 +163,7 @@ def equilibrium(
         step = StepContext(problem, start, load, dofs.loaded(loaded), dofs)
         tried = None if previous_try is None else previous_try.settled
         settled = settle_geometry(step, start.extrapolation, expected, tried.iterate if tried else None)
-    u, contact_force = solve_displacements(problem, start, load, loaded, settled)
+    u, contact_force = solve_displacements(problem, load, loaded, settled, start.u)
     balanced = balance(problem, u, contact_force, load.force, start.largest_force)
     if settled is not None:
         settled.iterate.history[-1]["residual"] = balanced.relative

@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.sparse import bsr_array, csr_array, diags_array, eye_array, kron
+from scipy.sparse import bsr_array, csr_array, eye_array, kron
 
 from fastcontact._jit import parallel
 from fastcontact.analysis.active_dofs import ActiveDofs, SurfaceDofs
@@ -123,6 +123,8 @@ class Problem:
         Pressures in finite strain; `forces` hold them as they are before any displacement.
     heat : Heat, optional
         Where heat is conducted.
+    linearised_at : ndarray (n_dofs,), optional
+        Displacements at which `system` is the tangent of bodies in finite strain [length].
     """
 
     model: Model
@@ -144,6 +146,7 @@ class Problem:
     bodies: NonlinearBodies | None = None
     following: Sequence[tuple[FollowingPressure, Table | None]] = ()
     heat: Heat | None = None
+    linearised_at: Array | None = None
 
     @cached_property
     def material_of_cells(self) -> Numbers:
@@ -236,6 +239,7 @@ class Problem:
             else at_points(self.pairs[name].secondary.points, worn.depth, self.model.mesh.n_points),
             state.bonds.get(name),
             load.fluids.get(name, 0.0),
+            linearised=None if self.linearised_at is None else self.displacement(self.linearised_at),
             friction_factor=load.friction_factors.get(name, 1.0),
         )
 
@@ -281,30 +285,34 @@ class Problem:
         u: Array,
         load: StepLoad,
         rigid: RigidPosition | None,
-        held: csr_array | None = None,
+        added: csr_array | None = None,
         stiff: bool = False,
-    ) -> tuple[Problem, StepLoad]:
-        """Return the problem with the tangent of nonlinear bodies, at displacements u (n_dofs,) [length], and its loads.
+    ) -> Problem:
+        """Return the problem with the tangent of nonlinear bodies, at displacements u (n_dofs,) [length].
 
-        The tangent has springs along the rows `held` (k, n_dofs), slack at u; those of floating bodies are `stiff`.
+        The tangent has the stiffness `added` (n_dofs, n_dofs), of forces that vanish or are known at u [force / length];
+        the springs of floating bodies are `stiff`.
         """
-        force, K = -self.internal(bodies, u, load)[0], stiffened(bodies.K, self.model.springs)
+        K = stiffened(bodies.K, self.model.springs)
         for (pressure, _), factor in zip(self.following, load.following, strict=True):
-            K = bsr_array(K + (factor * pressure.at(self.displacement(u))[1]).tobsr(K.blocksize))
-            K.sort_indices()
+            K = _sum(K, factor * pressure.at(self.displacement(u))[1])
         K = self.force_driven.stiffness(K)
-        system = self.system.renewed(K if held is None else _stiffened_along(K, held))
-        force += load.force + system.K @ u
+        system = self.system.renewed(K if added is None else _sum(K, added))
         floating = self._floating(system, u, rigid, stiff)
-        if floating is not None and rigid is not None:  # turned bodies under load are not free to turn
-            force -= system.K @ floating.rigid(u[floating.dofs])
         solver = copy.copy(self.solver)
         involved = system.involved(self.contact_dofs)
         modes = self.force_driven.near_nullspace(near_nullspace(self.model, self.displacement(u)))
         involved = _prepare_solver(solver, system, floating, modes, involved)
         dofs = active_dofs(system, self.contact_dofs, involved, self.pairs, floating, solver)
-        tangent = replace(self, system=system, solver=solver, dofs=dofs, floating_bodies=floating)
-        return tangent, replace(load, force=force)
+        at = u if self.bodies is not None and self.bodies.finite else None
+        return replace(self, system=system, solver=solver, dofs=dofs, floating_bodies=floating, linearised_at=at)
+
+    def about(self, bodies: DeformedBodies, u: Array, load: StepLoad, rigid: RigidPosition | None) -> StepLoad:
+        """Return the loads of this tangent about the bodies at displacements u (n_dofs,) [length]."""
+        force = load.force - self.internal(bodies, u, load)[0] + self.system.K @ u
+        if self.floating_bodies is not None and rigid is not None:  # turned bodies under load are not free to turn
+            force -= self.system.K @ self.floating_bodies.rigid(u[self.floating_bodies.dofs])
+        return replace(load, force=force)
 
     def initial_state(self) -> State:
         """Return the state before the first load step."""
@@ -373,10 +381,9 @@ def prepare(
     )  # fmt: skip
 
 
-def _stiffened_along(K: bsr_array, rows: csr_array) -> bsr_array:
-    """Return K (n, n) with springs along `rows` (k, n), as stiff as its diagonal at most [force / length]."""
-    stiffness = float(K.diagonal().max()) / np.asarray(rows.multiply(rows).sum(axis=1)).ravel()
-    total = bsr_array(K + csr_array(rows.T @ diags_array(stiffness) @ rows).tobsr(K.blocksize))
+def _sum(K: bsr_array, more: csr_array) -> bsr_array:
+    """Return the sum of two matrices (n, n), blocks sorted."""
+    total = bsr_array(K + more.tobsr(K.blocksize))
     total.sort_indices()
     return total
 

@@ -194,8 +194,9 @@ class ModelContact(ModelConnections):
         """Let a fluid penetrate a contact pair: it acts on both sides wherever they are open and connected to its source.
 
         Starting at the source, the fluid advances from facet to facet where the sides are open, or where their contact
-        pressure does not exceed its own. There it acts on both sides along the contact normal (``fluid_pressure`` of the
-        results). Its action on other surfaces is a load, see `add_pressure`.
+        pressure does not exceed its own. There it acts on the secondary side along its own normals, in finite strain those
+        of the deformed surface, and on the primary side along its own (``fluid_pressure`` of the results). Its action on
+        other surfaces is a load, see `add_pressure`.
 
         Parameters
         ----------
