@@ -114,7 +114,8 @@ def animate(
     figure = new_axes(None, size, projection).figure
     writer = writer_of(target, pictures_per_second)
     colours, box = _over_all(mesh, steps, field, scale, mirrored)
-    with _failure_of_ffmpeg(target), replacing(target) as temporary, writer.saving(figure, temporary, RESOLUTION):
+    with _failure_of_ffmpeg(target), replacing(target) as temporary:
+        writer.setup(figure, temporary, RESOLUTION)
         for step in steps:
             figure.clear()
             axes = figure.add_subplot(projection=projection)
@@ -125,6 +126,7 @@ def animate(
             )  # fmt: skip
             _show(axes, box, view)
             writer.grab_frame()
+        writer.finish()
     return MovingPicture(target)
 
 
