@@ -272,7 +272,7 @@ class ByShape(Generic[Name]):
             if len(points) == len(members) and min(sizes) == max(sizes):
                 yield axis, list(members), 1.0, table
             else:  # what acts twice on a point adds up
-                yield axis, points.tolist(), partial(given_values, np.bincount(which, sizes)), shape
+                yield axis, points.tolist(), partial(given_values, np.bincount(which, sizes).astype(float)), shape
 
 
 def given_values(values: Array, positions: Array) -> Array:
