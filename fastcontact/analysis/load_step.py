@@ -25,6 +25,7 @@ from fastcontact.analysis.state import State
 from fastcontact.analysis.step_history import keep_path, save_contact_history
 from fastcontact.analysis.step_result import contact_results, counted, recover
 from fastcontact.analysis.thermal_coupling import Heated, expanded, first_rise, settle_heat
+from fastcontact.analysis.touching import along_path
 from fastcontact.arrays import Array
 from fastcontact.elasticity.nonlinear_bodies import DeformedBodies
 from fastcontact.linear.protocol import Loaded
@@ -167,6 +168,7 @@ def equilibrium(
         dofs = problem.dofs.for_step(start.u, load.lift)
         step = StepContext(problem, start, load, dofs.loaded(loaded), dofs)
         settled = settle_geometry(step, start.extrapolation, expected, previous_try.iterate if previous_try else None)
+        settled = along_path(step, settled, expected)
     u, contact_force = solve_displacements(problem, start, load, loaded, settled)
     balanced = balance(problem, u, contact_force, load.force, start.largest_force)
     if settled is not None:

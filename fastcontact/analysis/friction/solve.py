@@ -17,8 +17,9 @@ from scipy.linalg import lstsq
 from scipy.sparse import csr_array, vstack
 
 from fastcontact.analysis.friction import dense, eliminated
+from fastcontact.analysis.friction.path import Path, along
 from fastcontact.analysis.friction.slip_directions import GIVING, aligning, idle, own_compliance
-from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium
+from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium, Slid
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.pairing import normals
@@ -30,7 +31,7 @@ log = logging.getLogger("fastcontact")
 
 def solve(
     loaded: Loaded, constraints: Constraints, closed: Mask, accuracy: Accuracy, u: Array,
-    guess: FrictionalEquilibrium | None = None,
+    guess: FrictionalEquilibrium | None = None, path: Path | None = None,
 ) -> FrictionalEquilibrium:  # fmt: skip
     """Find displacement and contact forces under contact and friction.
 
@@ -51,9 +52,11 @@ def solve(
         Unknowns that stay where no constraint acts, see `Loaded.involved_solution`; iterative solvers start there [length].
     guess : FrictionalEquilibrium, optional
         A solution with nearly the same forces; one of other constraints is passed over.
+    path : Path, optional
+        To solve along, in increments; where constraints are eliminated the step is solved at once.
     """
     forces = None if guess is None else guess.forces_along(constraints.directions, len(constraints))
-    together = constraints.compliance is not None or constraints.low_rank_compliance is not None
+    together = constraints.coupled
     if isinstance(loaded, LoadedNonsymmetric) and not together:
         equilibrium = _eliminated(loaded, constraints, closed, accuracy, u, forces)
         if equilibrium is not None:
@@ -61,10 +64,11 @@ def solve(
         log.info("friction: the iteration on eliminated constraints did not settle, their compliance is formed")
     usable = constraints.usable
     begun = closed if constraints.equality is None else closed | constraints.equality
+    begun = begun if path is None else begun | path.loaded
     chosen = usable if together else usable & begun
     iterations = 0
     while True:
-        equilibrium = _among(chosen, loaded, constraints, closed, u, forces)
+        equilibrium = _among(chosen, loaded, constraints, closed, u, forces, path)
         equilibrium.gap[~usable], equilibrium.slip[~usable] = np.inf, 0.0
         iterations += equilibrium.iterations
         missing = usable & ~chosen & (equilibrium.gap < 0.0)
@@ -95,8 +99,8 @@ def _eliminated(
 
 
 def _among(
-    chosen: Mask, loaded: Loaded, constraints: Constraints, closed: Mask, u: Array, forces: Array | None
-) -> FrictionalEquilibrium:
+    chosen: Mask, loaded: Loaded, constraints: Constraints, closed: Mask, u: Array, forces: Array | None, path: Path | None
+) -> FrictionalEquilibrium:  # fmt: skip
     """Solve with the `chosen` constraints (m,) alone; gaps and slips of the others follow from the displacement."""
     rows = np.flatnonzero(chosen)
     k, m = len(constraints.tangents), len(constraints)
@@ -114,16 +118,26 @@ def _among(
     _add_compliance(F, constraints, rows)
     free = free.reshape(1 + k, -1) + at_rest[:, rows]
     start = None if forces is None else forces[:, rows]
+    begin = np.zeros_like(free) if path is None else path.forces(constraints.directions, rows)
     if Q is not None:
-        F, free = np.asarray(Q @ (Q @ F).T), (Q @ free.ravel()).reshape(free.shape)
+        F, free, begin = np.asarray(Q @ (Q @ F).T), *((Q @ own.ravel()).reshape(free.shape) for own in (free, begin))
         start = None if start is None else (Q @ start.ravel()).reshape(free.shape)
     if len(still):
         moved = idle_slips & constraints.moved_past[rows]
         F[still], F[:, still] = 0.0, 0.0
         F[still, still] = np.where(moved, GIVING * own[0, 0], np.diag(F).max())[idle_slips]
         free[1:][idle_slips & ~moved] = 0.0
+        begin[1:][idle_slips] = 0.0
     equations = np.zeros(len(rows), bool) if constraints.equality is None else constraints.equality[rows]
-    result = _on_delassus_operator(F, free, constraints.coefficients[rows], closed[rows], equations, start)
+
+    def solved(free: Array, closed: Mask, start: Array | None) -> dense.Forces:
+        return _on_delassus_operator(F, free, constraints.coefficients[rows], closed, equations, start)
+
+    before = None
+    if path is None:
+        result = solved(free, closed[rows], start)
+    else:
+        result, before = along(F, free, path.gap[rows], begin, path.parts, solved)
     y, relative = result.y, result.gaps
     if Q is not None:
         y, relative = (Q.T @ y.ravel()).reshape(y.shape), (Q.T @ relative.ravel()).reshape(y.shape)
@@ -134,15 +148,29 @@ def _among(
     active[rows], sticking[rows] = result.closed, result.sticking
     return FrictionalEquilibrium(
         u, full[0], gaps[0], full[1:].T, gaps[1:].T, active, sticking, result.settled, result.residual, result.iterations,
-        constraints.directions,
+        constraints.directions, slid=None if before is None else _slid(before, Q, rows, constraints),
     )  # fmt: skip
+
+
+def _slid(before: tuple[Array, Array, Array], Q: csr_array | None, rows: Indices, constraints: Constraints) -> Slid:
+    """Return slips (k, r), works (2, r) and normal forces (r,) of `path.along` at all constraints, Q turned back."""
+    slip, work, normal = before
+    if Q is not None:
+        slip = (Q.T @ np.vstack([np.zeros(len(rows)), slip]).ravel()).reshape(-1, len(rows))[1:]
+    m, dim = constraints.positions.shape
+    slid = Slid(np.zeros((m, dim)), np.zeros((2, m)), np.zeros(m))
+    slid.slip[rows] = sum(
+        along[:, None] * tangent[rows] for along, tangent in zip(slip, constraints.directions, strict=True)
+    )
+    slid.work[:, rows], slid.normal[rows] = work, normal
+    return slid
 
 
 def _add_compliance(F: Array, constraints: Constraints, rows: Indices) -> None:
     """Add, in place, the own compliance of constraints `rows` to the Delassus operator F ((1 + k) m, (1 + k) m)."""
     if constraints.compliance is not None and len(rows):
-        along = np.stack([direction[rows] for direction in constraints.coupled_directions or constraints.directions])
-        F += _turned(constraints.compliance.block(rows), along)
+        frame = np.stack([direction[rows] for direction in constraints.coupled_directions or constraints.directions])
+        F += _turned(constraints.compliance.block(rows), frame)
     if constraints.low_rank_compliance is not None and len(rows):
         Z = constraints.low_rank_compliance[:, rows].reshape(len(F), -1)
         F += Z @ Z.T
