@@ -10,7 +10,7 @@ import numpy as np
 
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.friction.path import Path
-from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
+from fastcontact.analysis.geometry_loop import Plan, SettledContact, settle_geometry
 from fastcontact.analysis.inequalities import StepContext, solve_inequalities
 from fastcontact.analysis.iterate import Iterate, pair_surfaces
 from fastcontact.analysis.shared_nodes import SharedNodes
@@ -22,8 +22,9 @@ from fastcontact.linear.protocol import LoadedNonsymmetric
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 log = logging.getLogger("fastcontact")
-# What friction does at constraints that close in an increment, by default; and the most increments of a step.
-WHILE_TOUCHING, MOST = 0.01, 128
+# Shear of constraints that close in an increment over what friction can carry in all, by default, and where constraints are
+# eliminated: increments cost iterations there. The most increments of a step.
+WHILE_TOUCHING, MOST = (0.01, 0.05), 128
 
 
 def along_path(step: StepContext, settled: SettledContact, expected: float) -> SettledContact:
@@ -47,16 +48,19 @@ def along_path(step: StepContext, settled: SettledContact, expected: float) -> S
         assert isinstance(solution, FrictionalEquilibrium)
         if not solution.settled:
             return settled
-        return settle_geometry(replace(step, path=solution.slid), Extrapolation(), expected, begun)
+        along = settle_geometry(replace(step, path=solution.slid), Extrapolation(), expected, begun)
+        if not Plan.of(step.problem).until_settled:  # their number is given
+            del begun.history[: len(old.history)]
+        return along
     except ConvergenceError as error:
         log.info("friction in %d increments of the step does not converge: %s", path.parts, error)
         return settled
 
 
 def _path(step: StepContext, settled: SettledContact, nodes: SharedNodes | None) -> Path | None:
-    """Return the path of a step, None where it makes no difference or constraints are eliminated."""
+    """Return the path of a step, None where it makes no difference."""
     constraints, solution = settled.constraints, settled.solution
-    if not isinstance(solution, FrictionalEquilibrium) or not constraints.tangents or _eliminated(step, constraints):
+    if not isinstance(solution, FrictionalEquilibrium) or not constraints.tangents:
         return None
     forces = _forces(step, constraints)
     if forces is None:
@@ -65,7 +69,8 @@ def _path(step: StepContext, settled: SettledContact, nodes: SharedNodes | None)
     rubs = solution.active & (constraints.coefficients > 0.0)
     closing = rubs & (normal == 0.0)
     shear = np.linalg.norm(solution.tangential, axis=1)
-    allowed = step.problem.criteria.friction_while_touching or WHILE_TOUCHING
+    eliminated = isinstance(step.loaded, LoadedNonsymmetric) and not constraints.coupled
+    allowed = step.problem.criteria.friction_while_touching or WHILE_TOUCHING[int(eliminated)]
     limit = allowed * float((constraints.coefficients * solution.multiplier)[rubs].sum())
     if not float(shear[closing].sum()) > limit:
         return None
@@ -77,11 +82,6 @@ def _path(step: StepContext, settled: SettledContact, nodes: SharedNodes | None)
     if nodes is not None:
         gap, normal, traction = nodes.gathered(constraints, gap, normal, traction)
     return Path(gap, normal, traction, min(math.ceil(slid / limit), MOST))
-
-
-def _eliminated(step: StepContext, constraints: StackedConstraints) -> bool:
-    """Return whether friction is solved without a Delassus operator."""
-    return isinstance(step.loaded, LoadedNonsymmetric) and not constraints.coupled
 
 
 def _forces(step: StepContext, constraints: StackedConstraints) -> tuple[Array, Array] | None:

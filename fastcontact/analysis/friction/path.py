@@ -52,31 +52,26 @@ class Path:
 
 
 def along(
-    F: Array, free: Array, gap: Array, y: Array, parts: int, solve: Callable[[Array, Mask, Array | None], Forces]
+    lag: Array, y: Array, parts: int, solve: Callable[[Array, Mask, Array | None], Forces]
 ) -> tuple[Forces, tuple[Array, Array, Array]]:
     """Return the forces at the end of a step, and `Slid.slip` along tangents (k, m), `work` and `normal` there.
 
     Parameters
     ----------
-    F : ndarray ((1 + k) m, (1 + k) m)
-    free : ndarray (1 + k, m)
-        Gaps and slips at the end without forces [length].
-    gap : ndarray (m,)
-        Gaps at the beginning [length].
+    lag : ndarray (1 + k, m)
+        What gaps and slips at the beginning are above those at the end under the forces of the beginning [length].
     y : ndarray (1 + k, m)
-        Forces there [force].
+        These forces [force].
     parts : int
     solve : callable
-        Returns the forces for gaps and slips without forces, closed constraints and forces to start from.
+        Returns the forces for gaps and slips beside those of the end, closed constraints and forces to start from.
     """
-    lag = -free - (F @ y.ravel()).reshape(free.shape)
-    lag[0] += gap
-    closed, slip, work, iterations, settled = y[0] > 0.0, np.zeros_like(free[1:]), np.zeros((2, len(gap))), 0, True
+    closed, slip, work, iterations, settled = y[0] > 0.0, np.zeros_like(lag[1:]), np.zeros((2, lag.shape[1])), 0, True
     for part in range(1, parts + 1):
-        there = free + (1.0 - part / parts) * lag
-        there[1:] -= slip
+        beside = (1.0 - part / parts) * lag
+        beside[1:] -= slip
         before = slip.copy(), work.copy(), y[0]
-        forces = solve(there, closed, y if y.any() else None)
+        forces = solve(beside, closed, y if y.any() else None)
         work += friction_work(y[0], forces.y[0], forces.y[1:], np.where(forces.closed, forces.gaps[1:], 0.0))
         slip += forces.gaps[1:]
         y, closed = forces.y, forces.closed

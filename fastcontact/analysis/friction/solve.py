@@ -9,8 +9,8 @@ place of the compliance.
 
 from __future__ import annotations
 
-import dataclasses
 import logging
+from dataclasses import replace
 
 import numpy as np
 from scipy.linalg import lstsq
@@ -23,10 +23,13 @@ from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium, Slid
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.pairing import normals
+from fastcontact.errors import ConvergenceError
 from fastcontact.linear.delassus import MOST_ROWS_WITH_FRICTION, check_rows
 from fastcontact.linear.protocol import Loaded, LoadedNonsymmetric
 
 log = logging.getLogger("fastcontact")
+# Of increments of a step where constraints are eliminated: the last one is solved again as accurately as the step is.
+ROUGH = Accuracy(0.0, residual=1e-3)
 
 
 def solve(
@@ -53,12 +56,12 @@ def solve(
     guess : FrictionalEquilibrium, optional
         A solution with nearly the same forces; one of other constraints is passed over.
     path : Path, optional
-        To solve along, in increments; where constraints are eliminated the step is solved at once.
+        To solve along, in increments.
     """
     forces = None if guess is None else guess.forces_along(constraints.directions, len(constraints))
     together = constraints.coupled
     if isinstance(loaded, LoadedNonsymmetric) and not together:
-        equilibrium = _eliminated(loaded, constraints, closed, accuracy, u, forces)
+        equilibrium = _eliminated(loaded, constraints, closed, accuracy, u, forces, path)
         if equilibrium is not None:
             return equilibrium
         log.info("friction: the iteration on eliminated constraints did not settle, their compliance is formed")
@@ -73,29 +76,52 @@ def solve(
         iterations += equilibrium.iterations
         missing = usable & ~chosen & (equilibrium.gap < 0.0)
         if not missing.any():
-            return dataclasses.replace(equilibrium, iterations=iterations)
+            return replace(equilibrium, iterations=iterations)
         chosen = chosen | missing
 
 
 def _eliminated(
-    loaded: LoadedNonsymmetric,
-    constraints: Constraints,
-    closed: Mask,
-    accuracy: Accuracy,
-    u: Array,
-    forces: Array | None,
-) -> FrictionalEquilibrium | None:
+    loaded: LoadedNonsymmetric, constraints: Constraints, closed: Mask, accuracy: Accuracy, u: Array, forces: Array | None,
+    path: Path | None,
+) -> FrictionalEquilibrium | None:  # fmt: skip
     """Solve without the Delassus operator of the constraints, see `eliminated`; None where that fails."""
-    usable = constraints.usable
-    solved = eliminated.solve(loaded, constraints, closed & usable, accuracy, u, forces)
-    if solved is None:
+    usable, before = constraints.usable, None
+
+    def solved(constraints: Constraints, closed: Mask, accuracy: Accuracy, forces: Array | None) -> dense.Forces:
+        nonlocal u
+        solution = eliminated.solve(loaded, constraints, closed & usable, accuracy, u, forces)
+        if solution is None:
+            raise ConvergenceError("friction: the iteration on eliminated constraints did not settle")
+        u, cone = solution
+        cone.gaps[0, ~usable], cone.gaps[1:, ~usable] = np.inf, 0.0
+        return cone
+
+    def beside(offset: Array, closed: Mask, forces: Array | None) -> dense.Forces:
+        at = constraints.gaps_at_rest() + offset
+        return solved(replace(constraints, gap0=at[0], slip0=at[1:], elastic_slip=None), closed, ROUGH, forces)
+
+    try:
+        if path is None:
+            cone = solved(constraints, closed, accuracy, forces)
+        else:
+            y = path.forces(constraints.directions, np.arange(len(constraints)))
+            cone, before = along(_lag(loaded, constraints, path, y), y, path.parts, beside)
+    except ConvergenceError:
         return None
-    u, cone = solved
-    cone.gaps[0, ~usable], cone.gaps[1:, ~usable] = np.inf, 0.0
     return FrictionalEquilibrium(
         u, cone.y[0], cone.gaps[0], cone.y[1:].T, cone.gaps[1:].T, cone.closed & usable, cone.sticking, cone.settled,
         cone.residual, cone.iterations, constraints.directions,
+        slid=None if before is None else _slid(before, None, np.arange(len(constraints)), constraints),
     )  # fmt: skip
+
+
+def _lag(loaded: Loaded, constraints: Constraints, path: Path, y: Array) -> Array:
+    """Return the lag (1 + k, m) of `path.along` for forces y (1 + k, m) at the beginning."""
+    end = loaded.full_solution(constraints.force(y[0], y[1:].T))
+    lag = -constraints.gaps_at_rest() - np.stack([R @ end for R in (constraints.B, *constraints.tangents)])
+    lag -= eliminated.diagonal_compliance(constraints) * y
+    lag[0] += path.gap
+    return np.where(constraints.usable, lag, 0.0)
 
 
 def _among(
@@ -130,14 +156,15 @@ def _among(
         begin[1:][idle_slips] = 0.0
     equations = np.zeros(len(rows), bool) if constraints.equality is None else constraints.equality[rows]
 
-    def solved(free: Array, closed: Mask, start: Array | None) -> dense.Forces:
-        return _on_delassus_operator(F, free, constraints.coefficients[rows], closed, equations, start)
+    def solved(beside: Array, closed: Mask, start: Array | None) -> dense.Forces:
+        return _on_delassus_operator(F, free + beside, constraints.coefficients[rows], closed, equations, start)
 
-    before = None
     if path is None:
-        result = solved(free, closed[rows], start)
+        result, before = solved(np.zeros_like(free), closed[rows], start), None
     else:
-        result, before = along(F, free, path.gap[rows], begin, path.parts, solved)
+        lag = -free - (F @ begin.ravel()).reshape(free.shape)
+        lag[0] += path.gap[rows]
+        result, before = along(lag, begin, path.parts, solved)
     y, relative = result.y, result.gaps
     if Q is not None:
         y, relative = (Q.T @ y.ravel()).reshape(y.shape), (Q.T @ relative.ravel()).reshape(y.shape)
@@ -196,7 +223,7 @@ def _on_delassus_operator(
     y[0, equality] = -(give[:, -1] + give[:, :-1] @ forces.y.ravel())
     now, sticking = equality.copy(), equality.copy()
     now[~equality], sticking[~equality] = forces.closed, forces.sticking
-    return dataclasses.replace(forces, y=y, gaps=gaps, closed=now, sticking=sticking)
+    return replace(forces, y=y, gaps=gaps, closed=now, sticking=sticking)
 
 
 def _turned(C: Array, along: Array) -> Array:
