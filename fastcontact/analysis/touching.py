@@ -71,6 +71,8 @@ def _path(step: StepContext, settled: SettledContact, nodes: SharedNodes | None)
     shear = np.linalg.norm(solution.tangential, axis=1)
     eliminated = isinstance(step.loaded, LoadedNonsymmetric) and not constraints.coupled
     allowed = step.problem.criteria.friction_while_touching or WHILE_TOUCHING[int(eliminated)]
+    if allowed >= 1.0:
+        return None
     limit = allowed * float((constraints.coefficients * solution.multiplier)[rubs].sum())
     if not float(shear[closing].sum()) > limit:
         return None
