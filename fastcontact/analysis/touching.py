@@ -87,18 +87,19 @@ def _path(step: StepContext, settled: SettledContact, nodes: SharedNodes | None)
 
 
 def _forces(step: StepContext, constraints: StackedConstraints) -> tuple[Array, Array] | None:
-    """Return normal (m,) and tangential (m, dim) forces at the beginning of the step [force]; None where nobody knows."""
+    """Return normal (m,) and tangential (m, dim) forces at the beginning of the step [force]; None where nobody knows.
+
+    Those of equations make no difference.
+    """
     normal, traction = np.zeros(len(constraints)), np.zeros_like(constraints.positions)
-    last = step.state.extrapolation.states[-1][1] if step.state.extrapolation.states else {}
     for name, rows in constraints.rows().items():
         part, before = constraints.parts[name], step.state.forces.get(name)
-        if name in last and len(last[name][1]) == len(part):
-            normal[rows] = last[name][1]
-        elif name in step.state.touched:
-            return None
-        if before is not None and part.areas is not None:
+        if before is not None and part.areas is not None and part.wetted is None:
             areas = np.where(np.isfinite(part.areas), part.areas, 0.0)
-            traction[rows] = areas[:, None] * before.at(part.positions)[1]
+            pressure, shear = before.at(part.positions)
+            normal[rows], traction[rows] = areas * pressure, areas[:, None] * shear
+        elif name in step.state.touched and not (part.equality is not None and part.equality.all()):
+            return None
     return normal, traction
 
 
