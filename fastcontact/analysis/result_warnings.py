@@ -48,7 +48,7 @@ LOOSE = 1e-4
 # Part of the largest energy or work that may be missing in the balance of works.
 IMBALANCE = 0.02
 # Part of the work of friction that nodes may do while they close; and work of friction, by the largest energy, that is any.
-WHILE_CLOSING, SOME_FRICTION = 0.25, 1e-5
+WHILE_CLOSING, SOME_FRICTION = 0.5, 1e-5
 
 
 def result_warnings(problem: Problem, state: State, last: StepResult) -> list[str]:
