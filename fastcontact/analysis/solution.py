@@ -78,6 +78,25 @@ class Equilibrium:
 
 
 @dataclass(frozen=True, eq=False)
+class Slid:
+    """Constraints at the beginning of the last increment of a load step.
+
+    Attributes
+    ----------
+    slip : ndarray (m, dim)
+        Since the beginning of the step [length].
+    work : ndarray (2, m)
+        Of friction since then, and what of it constraints did while they closed [energy].
+    normal : ndarray (m,)
+        Normal forces [force].
+    """
+
+    slip: Array
+    work: Array
+    normal: Array
+
+
+@dataclass(frozen=True, eq=False)
 class FrictionalEquilibrium:
     """A solution with friction; the normal part as in `Equilibrium`.
 
@@ -102,6 +121,10 @@ class FrictionalEquilibrium:
         Newton iterations.
     directions : tuple of ndarray (m, dim)
         The k tangents.
+    work : ndarray (2, m), optional
+        Of friction in the step, and what of it constraints do while they close, where increments of the step tell [energy].
+    slid : Slid, optional
+        Where the last increment began.
     """
 
     u: Array
@@ -115,6 +138,8 @@ class FrictionalEquilibrium:
     residual: float
     iterations: int
     directions: tuple[Array, ...] = ()
+    work: Array | None = None
+    slid: Slid | None = None
 
     def forces_along(self, directions: tuple[Array, ...], m: int) -> Array | None:
         """Return normal and tangential forces (1 + k, m) along other tangents (m, dim); None for other constraints.

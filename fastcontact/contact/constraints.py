@@ -219,6 +219,11 @@ class Constraints:
         return self.compliance if self.softness is None else _Softened(self.compliance, self.softness)
 
     @property
+    def coupled(self) -> bool:
+        """Whether a compliance of their own couples constraints."""
+        return self.compliance is not None or self.low_rank_compliance is not None
+
+    @property
     def coefficients(self) -> Array:
         """Coefficients of friction (m,), zero where there are none [-]."""
         return np.zeros(len(self)) if self.friction is None else self.friction
