@@ -62,7 +62,7 @@ class Plan:
             until_settled=fixed is None,
             limit=criteria.max_geometry_updates if fixed is None else fixed,
             semismooth=fixed is None and iterative and any(pair.geometry_in_loop for pair in problem.pairs.values()),
-            extrapolate=fixed is None,
+            extrapolate=fixed is None and (iterative or not any(pair.slides for pair in problem.pairs.values())),
             newton=not iterative and problem.floating_bodies is None,
         )
 
@@ -129,7 +129,8 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
     problem, plan = step.problem, Plan.of(step.problem)
     if iterate.history:  # nothing to extrapolate any more
         plan = replace(plan, extrapolate=False)
-    tolerances = Tolerances(problem.solver, problem.criteria, plan.extrapolate, step.state.gap_round_off, expected)
+    inexact = plan.extrapolate and problem.solver.iterative
+    tolerances = Tolerances(problem.solver, problem.criteria, inexact, step.state.gap_round_off, expected)
     mixing, watch = _Mixing(Anderson(MIXED, step.dofs.compared, problem.solver.iterative)), Watch()
     if plan.extrapolate:
         iterate.u = extrapolation.displacement(iterate.u)
@@ -159,7 +160,7 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
             mixed = mixing.next(moved.before, fraction, solution, tolerances.inexact, constraints)
         iterate.u = iterate.u if mixed is None else step.dofs.put(iterate.u, mixed)
         tolerances.tighten(moved.relative, solution.residual)
-        if plan.extrapolate and update == PATIENT_UPDATES:
+        if inexact and update == PATIENT_UPDATES:
             # Nodes that flip between facets may do so for ever from one start and not from another.
             iterate.begin_again(step.state)
             mixing.restart()
@@ -208,6 +209,8 @@ def _move(
     iterate.u = step.dofs.put(iterate.u, fraction)
     # Rigid motions of bodies that only contact holds do not count.
     size = max(step.dofs.size(solution.u), largest(step.load.lift))
+    if step.problem.floating_bodies is None:  # a step may lead back to where nothing is deformed
+        size = max(size, largest(step.state.u))
     change = largest_difference(fraction, before)
     moved = _Moved(before, change if change > step.state.gap_round_off else 0.0, size)
     iterate.remember(constraints, solution)

@@ -45,7 +45,7 @@ SMALL = 1e-5
 FORCING = 1e-3
 # Relative error of the displacement below which iterations end. Changes below SCATTER that do not fall to the part STAYS of
 # the one before are round-off, which is that much in slender bodies.
-UNCHANGED, SCATTER, STAYS = 1e-9, 1e-6, 0.3
+UNCHANGED, SCATTER, STAYS = 1e-10, 1e-6, 0.3
 
 
 def newton(
