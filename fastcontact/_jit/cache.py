@@ -23,6 +23,7 @@ import llvmlite
 import numba
 import numpy as np
 
+from fastcontact._jit import compiling
 from fastcontact._version import __version__
 
 log = logging.getLogger("fastcontact")
@@ -57,9 +58,15 @@ class KernelFiles:
     def __init__(self, folder: Path, name: str, function: Callable[..., Any], options: str, numbas: Any) -> None:
         self.folder, self._name, self._function, self._options, self._numbas = folder, name, function, options, numbas
 
+    def has(self, key: Any) -> bool:
+        """Return whether something is kept for a signature."""
+        return self._path(key).exists()
+
     def load(self, key: Any) -> Any:
-        """Return what was kept for a signature; None if there is nothing that may be used."""
+        """Return what is kept for a signature, once a helper at work on it is done; None if nothing may be used."""
         path = self._path(key)
+        while not path.exists() and compiling.wait(self._name):
+            pass
         try:
             with open(path, "rb") as file:
                 if not _is_own(os.fstat(file.fileno())):

@@ -17,7 +17,7 @@ from fastcontact._jit import environment  # isort: skip # noqa: F401 (before Num
 import numba
 from numba.core import event
 
-from fastcontact._jit import cache, compiling
+from fastcontact._jit import cache, compiling, interpreting
 from fastcontact.errors import FastcontactError
 
 log = logging.getLogger("fastcontact")
@@ -65,6 +65,15 @@ _forked_without_threads = False
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile `function` lazily in nopython mode, with the disk cache where one can be had."""
     return _compile(function, parallel=False)
+
+
+def interpretable_kernel(function: Callable[..., Any]) -> Any:
+    """Like `kernel`; where it is small and not compiled yet, Python runs it, to the same bits.
+
+    For sums, products, quotients and square roots alone: powers and sums of arrays are other ones in NumPy.
+    """
+    compiled = kernel(function)
+    return interpreting.until_compiled(compiled) if hasattr(compiled, "_compile_for_args") else compiled
 
 
 def parallel_kernel(function: Callable[..., Any]) -> Any:
@@ -124,6 +133,7 @@ def _notice_fork() -> None:
 
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_notice_fork)
+    os.register_at_fork(after_in_child=compiling.waiters.clear)  # nothing in a child hears of its parent's helpers
 
 
 def check_threads() -> None:

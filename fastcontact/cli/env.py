@@ -47,8 +47,7 @@ def _warm_up(show: bool) -> int:
     with open(ours, encoding="ascii") as lines, StatusLine(len("compiling kernels: 000 of 000"), show) as status:
         for done, _ in enumerate(lines, start=1):
             status.draw(f"compiling kernels: {done} of {total}")
-    for process in processes:
-        process.wait()
-    if done < total:
+    codes = [process.wait() for process in processes]
+    if done < total or any(codes):
         raise FastcontactError(f"only {done} of {total} kernels were compiled: was a process ended by lack of memory?")
     return done

@@ -1,7 +1,7 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
 """Projection of points on a curve in the plane along normals interpolated between its nodes."""
 
-from fastcontact._jit.decorators import kernel
+from fastcontact._jit.decorators import interpretable_kernel, kernel
 
 MOST_STEPS = 30
 MOST_FACETS = 8
@@ -50,7 +50,7 @@ def _newton(x, y, corners, normals, f, count, s, values, slopes):
     return s, abs(step) <= 1e-10
 
 
-@kernel
+@interpretable_kernel
 def along_normals(points, corners, normals, counts, neighbour, facet, xi, overhang, values, slopes):
     """Move projections (facet, xi) to where the points lie along the interpolated normals.
 

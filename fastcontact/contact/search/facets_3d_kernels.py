@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from fastcontact._jit.decorators import inlined_kernel, kernel
+from fastcontact._jit.decorators import inlined_kernel, interpretable_kernel, kernel
 from fastcontact.contact.search.projection_3d_kernels import vector
 from fastcontact.contact.search.straight_3d_kernels import dot, room
 
@@ -11,7 +11,7 @@ from fastcontact.contact.search.straight_3d_kernels import dot, room
 FLAT = 1e-9
 
 
-@kernel
+@interpretable_kernel
 def prepare(facets, begin, end, to_terms, weights, low, high):
     """Fill all but the nodes and the midst of the facets `begin` to `end`, and their boxes `low`, `high` (n_facets, 3).
 
@@ -87,9 +87,10 @@ def _convex(p, q, turn, second, diagonal):
     exceeds r |X''|, with r the distance to the farthest point of the facet.
     """
     pp, pq, qq = dot(p, p), dot(p, q), dot(q, q)
-    least = np.sqrt(max(0.5 * (pp + qq) - np.sqrt(0.25 * (pp - qq) ** 2 + pq * pq), 0.0)) - turn
+    least = np.sqrt(max(0.5 * (pp + qq) - np.sqrt(0.25 * ((pp - qq) * (pp - qq)) + pq * pq), 0.0)) - turn
     if not least > 0.0:
         return 0.0
     if second == 0.0:
         return np.inf
-    return max(least * least / second - diagonal, 0.0) ** 2
+    distance = max(least * least / second - diagonal, 0.0)
+    return distance * distance
