@@ -111,7 +111,7 @@ def _compile(function: Callable[..., Any], parallel: bool, fastmath: set[str] = 
     options |= inlining
     try:
         cached = numba.njit(cache=True, **options)(function)
-        reason = cache.keep(cached, function, repr(options))
+        reason = cache.keep(cached, function, repr(options | {"fastmath": sorted(fastmath)}))  # a set has any order
         if not reason:
             return cached
     except RuntimeError as error:  # numba: "cannot cache function ...: no locator available for file ..."
