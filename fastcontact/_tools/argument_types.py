@@ -34,13 +34,18 @@ _REAL = {bool: "True or False", int: "a whole number", float: "a number"}
 
 
 def typed(error: type[FastcontactError]) -> Callable[[F], F]:
-    """Return a decorator of functions and dataclasses that raises `error` for an argument that its annotation excludes."""
+    """Return a decorator that raises `error` for an argument that its annotation excludes.
+
+    It is one of functions, or of classes, whose constructor and public methods it guards.
+    """
 
     def decorate(call: F) -> F:
-        if isinstance(call, type):
-            call.__init__ = _checked(call.__init__, call.__name__, error)  # type: ignore[misc]
-            return call
-        return typing.cast(F, _checked(call, call.__qualname__.removesuffix(".__init__"), error))
+        if not isinstance(call, type):
+            return typing.cast(F, _checked(call, call.__qualname__, error))
+        for name, method in [*vars(call).items()]:
+            if isinstance(method, types.FunctionType) and (name == "__init__" or not name.startswith("_")):
+                setattr(call, name, _checked(method, f"{call.__name__}.{name}", error))
+        return call
 
     return decorate
 

@@ -15,12 +15,10 @@ from fastcontact.analysis.problem import Problem
 from fastcontact.arrays import Array
 from fastcontact.elasticity.springs import ground_force
 from fastcontact.errors import ConvergenceError
-from fastcontact.round_off import SUM_ROUND_OFF
+from fastcontact.round_off import ROUND_OFF, SUM_ROUND_OFF
 
 # Forces are there beyond so much round-off from elsewhere.
 THERE = 100.0
-# What is allowed where there are no forces but round-off, in the same units.
-ALLOWED = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,4 +152,4 @@ def _round_off(
     for part in map(np.abs, forces):
         if ((part > noise) & (part * problem.criteria.relative > SUM_ROUND_OFF * row_sums)).any():
             return slack, noise
-    return max(max(ALLOWED, 10 * problem.solver.tolerance) * largest(row_sums), slack), noise
+    return max(max(ROUND_OFF, 10 * problem.solver.tolerance) * largest(row_sums), slack), noise

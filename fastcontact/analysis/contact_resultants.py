@@ -294,23 +294,26 @@ def wear(model: Model, steps: Iterable[StepResult], name: str, coefficient: floa
                 "first on, in their order"
             )
         pressure = 0.0 if before is None else before.contact[name].pressure
-        depth = depth + worn_in_step(pair, _end_of(before, step, name), step.contact[name], pressure, coefficient)
+        depth = depth + worn_in_step(pair, end_of(before, step, name), step.contact[name], pressure, coefficient)
         depths.append(depth)
         before = step
     return np.array(depths).reshape(len(depths), len(depth))
 
 
-def _end_of(before: StepResult | None, step: StepResult, name: str) -> Configuration:
-    """Return the configuration of a contact pair at the end of a step."""
-    dim = step.displacement.shape[1]
+def end_of(before: StepResult | None, step: StepResult, name: str) -> Configuration:
+    """Return the configuration of a contact pair at the end of a step that began at the end of another one, or at rest."""
     start = np.zeros_like(step.displacement) if before is None else before.displacement
-    pairs = [None if end is None else end.contact[name] for end in (step, before)]
-    now, then = (
-        np.zeros(dim) if end is None or end.obstacle_displacement is None else np.asarray(end.obstacle_displacement)
-        for end in pairs
-    )
-    angles = [0.0 if end is None else end.obstacle_angle or 0.0 for end in pairs]
-    return Configuration(step.displacement, start, now, then, angle=angles[0], angle_start=angles[1])
+    (now, angle), (then, angle_start) = _pose(step, name), (np.zeros(start.shape[1]), 0.0)
+    if before is not None:
+        then, angle_start = _pose(before, name)
+    return Configuration(step.displacement, start, now, then, angle=angle, angle_start=angle_start)
+
+
+def _pose(step: StepResult, name: str) -> tuple[Array, float]:
+    """Return the displacement (dim,) [length] and the rotation [radian] of the obstacle of a pair, zero without one."""
+    contact, still = step.contact[name], np.zeros(step.displacement.shape[1])
+    moved = still if contact.obstacle_displacement is None else np.asarray(contact.obstacle_displacement)
+    return moved, contact.obstacle_angle or 0.0
 
 
 def _of_pair(pair: Formulation, step: StepResult, name: str) -> ContactResult:

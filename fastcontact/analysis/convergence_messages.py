@@ -9,13 +9,12 @@ import numpy as np
 
 from fastcontact.analysis.floating_bodies import FloatingBodies, RigidPosition
 from fastcontact.analysis.problem import Problem
+from fastcontact.analysis.scatter import WINDOW
 from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.constraints import StackedConstraints
 
 Nodes = dict[str, list[int]]
-# So many updates whose changes are alike go round in circles.
-CIRCLE = 8
 
 
 def geometry_moves(problem: Problem, history: list[dict[str, Any]], change: Array, limit: int) -> str:
@@ -26,7 +25,7 @@ def geometry_moves(problem: Problem, history: list[dict[str, Any]], change: Arra
     last = history[-1]
     last["nodes"] = _most_moved(problem, change)
     changes = [entry["displacement_change"] for entry in history]
-    circles = len(changes) > CIRCLE and min(changes[-CIRCLE:]) > 0.5 * max(changes[-CIRCLE:])
+    circles = len(changes) > WINDOW and min(changes[-WINDOW:]) > 0.5 * max(changes[-WINDOW:])
     more = "More of them do not help, it goes round in circles: use" if circles else (
         "Allow more (Criteria.max_geometry_updates), use"
     )  # fmt: skip
@@ -36,7 +35,7 @@ def geometry_moves(problem: Problem, history: list[dict[str, Any]], change: Arra
         f"{named_nodes(problem, last['nodes'])}, {last['active']} constraints are active. {more} more load steps, a "
         f"finer mesh on the primary side, {_smoother(problem)}a fixed number of updates (Criteria.geometry_updates), or "
         f"accept changes of that size (Criteria.geometry, which is {problem.criteria.geometry:g}, above "
-        f"{max(changes[-CIRCLE:]) if circles else changes[-1]:.0e})"
+        f"{max(changes[-WINDOW:]) if circles else changes[-1]:.0e})"
     )
 
 

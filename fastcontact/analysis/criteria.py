@@ -10,6 +10,8 @@ from fastcontact.errors import ModelError
 
 # Criteria beyond this are none: a state that misses them has nothing to do with the solution.
 LOOSEST = 1e-2
+# Part of the largest displacement that is worth a warning.
+NOTABLE = 1e-2
 
 
 @typed(ModelError)

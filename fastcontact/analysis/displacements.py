@@ -7,7 +7,6 @@ from scipy.sparse import csr_array
 
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.problem import Problem, StepLoad
-from fastcontact.analysis.state import State
 from fastcontact.arrays import Array
 from fastcontact.linear.protocol import Loaded
 
@@ -18,13 +17,16 @@ def with_loads(problem: Problem, load: StepLoad) -> Loaded:
 
 
 def solve_displacements(
-    problem: Problem, start: State, load: StepLoad, loaded: Loaded, settled: SettledContact | None
+    problem: Problem, load: StepLoad, loaded: Loaded, settled: SettledContact | None, guess: Array
 ) -> tuple[Array, Array]:
-    """Return all displacements [length] and the contact forces [force], both (n_dofs,)."""
+    """Return all displacements [length] and the contact forces [force], both (n_dofs,).
+
+    Without contact, iterative solvers begin at the displacements `guess` (n_dofs,) [length].
+    """
     system, lift = problem.system, load.lift
     if settled is None:
         none = csr_array((0, len(lift))), np.empty(0)
-        v = loaded.solve(*none, guess=system.unknowns(start.u, lift))[0]
+        v = loaded.solve(*none, guess=system.unknowns(guess, lift))[0]
         return system.displacement(v, lift), np.zeros(len(lift))
     contact_force, rigid = settled.force, settled.iterate.rigid
     if problem.floating_bodies is not None and rigid is not None:

@@ -23,6 +23,7 @@ from fastcontact.analysis.solution import Solution
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.elasticity.constrained_system import System
 from fastcontact.model.rigid_motions import FreeMotions
+from fastcontact.round_off import ROUND_OFF
 
 # Stiffness of the springs beside that of the body. Softer ones cost digits of factors (1e-6: a wedge off by 3e-9), stiffer
 # ones solutions: a stack with friction takes 4.1, 4.2 and 65 linear solutions with 1e-3, 1e-2 and 1, a bolt 2.8, 5.3 and 27.
@@ -31,7 +32,7 @@ from fastcontact.model.rigid_motions import FreeMotions
 SOFT, FIRM, STIFF = 1e-3, 1e-2, 1.0
 # The springs carry less than this fraction of the loads and of the contact forces, which is all there is where motions drive
 # the bodies; more where round-off or the linear solver leave more.
-SLACK = 1e-12
+SLACK = ROUND_OFF
 # What is left when nothing improves any more counts as slack below this fraction.
 STAGNANT = 1e-8
 MAX_POSITIONS = 100

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -54,8 +54,9 @@ class Heat:
     ramp : Ramp
     criteria : Criteria
     conduction : Conduction
+        In the reference configuration.
     matrix, films : csr_array (n_points, n_points)
-        Of conduction, and of films [power / temperature].
+        Of that conduction, and of films [power / temperature].
     merged : csr_array (n_points, n_points)
         From the temperatures of nodes to those of all that have the same [-].
     body : ndarray of int (n_points,)
@@ -88,15 +89,31 @@ class Heat:
         """Whether temperatures depend on the contact, not the contact on temperatures alone."""
         return any({"conductance", "friction_heat"} & set(pair.options) for pair in self.model.contact)
 
+    @property
+    def finite(self) -> bool:
+        """Whether heat is conducted in the deformed bodies."""
+        return self.model.strain == "finite"
+
+    @property
+    def depends_on_equilibrium(self) -> bool:
+        """Whether temperatures depend on contact or deformation."""
+        return self.depends_on_contact or self.finite
+
+    def conductors(self, displacement: Array) -> Conduction:
+        """Return the cells as they conduct at displacements (n_points, dim), with finite strains deformed [length]."""
+        return replace(self.conduction, displacement=displacement) if self.finite else self.conduction
+
     def temperatures(
-        self, instant: float, contact: csr_array | None = None, friction: Array | None = None,
-        obstacles: tuple[csr_array, Array] | None = None,
+        self, instant: float, displacement: Array | None = None, contact: csr_array | None = None,
+        friction: Array | None = None, obstacles: tuple[csr_array, Array] | None = None,
     ) -> Temperatures:  # fmt: skip
         """Return the temperatures at an instant of the ramp.
 
         Parameters
         ----------
         instant : float
+        displacement : ndarray (n_points, dim), optional
+            Of the bodies, which counts with finite strains [length].
         contact : csr_array (n_points, n_points), optional
             Matrix of what contacts conduct [power / temperature].
         friction : ndarray (n_points,), optional
@@ -114,7 +131,8 @@ class Heat:
             combined(by_ramp, self.ramp, instant, n) for by_ramp in (self.prescribed, self.powers, self.ambient)
         )
         rubbed = np.zeros(n) if friction is None else friction
-        inner = self.matrix if contact is None else csr_array(self.matrix + contact)
+        inner = self.matrix if displacement is None or not self.finite else self.conductors(displacement).matrix()
+        inner = inner if contact is None else csr_array(inner + contact)
         films = self.films
         if obstacles is not None:
             films, ambient = csr_array(films + obstacles[0]), ambient + obstacles[1]

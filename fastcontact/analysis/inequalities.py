@@ -22,10 +22,7 @@ from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.protocol import Loaded
 from fastcontact.model.rigid_motions import generalised, needed_friction, resisting, stopped_at
-from fastcontact.round_off import LENGTH_ROUND_OFF
-
-# Of the size of the model: gaps that the linear program for rigid bodies, accurate to 1e-7, leaves where they touch.
-TOUCHING = 1e-6
+from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +149,8 @@ def _with_floating_bodies(
 def _touching(step: StepContext, constraints: Constraints, u: Array) -> Mask:
     """Return which constraints (m,) displacements u (n_dofs,) of rigid bodies in contact close."""
     size = float(np.ptp(step.problem.model.mesh.points, axis=0).max())
-    return constraints.usable & (constraints.gap0 + constraints.B @ u <= TOUCHING * size)
+    # The linear program for rigid bodies is accurate to 1e-7.
+    return constraints.usable & (constraints.gap0 + constraints.B @ u <= SINGLE_PRECISION * size)
 
 
 def _approach(step: StepContext, bodies: FloatingBodies, constraints: Constraints, u: Array) -> Array:

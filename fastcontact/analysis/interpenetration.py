@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array, Mask
@@ -21,8 +22,8 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 Indices = NDArray[np.signedinteger]
 # Bodies by their numbers, and nodes on the outside of the first (n,) with their depths (n,) in the second [length].
 Inside = tuple[int, int, Indices, Array]
-# Beside the facets of a contact: relative to the deformation of the bodies, and to the depth of nodes that contact holds.
-BESIDE, HELD = 0.01, 2.0
+# Depth beside the facets of a contact that is worth a warning, relative to that of nodes that contact holds.
+HELD = 2.0
 
 
 def interpenetration(problem: Problem, state: State, last: StepResult) -> list[str]:
@@ -88,7 +89,7 @@ def _beside_contact(
         points, depth = np.concatenate([entry[2] for entry in entries]), np.concatenate([entry[3] for entry in entries])
         held, faced = (mask[points] for mask in _held(problem, last, names))
         deformed = max(float(np.ptp(last.displacement[body == number], axis=0).max()) for number in both)
-        limit = max(BESIDE * deformed, HELD * float(depth[held].max(initial=0.0)))
+        limit = max(NOTABLE * deformed, HELD * float(depth[held].max(initial=0.0)))
         depth[held | faced] = 0.0
         row = int(np.argmax(depth))
         if depth[row] > limit and depth[row] - _at_rest(problem, entries, int(points[row])) > limit:
@@ -133,7 +134,7 @@ def _through_obstacles(problem: Problem, state: State, last: StepResult) -> list
         gap = pair.primary.facing(mesh.points[points] + u[points], now)[0]
         inside = last.contact[name].gap
         deepest = -float(np.min(inside, initial=0.0, where=np.isfinite(inside)))
-        limit = max(BESIDE * float(np.ptp(u, axis=0).max()), HELD * deepest)
+        limit = max(NOTABLE * float(np.ptp(u, axis=0).max()), HELD * deepest)
         row = int(np.argmin(np.where(at_rest >= 0.0, gap, np.inf)))
         if at_rest[row] >= 0.0 and -gap[row] > limit:
             texts.append(_lacking(problem, name, "the body passes through the obstacle", -gap[row], points[row]))

@@ -15,18 +15,24 @@ import numpy as np
 
 from fastcontact._jit import parallel
 from fastcontact._jit.norms_kernels import largest
-from fastcontact.analysis.balance import Balance, balance
+from fastcontact.analysis.balance import balance
 from fastcontact.analysis.displacements import solve_displacements, with_loads
 from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
 from fastcontact.analysis.inequalities import StepContext
 from fastcontact.analysis.newton import newton
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
+from fastcontact.analysis.step_equilibrium import StepEquilibrium
 from fastcontact.analysis.step_history import keep_path, save_contact_history
 from fastcontact.analysis.step_result import contact_results, counted, recover
-from fastcontact.analysis.thermal_coupling import Heated, expanded, first_rise, settle_heat
+from fastcontact.analysis.thermal_coupling import (
+    Heated,
+    expanded,
+    expansion_as_force,
+    first_rise,
+    settle_heat,
+)
 from fastcontact.arrays import Array
-from fastcontact.elasticity.nonlinear_bodies import DeformedBodies
 from fastcontact.linear.protocol import Loaded
 from fastcontact.model.rigid_motions import generalised
 from fastcontact.results.step import ContactResult, StepResult
@@ -56,53 +62,42 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     load = expanded(problem, cold, rise)
     problem.solver.put_back(state.solver)
     solved_before = problem.solver.counters.iterations
-    loaded = with_loads(problem, load)
-    start, expected = prepare_start(problem, state, load, loaded)
-    if problem.bodies is not None:
-        solution = newton(problem, start, load, expected)
-        done = problem.solver.counters.iterations - solved_before
-        iterations = {**counted(solution.settled, done), **solution.counts, "history": solution.history}
-        return _ended(
-            problem,
-            start,
-            load,
-            solution.settled,
-            (solution.u, solution.balance, iterations),
-            (index, instant),
-            solution.bodies,
-        )
+    pushing = expansion_as_force(problem, load)
+    loaded = with_loads(problem, pushing)
+    start, expected = prepare_start(problem, state, pushing, loaded)
 
-    def solve(under: StepLoad, before: SettledContact | None) -> tuple[SettledContact | None, Array, Balance]:
+    def solve(under: StepLoad, before: StepEquilibrium | None) -> StepEquilibrium:
+        if problem.bodies is not None:
+            return newton(problem, start, under, expected, before)
         right = loaded if under is load else with_loads(problem, under)
         return _balanced(problem, start, under, right, expected, index, before)
 
-    heated, (settled, u, balanced) = None, solve(load, None)
+    heated, solution = None, solve(load, None)
     if rise is not None:
-        heated, (settled, u, balanced) = settle_heat(problem, start, cold, instant, rise, (settled, u, balanced), solve)
-    iterations = counted(settled, problem.solver.counters.iterations - solved_before)
-    return _ended(problem, start, load, settled, (u, balanced, iterations), (index, instant), None, heated)
+        heated, solution = settle_heat(problem, start, cold, instant, rise, solution, solve)
+    iterations = counted(solution.settled, problem.solver.counters.iterations - solved_before)
+    return _ended(problem, start, load, solution, {**iterations, **solution.counts}, (index, instant), heated)
 
 
 def _balanced(
     problem: Problem, start: State, load: StepLoad, loaded: Loaded, expected: float, index: int,
-    before: SettledContact | None,
-) -> tuple[SettledContact | None, Array, Balance]:  # fmt: skip
+    before: StepEquilibrium | None,
+) -> StepEquilibrium:  # fmt: skip
     """Return `equilibrium`, whose balance of forces is within the criterion."""
-    settled, u, balanced = equilibrium(problem, start, load, loaded, expected, before)
+    solution = equilibrium(problem, start, load, loaded, expected, before)
     # An iterative solver was too inaccurate: it is asked for more, and goes on from the same contact.
-    while balanced.excess > 1.0 and problem.solver.improve(balanced.wanting):
-        settled, u, balanced = equilibrium(problem, start, load, with_loads(problem, load), expected, settled)
-    balanced.check(index, problem, settled.iterate.history if settled is not None else ())
-    return settled, u, balanced
+    while solution.balance.excess > 1.0 and problem.solver.improve(solution.balance.wanting):
+        solution = equilibrium(problem, start, load, with_loads(problem, load), expected, solution)
+    solution.balance.check(index, problem, solution.history)
+    return solution
 
 
 def _ended(
-    problem: Problem, start: State, load: StepLoad, settled: SettledContact | None,
-    solution: tuple[Array, Balance, dict[str, Any]], instant: tuple[int, float], bodies: DeformedBodies | None,
-    heated: Heated | None = None,
+    problem: Problem, start: State, load: StepLoad, solution: StepEquilibrium, iterations: dict[str, Any],
+    instant: tuple[int, float], heated: Heated | None,
 ) -> tuple[State, StepResult]:  # fmt: skip
-    """Return state and result of a load step, from its displacements, the balance of forces and the iterations."""
-    u, balanced, iterations = solution
+    """Return state and result of a load step, from its equilibrium."""
+    settled, u, balanced, bodies = solution.settled, solution.u, solution.balance, solution.bodies
     end = replace(
         start, u=u, largest_force=balanced.largest, obstacles=problem.obstacles_at(load, u), angles=load.angles,
         history=start.history if bodies is None else bodies.history, instant=instant[1],
@@ -156,9 +151,9 @@ def _motions(problem: Problem, load: StepLoad) -> list[Array]:
 
 def equilibrium(
     problem: Problem, start: State, load: StepLoad, loaded: Loaded, expected: float,
-    previous_try: SettledContact | None = None,
-) -> tuple[SettledContact | None, Array, Balance]:  # fmt: skip
-    """Return the settled contact, all displacements (n_dofs,) [length] and the balance of forces.
+    previous_try: StepEquilibrium | None = None,
+) -> StepEquilibrium:  # fmt: skip
+    """Return the settled contact, all displacements and the balance of forces.
 
     It begins where a `previous_try` at the same step has settled with less accurate solutions.
     """
@@ -166,12 +161,13 @@ def equilibrium(
     if problem.pairs:
         dofs = problem.dofs.for_step(start.u, load.lift)
         step = StepContext(problem, start, load, dofs.loaded(loaded), dofs)
-        settled = settle_geometry(step, start.extrapolation, expected, previous_try.iterate if previous_try else None)
-    u, contact_force = solve_displacements(problem, start, load, loaded, settled)
+        tried = None if previous_try is None else previous_try.settled
+        settled = settle_geometry(step, start.extrapolation, expected, tried.iterate if tried else None)
+    u, contact_force = solve_displacements(problem, load, loaded, settled, start.u)
     balanced = balance(problem, u, contact_force, load.force, start.largest_force)
     if settled is not None:
         settled.iterate.history[-1]["residual"] = balanced.relative
-    return settled, u, balanced
+    return StepEquilibrium(settled, u, balanced)
 
 
 def after_contact(

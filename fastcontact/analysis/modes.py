@@ -203,7 +203,8 @@ def _stiffness(model: Model, step: StepResult | None, field: MaterialField) -> b
     if bodies is not None and step is not None:
         if model.strain == "small":
             model.refuse_nonlinear("modes about a step are")
-        return stiffened(bodies.at(step.displacement, bodies.beginning).K, model.springs)
+        rise = model.expanding_rise(step.iterations.get("temperature_factors", ()), step.temperature)
+        return stiffened(bodies.at(step.displacement, bodies.beginning, rise=rise).K, model.springs)
     K = stiffened(stiffness(mesh, kinematics, field.moduli, field.loops, None, field.treatment), model.springs)
     if step is None:
         return K

@@ -7,11 +7,11 @@ for generalised equations). So iterations converge quadratically, and few matric
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, diags_array
 
 from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.analysis.balance import Balance, balance
@@ -23,7 +23,9 @@ from fastcontact.analysis.inequalities import StepContext
 from fastcontact.analysis.iterate import Iterate
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
+from fastcontact.analysis.step_equilibrium import StepEquilibrium
 from fastcontact.arrays import Array
+from fastcontact.contact.constraints import Wetted
 from fastcontact.elasticity.nonlinear_bodies import WHOLE, DeformedBodies
 from fastcontact.errors import ConvergenceError, ModelError
 
@@ -34,6 +36,11 @@ MOST, HALVINGS = 40, 6
 SEARCHES, OVERSHOT, LEAST = 3, 0.8, 0.1
 # Iterations after which the change of the displacement must have fallen at least once by the factor.
 PATIENCE, FALL = 12, 0.5
+# Stiffness of springs along closed gaps beside the largest of the bodies. What contact does not hold, such as gaps between
+# values of a pressure field, creeps with stiff ones: an O-ring takes 5, 7, 11 iterations with 5e-5, 2e-4, 1e-3.
+HELD = 5e-5, 1e-3
+# After changes of the displacement up to this, relative to its size, a tangent serves a second iteration.
+SMALL = 1e-4
 # Contact geometry of the linearised bodies settles to this part of the last relative change of the displacement.
 FORCING = 1e-3
 # Relative error of the displacement below which iterations end. Changes below SCATTER that do not fall to the part STAYS of
@@ -41,36 +48,9 @@ FORCING = 1e-3
 UNCHANGED, SCATTER, STAYS = 1e-9, 1e-6, 0.3
 
 
-@dataclass(frozen=True, eq=False)
-class NewtonSolution:
-    """The end of a load step with nonlinear bodies.
-
-    Attributes
-    ----------
-    settled : SettledContact, optional
-        None without contact.
-    u : ndarray (n_dofs,)
-        [length]
-    balance : Balance
-    bodies : DeformedBodies
-    history : list of dict
-        An entry for each iteration.
-    """
-
-    settled: SettledContact | None
-    u: Array
-    balance: Balance
-    bodies: DeformedBodies
-    history: list[dict[str, Any]]
-
-    @property
-    def counts(self) -> dict[str, int]:
-        """Pairings and active-set iterations of all iterations, see `StepResult.iterations`."""
-        names = {"geometry_updates": "pairings", "active_set_iterations": "active_set_iterations"}
-        return {name: sum(entry[key] for entry in self.history) for name, key in names.items()}
-
-
-def newton(problem: Problem, start: State, load: StepLoad, expected: float) -> NewtonSolution:
+def newton(
+    problem: Problem, start: State, load: StepLoad, expected: float, before: StepEquilibrium | None = None
+) -> StepEquilibrium:
     """Return the equilibrium of a load step.
 
     Parameters
@@ -82,56 +62,218 @@ def newton(problem: Problem, start: State, load: StepLoad, expected: float) -> N
     load : StepLoad
     expected : float
         Displacement to expect in the first step, if forces alone act [length].
+    before : StepEquilibrium, optional
+        Of the same step, under about the same load.
 
     Raises
     ------
     ConvergenceError
         If the iterations do not end, or a cell turns inside out.
     """
-    if start.extrapolation.ratio:
+    if before is not None or start.extrapolation.ratio:
+        origin = start.extrapolation.displacement(start.u) if before is None else before.u
         try:
-            return _iterated(problem, start, load, expected, start.extrapolation.displacement(start.u))
+            return _Newton(problem, start, load, expected).iterated(origin)
         except ConvergenceError as error:
-            log.info("the step starts anew, not from an extrapolated displacement: %s", error)
-    return _iterated(problem, start, load, expected, start.u)
+            log.info("the step starts anew, not from an expected displacement: %s", error)
+    return _Newton(problem, start, load, expected).iterated(start.u)
 
 
-def _iterated(problem: Problem, start: State, load: StepLoad, expected: float, origin: Array) -> NewtonSolution:
-    """Return the equilibrium of a load step by iterations that begin at displacements `origin` (n_dofs,) [length]."""
-    iterate = Iterate.of(start)
-    history: list[dict[str, Any]] = []
-    u, bodies, changes = origin, problem.deformed(origin, start), [1.0]
-    settled = None
-    for _ in range(MOST):
-        scale = expected, changes[-1]
-        settled, target, force = _solve(problem, start, load, (bodies, u), iterate, scale, settled)
-        before, here = u, bodies
-        u, bodies, fraction = _reach(problem, start, u, target)
-        balanced = _balanced(problem, start, load, (u, bodies), force)
-        if history and fraction == 1.0 and balanced.excess > 1.0:
-            u, bodies, fraction = _searched(problem, start, load, (before, here), (u, bodies), force)
-            balanced = _balanced(problem, start, load, (u, bodies), force) if fraction < 1.0 else balanced
-        moved, size = largest_difference(u, before), max(map(largest, (u, load.lift, start.u)))
-        changes.append(moved / size if size else 0.0)
-        history.append(_told(iterate, changes[-1], balanced, fraction))
-        if fraction == 1.0 and balanced.excess <= 1.0 and (_still(problem, changes) or moved <= start.gap_round_off):
-            return NewtonSolution(settled, u, balanced, bodies, history)
-        if len(changes) > PATIENCE and min(changes[-PATIENCE:]) > FALL * min(changes[:-PATIENCE]):
-            break
-    raise ConvergenceError(
-        f"Newton's iterations do not converge: after {len(history)} the displacement still changes by {changes[-1]:.1e} of "
-        f"its largest component and forces are out of balance by {balanced.relative:.1e}; take smaller load steps",
-        history,
-    )
+class _Tangent(NamedTuple):
+    """How a tangent is made positive definite.
+
+    `geometric` is how much of the geometric stiffness it has, see `NonlinearBodies.at`; `held` the stiffness of springs along
+    closed gaps, beside the body's [-]; `stiff` tells whether those of floating bodies are.
+    """
+
+    geometric: int
+    held: float
+    stiff: bool
 
 
-def _balanced(
-    problem: Problem, start: State, load: StepLoad, at: tuple[Array, DeformedBodies], contact_force: Array
-) -> Balance:
-    """Return the balance of forces at displacements (n_dofs,) [length]."""
-    u, bodies = at
-    internal = problem.internal(bodies, u, load)
-    return balance(problem, u, contact_force, load.force, start.largest_force, internal)
+class _Newton:
+    """The iterations of a load step; see `newton` for the parameters."""
+
+    def __init__(self, problem: Problem, start: State, load: StepLoad, expected: float) -> None:
+        self._problem, self._start, self._load, self._expected = problem, start, load, expected
+        self._iterate = Iterate.of(start)
+        self._settled: SettledContact | None = None
+        self._kept: Problem | None = None  # the last tangent, where another iteration may use it
+        self._held = False  # whether the last tangent needed springs along closed gaps
+
+    def iterated(self, origin: Array) -> StepEquilibrium:
+        """Return the equilibrium by iterations that begin at displacements `origin` (n_dofs,) [length]."""
+        problem, start = self._problem, self._start
+        history: list[dict[str, Any]] = []
+        u, bodies, changes = origin, problem.deformed(origin, start, self._load.rise), [1.0]
+        for _ in range(MOST):
+            before, here = u, bodies
+            target, force = self._solve(here, before, changes[-1])
+            u, bodies, fraction = self._reach(before, target)
+            balanced = self._balanced(u, bodies, force, before)
+            if history and fraction == 1.0 and balanced.excess > 1.0:
+                u, bodies, fraction = self._searched((before, here), (u, bodies), force)
+                balanced = self._balanced(u, bodies, force, before) if fraction < 1.0 else balanced
+            moved, size = largest_difference(u, before), max(map(largest, (u, self._load.lift, start.u)))
+            changes.append(moved / size if size else 0.0)
+            history.append(_told(self._iterate, changes[-1], balanced, fraction))
+            if (
+                fraction == 1.0
+                and balanced.excess <= 1.0
+                and (_still(problem, changes) or moved <= start.gap_round_off)
+            ):
+                return StepEquilibrium(self._settled, u, balanced, bodies, history)
+            if len(changes) > PATIENCE and min(changes[-PATIENCE:]) > FALL * min(changes[:-PATIENCE]):
+                break
+        raise ConvergenceError(
+            f"Newton's iterations do not converge: after {len(history)} the displacement still changes by {changes[-1]:.1e} "
+            f"of its largest component and forces are out of balance by {balanced.relative:.1e}; take smaller load steps",
+            history,
+        )
+
+    def _balanced(self, u: Array, bodies: DeformedBodies, contact_force: Array, linearised_at: Array) -> Balance:
+        """Return the balance of forces at displacements u, fluid's those of a linearisation elsewhere (n_dofs,) [length]."""
+        contact_force = contact_force + self._fluid_change(linearised_at, u)
+        internal = self._problem.internal(bodies, u, self._load)
+        return balance(self._problem, u, contact_force, self._load.force, self._start.largest_force, internal)
+
+    def _solve(self, bodies: DeformedBodies, u: Array, change: float) -> tuple[Array, Array]:
+        """Return displacements (n_dofs,) [length] and contact forces (n_dofs,) [force] of the bodies linearised at u.
+
+        Contact geometry settles to a part of the last relative `change` of the displacement. Where the tangent is not
+        positive definite, the springs of floating bodies are stiffened, then the constraints that the last contact held, by
+        soft springs first: this leaves the iterations quadratic but for what contact does not hold. Where that does not help,
+        parts of the geometric stiffness are left out. Once springs have helped, they are tried first.
+        """
+        failed: Exception | None = None
+        for tangent in self._tangents():
+            if self._held and tangent.geometric == WHOLE and not tangent.held:
+                continue  # it failed an iteration ago
+            if failed or tangent.geometric < WHOLE:  # the stiffness of the bodies is taken apart by now
+                bodies = self._problem.deformed(u, self._start, self._load.rise, geometric=tangent.geometric)
+            try:
+                solution = self._linear_contact(bodies, u, change, tangent)
+            except (ModelError, ConvergenceError) as error:
+                log.info("the tangent fails with %s: %s", tangent, error)
+                failed = error
+            else:
+                self._held = tangent.held > 0.0
+                return solution
+        if isinstance(failed, ConvergenceError):
+            raise failed
+        raise ConvergenceError(
+            f"the tangent stiffness of the bodies cannot be factorised ({failed}): they buckle, or the load step is too large"
+        )
+
+    def _tangents(self) -> list[_Tangent]:
+        """Return the tangents to try, one after the other."""
+        floats = self._problem.floating_bodies is not None
+        closed = self._settled is not None and self._settled.solution.active.any()
+        whole = [_Tangent(WHOLE, 0.0, stiff) for stiff in (False, True)[: 1 + floats]]
+        held = [_Tangent(WHOLE, stiffness, floats) for stiffness in HELD] if closed else []
+        return whole + held + [_Tangent(less, 0.0, floats) for less in range(WHOLE)[::-1]]
+
+    def _linear_contact(
+        self, bodies: DeformedBodies, u: Array, change: float, tangent: _Tangent
+    ) -> tuple[Array, Array]:
+        """Return the result of `_solve` for a tangent, and keep the contact."""
+        start, iterate = self._start, self._iterate
+        problem, self._kept = (self._kept, None) if change <= SMALL else (None, None)
+        if problem is None:
+            scale = tangent.held and tangent.held * float(bodies.K.diagonal().max())
+            added = self._added(scale, u) if tangent.geometric == WHOLE else None
+            problem = self._problem.linearised(bodies, u, self._load, iterate.rigid, added, tangent.stiff)
+            if tangent.geometric == WHOLE and not problem.pairs:  # where there is contact, its geometry goes on
+                self._kept = problem
+        load = problem.about(bodies, u, self._load, iterate.rigid)
+        iterate.u, iterate.history = u.copy(), []
+        loaded, settled = with_loads(problem, load), None
+        if problem.pairs:
+            enough = min(max(problem.criteria.geometry, FORCING * change), LOOSEST)
+            inner = replace(problem, criteria=replace(problem.criteria, geometry=enough))
+            dofs = problem.dofs.for_step(iterate.u, load.lift)
+            step = StepContext(inner, start, load, dofs.loaded(loaded), dofs)
+            settled = settle_geometry(step, Extrapolation(), self._expected, iterate)
+        solution = solve_displacements(problem, load, loaded, settled, u)
+        self._settled = settled
+        return solution
+
+    def _added(self, stiffness: float, u: Array) -> csr_array | None:
+        """Return what the last contact adds to a tangent (n_dofs, n_dofs), at displacements u (n_dofs,) [force / length].
+
+        The symmetric part of how forces of fluid follow the surface; and springs of a `stiffness`, slack at u, along the gaps
+        that are closed. Displacements along these hardly change any more as iterations converge, so that springs change
+        iterations by terms of second order alone (as the augmented Lagrangian does: Alart and Curnier, 1991).
+        """
+        total = csr_array((len(u), len(u)))
+        for wetted in self._wetted:
+            K = wetted.stiffness(self._problem.displacement(u))
+            K.resize(total.shape)
+            total = csr_array(total + K)
+        if stiffness and self._settled is not None:
+            constraints = self._settled.constraints
+            dry = np.concatenate([part.contact_forces(np.ones(len(part))) for part in constraints.parts.values()])
+            rows = csr_array(constraints.B[np.flatnonzero(self._settled.solution.active & (dry > 0.0))])
+            springs = stiffness / np.asarray(rows.multiply(rows).sum(axis=1)).ravel()
+            total = csr_array(total + rows.T @ diags_array(springs) @ rows)
+        return total if total.nnz else None
+
+    @property
+    def _wetted(self) -> list[Wetted]:
+        """Where fluid has come in the last contact, whose forces follow bodies in finite strain."""
+        bodies = self._problem.bodies
+        if self._settled is None or bodies is None or not bodies.finite:
+            return []
+        return [part.wetted for part in self._settled.constraints.parts.values() if part.wetted is not None]
+
+    def _fluid_change(self, before: Array, u: Array) -> Array:
+        """Return by how much forces (n_dofs,) of fluid change between displacements `before` and u (n_dofs,) [force]."""
+        change, n = np.zeros_like(u), self._problem.model.n_dofs
+        for wetted in self._wetted:
+            now, then = (wetted.force(self._problem.displacement(each)) for each in (u, before))
+            change[:n] += (now - then).ravel()
+        return change
+
+    def _reach(self, u: Array, target: Array) -> tuple[Array, DeformedBodies, float]:
+        """Return the displacements to go on from, the bodies there, and the part of the way to the `target` (n_dofs,).
+
+        Half of the way, of that half, and so on, is gone where cells turn inside out farther on.
+        """
+        fraction = 1.0
+        for _ in range(HALVINGS):
+            end = target if fraction == 1.0 else u + fraction * (target - u)
+            try:
+                return end, self._problem.deformed(end, self._start, self._load.rise), fraction
+            except ConvergenceError as error:
+                failed = error
+            fraction *= 0.5
+        raise failed
+
+    def _searched(
+        self, begin: tuple[Array, DeformedBodies], end: tuple[Array, DeformedBodies], contact_force: Array
+    ) -> tuple[Array, DeformedBodies, float]:
+        """Return the result of `_reach` after a line search between two displacements (Crisfield, 1991, section 9.2).
+
+        Under contact forces (n_dofs,) [force] as they are, the potential falls along the way at its beginning; where it rises
+        at the end by much of that, the end lies too far.
+        """
+        (u, here), (target, bodies) = begin, end
+        problem = self._problem
+        along = problem.system.unknowns(target - u)
+
+        def slope(at: Array, deformed: DeformedBodies) -> float:
+            out = problem.internal(deformed, at, self._load)[0] - contact_force - self._fluid_change(u, at)
+            return float(problem.system.reduced(out - self._load.force) @ along)
+
+        first, last, fraction = slope(u, here), slope(target, bodies), 1.0
+        for _ in range(SEARCHES):
+            if not last > OVERSHOT * abs(first):
+                break
+            fraction *= max(abs(first) / (abs(first) + last), LEAST)
+            target = u + fraction * (end[0] - u)
+            bodies = problem.deformed(target, self._start, self._load.rise)
+            last = slope(target, bodies)
+        return target, bodies, fraction
 
 
 def _still(problem: Problem, changes: list[float]) -> bool:
@@ -139,109 +281,6 @@ def _still(problem: Problem, changes: list[float]) -> bool:
     before, last = changes[-2:]
     left = last * min(last / before, 1.0) if before else last
     return left <= max(problem.criteria.geometry, UNCHANGED) or (last <= SCATTER and last > STAYS * before)
-
-
-def _solve(
-    problem: Problem, start: State, load: StepLoad, at: tuple[DeformedBodies, Array], iterate: Iterate,
-    scale: tuple[float, float], last: SettledContact | None,
-) -> tuple[SettledContact | None, Array, Array]:  # fmt: skip
-    """Return contact, displacements (n_dofs,) [length] and contact forces (n_dofs,) [force] of the bodies linearised.
-
-    `at` are the bodies and their displacements (n_dofs,) [length], `scale` the displacement to expect [length] and the last
-    relative change: contact geometry settles to a part of that. Where the tangent is not positive definite, the constraints
-    that the `last` contact held are stiffened, or the springs of floating bodies, which leaves the iterations quadratic;
-    where that does not help, parts of the geometric stiffness are left out.
-    """
-    bodies, u = at
-    stiff = problem.floating_bodies is not None
-    held = None if stiff else _held(last)  # there tangents let bodies move freely
-    attempts: list[tuple[int, csr_array | None, bool]] = [(WHOLE, None, False)]
-    attempts += [(WHOLE, held, stiff)] if stiff or held is not None else []
-    attempts += [(less, None, stiff) for less in range(WHOLE)[::-1]]
-    for geometric, rows, firm in attempts:
-        if geometric < WHOLE:
-            bodies = problem.deformed(u, start, geometric=geometric)
-        try:
-            return _linear_contact(problem, start, load, (bodies, u), iterate, scale, rows, firm)
-        except (ModelError, ConvergenceError) as error:
-            log.info("the tangent with %d parts of the geometric stiffness fails: %s", geometric, error)
-            failed = error
-    if isinstance(failed, ConvergenceError):
-        raise failed
-    raise ConvergenceError(
-        f"the tangent stiffness of the bodies cannot be factorised ({failed}): they buckle, or the load step is too large"
-    )
-
-
-def _held(last: SettledContact | None) -> csr_array | None:
-    """Return the rows (k, n_dofs) of the gaps that are closed in a contact solution; None where there are none.
-
-    Displacements along them hardly change any more as iterations converge, so that a stiffness there changes iterations
-    by terms of second order alone (as the augmented Lagrangian does: Alart and Curnier, 1991).
-    """
-    if last is None or not last.solution.active.any():
-        return None
-    return csr_array(last.constraints.B[np.flatnonzero(last.solution.active)])
-
-
-def _linear_contact(
-    problem: Problem, start: State, load: StepLoad, at: tuple[DeformedBodies, Array], iterate: Iterate,
-    scale: tuple[float, float], held: csr_array | None = None, stiff: bool = False,
-) -> tuple[SettledContact | None, Array, Array]:  # fmt: skip
-    """Return the result of `_solve` for a tangent, stiffened along the rows `held` (k, n_dofs) and where bodies float."""
-    tangent, linear = problem.linearised(*at, load, iterate.rigid, held, stiff)
-    iterate.u, iterate.history = at[1].copy(), []
-    loaded, settled = with_loads(tangent, linear), None
-    if tangent.pairs:
-        enough = min(max(tangent.criteria.geometry, FORCING * scale[1]), LOOSEST)
-        inner = replace(tangent, criteria=replace(tangent.criteria, geometry=enough))
-        dofs = tangent.dofs.for_step(iterate.u, linear.lift)
-        step = StepContext(inner, start, linear, dofs.loaded(loaded), dofs)
-        settled = settle_geometry(step, Extrapolation(), scale[0], iterate)
-    return settled, *solve_displacements(tangent, start, linear, loaded, settled)
-
-
-def _reach(problem: Problem, start: State, u: Array, target: Array) -> tuple[Array, DeformedBodies, float]:
-    """Return the displacements to go on from, the bodies there, and the part of the way to the `target` (n_dofs,) [length].
-
-    Half of the way, of that half, and so on, is gone where cells turn inside out farther on.
-    """
-    fraction = 1.0
-    for _ in range(HALVINGS):
-        end = target if fraction == 1.0 else u + fraction * (target - u)
-        try:
-            return end, problem.deformed(end, start), fraction
-        except ConvergenceError as error:
-            failed = error
-        fraction *= 0.5
-    raise failed
-
-
-def _searched(
-    problem: Problem, start: State, load: StepLoad, begin: tuple[Array, DeformedBodies], end: tuple[Array, DeformedBodies],
-    contact_force: Array,
-) -> tuple[Array, DeformedBodies, float]:  # fmt: skip
-    """Return the result of `_reach` after a line search between two displacements (Crisfield, 1991, section 9.2).
-
-    Under contact forces (n_dofs,) [force] as they are, the potential falls along the way at its beginning; where it rises at
-    the end by much of that, the end lies too far.
-    """
-
-    def slope(u: Array, bodies: DeformedBodies) -> float:
-        out = problem.internal(bodies, u, load)[0] - contact_force - load.force
-        return float(problem.system.reduced(out) @ along)
-
-    (u, here), (target, bodies) = begin, end
-    along = problem.system.unknowns(target - u)
-    first, last, fraction = slope(u, here), slope(target, bodies), 1.0
-    for _ in range(SEARCHES):
-        if not last > OVERSHOT * abs(first):
-            break
-        fraction *= max(abs(first) / (abs(first) + last), LEAST)
-        target = u + fraction * (end[0] - u)
-        bodies = problem.deformed(target, start)
-        last = slope(target, bodies)
-    return target, bodies, fraction
 
 
 def _told(iterate: Iterate, change: float, balanced: Balance, fraction: float) -> dict[str, Any]:

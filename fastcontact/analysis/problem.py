@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.sparse import bsr_array, csr_array, diags_array, eye_array, kron
+from scipy.sparse import bsr_array, csr_array, eye_array, kron
 
 from fastcontact._jit import parallel
 from fastcontact.analysis.active_dofs import ActiveDofs, SurfaceDofs
@@ -17,6 +17,7 @@ from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.floating_bodies import FIRM, SOFT, STIFF, FloatingBodies, RigidPosition
 from fastcontact.analysis.heat import Heat, prepared_heat
 from fastcontact.analysis.state import State
+from fastcontact.analysis.wear import at_points
 from fastcontact.analysis.work import Work
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.contact.configuration import Configuration
@@ -68,6 +69,8 @@ class StepLoad:
         By contact pair, what its coefficient of friction is multiplied with, where it changes.
     fluids : dict of str to float
         By contact pair, the pressure of the fluid at its source [pressure].
+    rise : ndarray (n_points,), optional
+        Of the temperature, by which nonlinear bodies expand [temperature]; that of linear ones is in the forces.
     """
 
     lift: Array
@@ -78,6 +81,7 @@ class StepLoad:
     following: tuple[float, ...] = ()
     friction_factors: Mapping[str, float] = field(default_factory=dict)
     fluids: Mapping[str, float] = field(default_factory=dict)
+    rise: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +123,8 @@ class Problem:
         Pressures in finite strain; `forces` hold them as they are before any displacement.
     heat : Heat, optional
         Where heat is conducted.
+    linearised_at : ndarray (n_dofs,), optional
+        Displacements at which `system` is the tangent of bodies in finite strain [length].
     """
 
     model: Model
@@ -140,6 +146,7 @@ class Problem:
     bodies: NonlinearBodies | None = None
     following: Sequence[tuple[FollowingPressure, Table | None]] = ()
     heat: Heat | None = None
+    linearised_at: Array | None = None
 
     @cached_property
     def material_of_cells(self) -> Numbers:
@@ -173,7 +180,10 @@ class Problem:
             pair.name: pair.fluid.pressure * multiplier(pair.fluid.ramp, self.ramp, instant)
             for pair in self.model.contact if pair.fluid is not None
         }  # fmt: skip
-        return StepLoad(lift, force, obstacles, clearances, angles, following, frictions, fluids)
+        temperatures, rise = self.model.temperatures, None
+        if self.bodies is not None:
+            rise = self.model.temperature_rise(self.factors(temperatures, instant))
+        return StepLoad(lift, force, obstacles, clearances, angles, following, frictions, fluids, rise)
 
     def factors(self, histories: Iterable[Temperature | InitialState], instant: float) -> list[float]:
         """Return the load factors of temperatures or initial states at an instant of the ramp [-]."""
@@ -213,7 +223,7 @@ class Problem:
         u : ndarray (n_dofs,)
             All displacements, for the obstacles that forces drive [length].
         """
-        still = np.zeros(self.model.mesh.dim)
+        still, worn = np.zeros(self.model.mesh.dim), state.worn.get(name)
         return Configuration(
             displacement,
             self.displacement(state.u),
@@ -224,24 +234,23 @@ class Problem:
             state.elastic_slip.get(name),
             load.angles.get(name, 0.0),
             state.angles.get(name, 0.0),
-            self._worn(name, state),
+            None
+            if worn is None
+            else at_points(self.pairs[name].secondary.points, worn.depth, self.model.mesh.n_points),
             state.bonds.get(name),
             load.fluids.get(name, 0.0),
+            linearised=None if self.linearised_at is None else self.displacement(self.linearised_at),
             friction_factor=load.friction_factors.get(name, 1.0),
         )
 
-    def _worn(self, name: str, state: State) -> Array | None:
-        """Return the wear depth of a contact pair at all points (n_points,) [length], None without wear."""
-        if name not in state.worn:
-            return None
-        depth = np.zeros(self.model.mesh.n_points)
-        depth[self.pairs[name].secondary.points] = state.worn[name].depth
-        return depth
+    def deformed(self, u: Array, start: State, rise: Array | None, *, geometric: int = WHOLE) -> DeformedBodies:
+        """Return `NonlinearBodies.at` displacements u (n_dofs,) [length], in a load step that begins at `start`.
 
-    def deformed(self, u: Array, start: State, *, geometric: int = WHOLE) -> DeformedBodies:
-        """Return `NonlinearBodies.at` displacements u (n_dofs,) [length], in a load step that begins at `start`."""
+        `rise` (n_points,) is that of the temperature at its end [temperature].
+        """
         assert self.bodies is not None
-        return self.bodies.at(self.displacement(u), start.history or self.bodies.beginning, geometric=geometric)
+        before = start.history or self.bodies.beginning
+        return self.bodies.at(self.displacement(u), before, rise=rise, geometric=geometric)
 
     def internal(self, bodies: DeformedBodies, u: Array, load: StepLoad) -> tuple[Array, tuple[float, float]]:
         """Return forces (n_dofs,) [force] of nonlinear bodies and springs, their elastic energy and plastic work [energy].
@@ -276,30 +285,34 @@ class Problem:
         u: Array,
         load: StepLoad,
         rigid: RigidPosition | None,
-        held: csr_array | None = None,
+        added: csr_array | None = None,
         stiff: bool = False,
-    ) -> tuple[Problem, StepLoad]:
-        """Return the problem with the tangent of nonlinear bodies, at displacements u (n_dofs,) [length], and its loads.
+    ) -> Problem:
+        """Return the problem with the tangent of nonlinear bodies, at displacements u (n_dofs,) [length].
 
-        The tangent has springs along the rows `held` (k, n_dofs), slack at u; those of floating bodies are `stiff`.
+        The tangent has the stiffness `added` (n_dofs, n_dofs), of forces that vanish or are known at u [force / length];
+        the springs of floating bodies are `stiff`.
         """
-        force, K = -self.internal(bodies, u, load)[0], stiffened(bodies.K, self.model.springs)
+        K = stiffened(bodies.K, self.model.springs)
         for (pressure, _), factor in zip(self.following, load.following, strict=True):
-            K = bsr_array(K + (factor * pressure.at(self.displacement(u))[1]).tobsr(K.blocksize))
-            K.sort_indices()
+            K = _sum(K, factor * pressure.at(self.displacement(u))[1])
         K = self.force_driven.stiffness(K)
-        system = self.system.renewed(K if held is None else _stiffened_along(K, held))
-        force += load.force + system.K @ u
+        system = self.system.renewed(K if added is None else _sum(K, added))
         floating = self._floating(system, u, rigid, stiff)
-        if floating is not None and rigid is not None:  # turned bodies under load are not free to turn
-            force -= system.K @ floating.rigid(u[floating.dofs])
         solver = copy.copy(self.solver)
         involved = system.involved(self.contact_dofs)
         modes = self.force_driven.near_nullspace(near_nullspace(self.model, self.displacement(u)))
         involved = _prepare_solver(solver, system, floating, modes, involved)
         dofs = active_dofs(system, self.contact_dofs, involved, self.pairs, floating, solver)
-        tangent = replace(self, system=system, solver=solver, dofs=dofs, floating_bodies=floating)
-        return tangent, replace(load, force=force)
+        at = u if self.bodies is not None and self.bodies.finite else None
+        return replace(self, system=system, solver=solver, dofs=dofs, floating_bodies=floating, linearised_at=at)
+
+    def about(self, bodies: DeformedBodies, u: Array, load: StepLoad, rigid: RigidPosition | None) -> StepLoad:
+        """Return the loads of this tangent about the bodies at displacements u (n_dofs,) [length]."""
+        force = load.force - self.internal(bodies, u, load)[0] + self.system.K @ u
+        if self.floating_bodies is not None and rigid is not None:  # turned bodies under load are not free to turn
+            force -= self.system.K @ self.floating_bodies.rigid(u[self.floating_bodies.dofs])
+        return replace(load, force=force)
 
     def initial_state(self) -> State:
         """Return the state before the first load step."""
@@ -368,10 +381,9 @@ def prepare(
     )  # fmt: skip
 
 
-def _stiffened_along(K: bsr_array, rows: csr_array) -> bsr_array:
-    """Return K (n, n) with springs along `rows` (k, n), as stiff as its diagonal at most [force / length]."""
-    stiffness = float(K.diagonal().max()) / np.asarray(rows.multiply(rows).sum(axis=1)).ravel()
-    total = bsr_array(K + csr_array(rows.T @ diags_array(stiffness) @ rows).tobsr(K.blocksize))
+def _sum(K: bsr_array, more: csr_array) -> bsr_array:
+    """Return the sum of two matrices (n, n), blocks sorted."""
+    total = bsr_array(K + more.tobsr(K.blocksize))
     total.sort_indices()
     return total
 
@@ -399,9 +411,13 @@ def active_dofs(
 
 
 def _forces(model: Model) -> dict[Table | None, Array]:
-    """Return by history the nodal forces (n_points, dim) of loads, heat and initial states at multiplier 1 [force]."""
+    """Return by history the nodal forces (n_points, dim) of loads, heat and initial states at multiplier 1 [force].
+
+    Heat expands nonlinear bodies by strains, not by forces.
+    """
     forces = model.forces_by_ramp()
-    for table, values in (*model.thermal_forces_by_ramp().items(), *model.initial_forces_by_ramp().items()):
+    thermal = {} if model.nonlinear else model.thermal_forces_by_ramp()
+    for table, values in (*thermal.items(), *model.initial_forces_by_ramp().items()):
         forces[table] = forces[table] + values if table in forces else values
     return forces
 

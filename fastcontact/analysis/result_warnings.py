@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.facet_sag import sag_warnings
 from fastcontact.analysis.interpenetration import interpenetration
 from fastcontact.analysis.problem import Problem
@@ -26,9 +27,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# Penetration under a penalty that is worth a warning, relative to the largest displacement.
-DEEP = 0.01
-# Equivalent strain beyond which linear kinematics are worth a warning.
+# Equivalent strain, and worn depth by the size of the model, beyond which linear kinematics are worth a warning.
 STRAIN = 0.1
 # Plastic strain, which concentrates in a few cells, likewise: under a ball without hardening the mean contact pressure falls
 # from 2.6 times the yield stress, where it reaches 0.1, to 2.3 at 0.5 and 2.1 at 1.1.
@@ -37,12 +36,8 @@ PLASTIC_STRAIN = 0.5
 ROTATION = 0.3
 # Steps to take in the place of one; more of them are no remedy, but the sign of a wrong coefficient.
 MANY_STEPS = 1000
-# Worn depth by the size of the model, likewise.
-WORN = 0.1
 # Elements across the radius of a contact that resolve its pressure.
 ACROSS = 4
-# Change of the displacement by the last of a fixed number of geometry updates, relative to its largest component.
-UNSETTLED = 1e-2
 # What criteria may leave, of the displacement or of the forces, before it is worth a warning.
 LOOSE = 1e-4
 # Part of the largest energy or work that may be missing in the balance of works.
@@ -57,15 +52,17 @@ def result_warnings(problem: Problem, state: State, last: StepResult) -> list[st
     if problem.bodies is None:
         warnings += locking_warning(problem, state.u) or scatter_warnings(problem, last)
     else:
-        warnings += nonlinear_scatter_warnings(problem, state)
+        warnings += nonlinear_scatter_warnings(problem, state, last)
     warnings += [problem.solver.gave_up] if problem.solver.gave_up else []
     load = problem.load_at(last.load_factor)
     loaded, sagging = bool(load.force.any() or load.lift.any()), sag_warnings(problem, state, last)
+    clearances = _clearances(problem, state)
     for name, pair in problem.pairs.items():
         contact = last.contact[name]
         if pair.options.gap_only:
             continue
-        warnings += [*_deep(pair, contact, state.u), *_lost(pair, contact, name in state.touched, loaded)]
+        lost = [] if name in clearances else _lost(pair, contact, name in state.touched, loaded)
+        warnings += [*_deep(pair, contact, state.u), *lost]
         warnings += [sagging[name]] if name in sagging else _unresolved(name, pair, contact)
         warnings += [*wavering(pair, contact), *_too_fast(name, pair, state)]
     return [*warnings, *_unsettled(state), *_loose(problem, last), *_unbalanced(state)]
@@ -75,10 +72,10 @@ def _deep(pair: Formulation, contact: ContactResult, displacement: Array) -> Ite
     """Yield a warning where a penalty lets the sides penetrate by much of the largest displacement."""
     size = float(np.abs(displacement).max(initial=0.0))
     penalty, depth = pair.options.penalty, contact.penetration
-    if isinstance(penalty, float) and depth > DEEP * size:
+    if isinstance(penalty, float) and depth > NOTABLE * size:
         yield (
             f"contact '{contact.name}' penetrates by {depth:.4g}, which is {depth / size:.1%} of the largest displacement: "
-            f"raise its penalty from {penalty:.4g} to about {penalty * depth / (DEEP * size):.2g}, or leave it out"
+            f"raise its penalty from {penalty:.4g} to about {penalty * depth / (NOTABLE * size):.2g}, or leave it out"
         )
 
 
@@ -87,7 +84,7 @@ def _too_fast(name: str, pair: Formulation, state: State) -> Iterator[str]:
     if name not in state.worn or (many := too_fast(pair, state.worn[name])) <= 1.0:
         return
     depth, size = float(state.worn[name].depth.max()), float(np.ptp(pair.points, axis=0).max())
-    if many > MANY_STEPS or depth > WORN * size:
+    if many > MANY_STEPS or depth > STRAIN * size:
         yield (
             f"contact '{name}' wears off {depth:.3g}, {depth / size:.2g} times the size of the model, in steps "
             f"{many:.2g} times as long as pressures can follow: is its wear Archard's coefficient by the hardness, in the "
@@ -115,7 +112,7 @@ def _unbalanced(state: State) -> Iterator[str]:
 def _unsettled(state: State) -> Iterator[str]:
     """Yield a warning where the last of a fixed number of geometry updates still changed much."""
     update, change = state.last_change or (0, 0.0)
-    if change > UNSETTLED:
+    if change > NOTABLE:
         yield (
             f"the contact geometry had not settled after the {update} updates asked for: the last one changed the "
             f"displacement by {change:.1%} of its largest component. Allow more geometry_updates, or leave them out"
@@ -239,6 +236,15 @@ def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
         if most > square:
             square, point = most, mesh.points[block[row]].mean(axis=0)
     return float(square**0.5), point
+
+
+def _clearances(problem: Problem, state: State) -> set[str]:
+    """Return the names of found pairs that were apart and never closed, as a shank in its hole, where others closed."""
+    found = {pair.name: pair.found_gap for pair in problem.model.contact if pair.found_gap is not None}
+    if not state.touched & found.keys():
+        return set()
+    apart = LENGTH_ROUND_OFF * float(np.ptp(problem.model.mesh.points, axis=0).max())
+    return {name for name, gap in found.items() if gap > apart and name not in state.touched}
 
 
 def _lost(pair: Formulation, contact: ContactResult, touched: bool, loaded: bool) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""The model in one load step: with the pretension sections that are locked in it, and the temporary relations that hold."""
+"""The model in one load step: with locked pretension sections, and the relations, temperatures and films that hold in it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, TemporaryConstraint
-from fastcontact.model.model import Model
+from fastcontact.heat.loads import FixedTemperature, TemporaryHeat
+from fastcontact.model.model import TEMPORARY, Model
 from fastcontact.model.pretension import locked_lengths
 from fastcontact.results.step import StepResult
 
@@ -22,9 +23,9 @@ from fastcontact.results.step import StepResult
 def stage_of(model: Model, last: StepResult | None, begin: float = 0.0) -> Model:
     """Return the model as it was in the `last` step; before all steps as it is in the first one, from the instant `begin`."""
     if last is None:
-        return _stage(model, begin, np.zeros(model.mesh.points.shape), {})[0]
+        return _stage(model, begin, np.zeros(model.mesh.points.shape), None, {})[0]
     before = float(np.nextafter(last.load_factor, -np.inf))
-    return _stage(model, before, last.displacement, (last.restart or {}).get("locked", {}))[0]
+    return _stage(model, before, last.displacement, None, (last.restart or {}).get("locked", {}))[0]
 
 
 def go_on(
@@ -37,15 +38,15 @@ def go_on(
     prepared : callable
         Makes the problem of a model.
     model : Model
-        With all temporary relations, and without locked sections.
+        With all that is temporary, and without locked sections.
     problem : Problem
         Of the step before.
     state : State
         At the beginning of the step.
     begin : float
     """
-    stage, kept = _stage(model, begin, problem.displacement(state.u), state.locked)
-    if [relation.name for relation in stage.relations] == [relation.name for relation in problem.model.relations]:
+    stage, kept = _stage(model, begin, problem.displacement(state.u), state.rise, state.locked)
+    if _names(stage) == _names(problem.model):
         return problem, state
     problem = prepared(stage)
     return problem, replace(
@@ -58,13 +59,20 @@ def at_present_length(model: Model) -> list[MultiPointConstraint]:
     return [own.locked(model.mesh.points.size, 0.0) for own in model.pretensions]
 
 
-def _stage(
-    model: Model, begin: float, displacement: Array, kept: Mapping[str, Any]
-) -> tuple[Model, dict[str, float | Array]]:
-    """Return the model in the step that begins at an instant, and what its locks and temporary relations began with.
+def _names(model: Model) -> list[str]:
+    """Return the names of relations, temperatures and films."""
+    temporary = [load for load in model.heat_loads if isinstance(load, TemporaryHeat)]
+    return [*(relation.name for relation in model.relations), *(load.label for load in temporary)]
 
-    That is `kept` from when they began, and follows from the displacements (n_points, dim) [length] for new ones: lengths by
-    the names of sections, values (m,) by those of relations.
+
+def _stage(
+    model: Model, begin: float, displacement: Array, rise: Array | None, kept: Mapping[str, Any]
+) -> tuple[Model, dict[str, float | Array]]:
+    """Return the model in the step that begins at an instant, and what its locks and all that is temporary began with.
+
+    That is `kept` from when they began, and follows for new ones from the displacements (n_points, dim) [length] and the rise
+    of the temperature (n_points,) [temperature]: lengths by the names of sections, values (m,) by those of relations,
+    temperatures by their labels.
     """
     lengths = locked_lengths(model.pretensions, begin, displacement, kept)
     locks = [
@@ -78,8 +86,16 @@ def _stage(
         elif own.acts_from(begin):
             reached[own.name] = kept[own.name] if own.name in kept else own.rows @ displacement.ravel()
             relations += own.after(np.asarray(reached[own.name]))
-    if not locks and not any(isinstance(own, TemporaryConstraint) for own in model.relations):
+    loads: list[Any] = []
+    for load in model.heat_loads:
+        if isinstance(load, FixedTemperature) and load.begins > -np.inf and load.acts_from(begin):
+            at_first = np.zeros(len(displacement)) if rise is None else rise
+            reached[load.label] = kept.get(load.label, at_first)
+            loads.append(replace(load, reached=np.asarray(reached[load.label])))
+        elif not isinstance(load, TemporaryHeat) or load.acts_from(begin):
+            loads.append(load)
+    if not locks and not any(isinstance(own, TEMPORARY) for own in (*model.relations, *model.heat_loads)):
         return model, reached
     made = copy.copy(model)
-    made.relations = [*relations, *locks]
+    made.relations, made.heat_loads = [*relations, *locks], loads
     return made, reached

@@ -58,7 +58,7 @@ class State:
         By contact pair with a cohesive layer, what that is like.
     locked : dict of str to float or ndarray (m,)
         By locked pretension section, its shortening from when it was locked [length]; by temporary relation, the values that
-        it began with.
+        it began with; by temperature that began later, the rise (n_points,) of then [temperature].
     extrapolation : Extrapolation
         The last two converged steps.
     gap_round_off : float

@@ -104,14 +104,15 @@ class StressScatter:
         return sums
 
 
-def nonlinear_scatter_warnings(problem: Problem, state: State) -> list[str]:
+def nonlinear_scatter_warnings(problem: Problem, state: State, step: StepResult) -> list[str]:
     """Return a warning where the mean stress of nonlinear triangles and tetrahedra that keep their volume alternates."""
     mesh, bodies = problem.model.mesh, problem.bodies
     names = [name for name in SIMPLICES if name in mesh.solids]
     nearly = problem.field.averaged & (problem.model.kinematics != "plane_stress")
     if bodies is None or not names or not nearly.any():
         return []
-    stress, off, whole = problem.deformed(state.u, state).stress, 0.0, 0.0
+    rise = problem.model.expanding_rise(step.iterations.get("temperature_factors", ()), step.temperature)
+    stress, off, whole = problem.deformed(state.u, state, rise).stress, 0.0, 0.0
     for name in names:
         cells = mesh.cells[name][nearly[problem.field.rows[name]]]
         mean = stress[name][nearly[problem.field.rows[name]]][..., :3].mean(axis=(1, 2))

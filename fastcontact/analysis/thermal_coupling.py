@@ -1,7 +1,8 @@
 """Heat and contact in turn: temperatures expand bodies, whose contact conducts by its pressures and gaps, until both settle.
 
 Each exchange solves the equilibrium at given temperatures, then the temperatures at the conductances of its contact; the
-temperatures are mixed (Anderson). Where they do not depend on the contact, they are solved once, before it.
+temperatures are mixed (Anderson). Where they depend neither on the contact nor on finite strains, they are solved once,
+before it.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ from fastcontact.analysis.heat import Temperatures
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import FrictionalEquilibrium
 from fastcontact.analysis.state import State
+from fastcontact.analysis.step_equilibrium import StepEquilibrium
+from fastcontact.analysis.true_pressure import areas
 from fastcontact.arrays import Array
 from fastcontact.contact.conductance import crossing
 from fastcontact.contact.configuration import Configuration
@@ -29,8 +32,7 @@ from fastcontact.model.parts.heat import HEAT_FLUX
 from fastcontact.results.step import StepResult
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-Equilibrium = tuple[SettledContact | None, Array, Balance]
-Solve = Callable[[StepLoad, SettledContact | None], Equilibrium]
+Solve = Callable[[StepLoad, StepEquilibrium | None], StepEquilibrium]
 # Exchanges after which heat and contact have no common solution that this finds, and temperatures that are mixed.
 MOST_EXCHANGES, MIXED = 60, 8
 # Linear solutions leave temperatures to this many times their tolerance.
@@ -46,7 +48,7 @@ class Heated(Temperatures):
     def told(self, problem: Problem, step: StepResult) -> StepResult:
         """Return the result of a load step with its heat."""
         assert problem.heat is not None
-        flux = problem.heat.conduction.flux(self.rise)
+        flux = problem.heat.conductors(step.displacement).flux(self.rise)
         contact = {
             name: replace(pair, heat_flux=self.fluxes[name]) if name in self.fluxes else pair
             for name, pair in step.contact.items()
@@ -61,14 +63,15 @@ def first_rise(problem: Problem, state: State, instant: float) -> Array | None:
     """Return the rise of the temperature (n_points,) to begin a load step with [temperature]; None without heat."""
     if problem.heat is None:
         return None
-    if not problem.heat.depends_on_contact:
+    if not problem.heat.depends_on_equilibrium:
         return problem.heat.temperatures(instant).rise
     return np.zeros(problem.model.mesh.n_points) if state.rise is None else state.rise
 
 
 def settle_heat(
-    problem: Problem, start: State, load: StepLoad, instant: float, rise: Array, equilibrium: Equilibrium, solve: Solve
-) -> tuple[Heated, Equilibrium]:
+    problem: Problem, start: State, load: StepLoad, instant: float, rise: Array, equilibrium: StepEquilibrium,
+    solve: Solve,
+) -> tuple[Heated, StepEquilibrium]:  # fmt: skip
     """Return the temperatures and the equilibrium of a load step.
 
     Parameters
@@ -82,10 +85,10 @@ def settle_heat(
         Of its end.
     rise : ndarray (n_points,)
         Of the temperature, to begin with [temperature].
-    equilibrium : (SettledContact or None, ndarray (n_dofs,), Balance)
-        The equilibrium at that temperature.
+    equilibrium : StepEquilibrium
+        At that temperature.
     solve : callable
-        From a load and the contact before to the equilibrium.
+        From a load and the equilibrium before to the next one.
 
     Raises
     ------
@@ -100,15 +103,15 @@ def settle_heat(
         heated = _conducted(problem, start, load, instant, equilibrium)
         change = largest_difference(heated.rise, rise)
         settled = change <= enough * largest(heated.rise) or not problem.model.expands
-        if settled or _pushes_little(problem, heated.rise - rise, equilibrium[2], enough):
+        if settled or _pushes_little(problem, heated.rise - rise, equilibrium.balance, enough):
             return replace(heated, balance={**heated.balance, "exchanges": exchange}), equilibrium
         rise = mixing.mixed(rise, heated.rise)
-        equilibrium = solve(expanded(problem, load, rise), equilibrium[0])
+        equilibrium = solve(expanded(problem, load, rise), equilibrium)
     raise ConvergenceError(
         f"heat and contact do not settle: after {MOST_EXCHANGES} times temperatures still change by {change:.3g}, as where "
         "a contact opens by its heat and closes without it; let its conductance fall gradually with the gap, or grow from "
         "zero with the pressure",
-        equilibrium[0].iterate.history if equilibrium[0] is not None else (),
+        equilibrium.history,
     )
 
 
@@ -119,19 +122,28 @@ def _pushes_little(problem: Problem, rise: Array, balance: Balance, enough: floa
 
 
 def expanded(problem: Problem, load: StepLoad, rise: Array | None) -> StepLoad:
-    """Return a load with the forces by which a rise of the temperature (n_points,) expands the bodies [temperature]."""
+    """Return a load with a rise of the temperature (n_points,) [temperature]; on linear bodies with its forces."""
     if rise is None or not problem.model.expands:
         return load
-    forces = problem.model.expansion_forces(problem.field, rise).ravel()
-    return replace(load, force=load.force + np.pad(forces, (0, len(load.force) - len(forces))))
+    load = replace(load, rise=rise)
+    return load if problem.bodies is not None else expansion_as_force(problem, load)
 
 
-def _conducted(problem: Problem, start: State, load: StepLoad, instant: float, equilibrium: Equilibrium) -> Heated:
+def expansion_as_force(problem: Problem, load: StepLoad) -> StepLoad:
+    """Return a load whose rise of the temperature is in its forces, those by which it would expand linear bodies."""
+    if load.rise is None:
+        return load
+    forces = problem.model.expansion_forces(problem.field, load.rise).ravel()
+    return replace(load, force=load.force + np.pad(forces, (0, len(load.force) - len(forces))), rise=None)
+
+
+def _conducted(problem: Problem, start: State, load: StepLoad, instant: float, equilibrium: StepEquilibrium) -> Heated:
     """Return the temperatures at the conductances of the contact."""
-    settled, u, _ = equilibrium
-    assert problem.heat is not None
-    if settled is None or not problem.heat.depends_on_contact:
-        steady = problem.heat.temperatures(instant)
+    settled, u = equilibrium.settled, equilibrium.u
+    heat, displacement = problem.heat, problem.displacement(u)
+    assert heat is not None
+    if settled is None or not heat.depends_on_contact:
+        steady = heat.temperatures(instant, displacement)
         return Heated(steady.rise, steady.reaction, {**steady.balance, "contacts": {}}, {})
     n, solution, laws = problem.model.mesh.n_points, settled.solution, problem.model.conductances()
     matrix, rubbed, crossings = csr_array((n, n)), np.zeros(n), {}
@@ -140,10 +152,15 @@ def _conducted(problem: Problem, start: State, load: StepLoad, instant: float, e
         pair, law = problem.pairs[name], laws.get(name)
         if law is None and not pair.options.friction_heat:
             continue
-        at = problem.configuration(name, start, load, problem.displacement(u), u)
+        at = problem.configuration(name, start, load, displacement, u)
         constraints, force, gap = _pressed(problem, settled, name, rows, at)
         assert constraints.nodal is not None
         own = crossing(constraints, pair.secondary, pair.primary, pair.points.shape)
+        grown = np.ones(n)  # areas of the deformed surface over those of constraints
+        if heat.finite:
+            before, after = areas(pair, displacement)
+            grown[pair.secondary.points] = after / before
+            own = replace(own, area=own.area * (own.secondary @ grown))
         if law is not None:
             h, facing = np.zeros(len(gap)), own.area > 0.0
             h[facing] = law(force[facing] / own.area[facing], gap[facing])
@@ -156,13 +173,13 @@ def _conducted(problem: Problem, start: State, load: StepLoad, instant: float, e
                     csr_array(obstacles + own.matrix(h)),
                     given + own.secondary.T @ (h * own.area * obstacle_rise),
                 )
-            crossings[name] = own, constraints.nodal, h, obstacle_rise
+            crossings[name] = own, constraints.nodal, h, obstacle_rise, grown[pair.secondary.points]
         if pair.options.friction_heat and isinstance(solution, FrictionalEquilibrium):
             work = np.maximum(-(solution.tangential[rows] * solution.slip[rows]).sum(axis=1), 0.0)
             rubbed += own.shared(pair.options.friction_heat * work / (instant - start.instant))
-    steady = problem.heat.temperatures(instant, matrix, rubbed, (obstacles, given))
-    powers = {name: h * own.area * (own.jump @ steady.rise - at) for name, (own, _, h, at) in crossings.items()}
-    fluxes = {name: crossings[name][1].over_whole_side(power) for name, power in powers.items()}
+    steady = heat.temperatures(instant, displacement, matrix, rubbed, (obstacles, given))
+    powers = {name: h * own.area * (own.jump @ steady.rise - at) for name, (own, _, h, at, _) in crossings.items()}
+    fluxes = {name: crossings[name][1].over_whole_side(power) / crossings[name][4] for name, power in powers.items()}
     balance = {**steady.balance, "contacts": {name: float(power.sum()) for name, power in powers.items()}}
     return Heated(steady.rise, steady.reaction, balance, fluxes)
 

@@ -26,14 +26,19 @@ def on_deformed_surface(pair: Formulation, contact: ContactResult, displacement:
     displacement : ndarray (n_points, dim)
         Of the mesh [length].
     """
-    before, after = (
-        lumped_areas(pair.secondary, points, pair.axisymmetric) for points in (pair.points, pair.points + displacement)
-    )
+    before, after = areas(pair, displacement)
     ratio, stretch = before / after, _stretch(contact, displacement[contact.points], before, after)
     return replace(
         contact, pressure=contact.pressure * ratio, multiplier=contact.multiplier * ratio,
         shear=contact.shear * ratio[:, None], radius=(contact.radius[0] * stretch[0], contact.radius[1] * stretch[1]),
     )  # fmt: skip
+
+
+def areas(pair: Formulation, displacement: Array) -> tuple[Array, Array]:
+    """Return each secondary node's share (n_nodes,) of the surface before and after a displacement (n_points, dim) [area]."""
+    places = pair.points, pair.points + displacement
+    before, after = (lumped_areas(pair.secondary, points, pair.axisymmetric) for points in places)
+    return before, after
 
 
 def _stretch(contact: ContactResult, displacement: Array, before: Array, after: Array) -> tuple[float, float]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fastcontact.analysis.slip import slip_of_nodes
-from fastcontact.arrays import Array
+from fastcontact.arrays import Array, Numbers
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.mesh import elements
@@ -65,6 +65,13 @@ def worn_in_step(
         distance = np.where(contact.sticking, 0.0, distance)
     pressure = np.maximum(contact.pressure + before, 0.0)
     return np.asarray(coefficient * 0.5 * pressure * distance)
+
+
+def at_points(points: Numbers, depth: Array, n_points: int) -> Array:
+    """Return depths (m,) of wear at `points` (m,) as depths of all points (n_points,), zero elsewhere [length]."""
+    whole = np.zeros(n_points)
+    whole[points] = depth
+    return whole
 
 
 def too_fast(pair: Formulation, worn: Worn) -> float:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import platform
 from collections.abc import Mapping, Sequence
-from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fastcontact._version import __version__
+from fastcontact._tools.versions import versions
 from fastcontact.analysis.contact_resultants import contact_resultants
 from fastcontact.cases.case import Asked, Case
 from fastcontact.cases.checks import at_point, evaluated
@@ -24,13 +22,6 @@ if TYPE_CHECKING:
 RESULTANTS = ("normal_force", "moment", "area", "centre", "mean_gap", "pressure_mean")
 # Numbers that a theory must have to be compared as a whole.
 COMPARED = ("force", "pressure_max", "radius")
-
-
-def versions() -> dict[str, str]:
-    """Return the versions of fastcontact, Python and the libraries it uses."""
-    libraries = ("numpy", "scipy", "numba", "pyamg", "meshio", "h5py")
-    versions_used = {"fastcontact": __version__, "python": platform.python_version()}
-    return {**versions_used, **{name: metadata.version(name) for name in libraries}}
 
 
 def summarise(

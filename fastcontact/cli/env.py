@@ -20,10 +20,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Print the environment."""
     from fastcontact._jit import decorators as _jit
-    from fastcontact.cases import summary
+    from fastcontact._tools.versions import versions
     from fastcontact.elasticity import element_2d_kernels
 
-    for name, version in summary.versions().items():
+    for name, version in versions().items():
         say(f"{name:<12} {version}")
     say(f"{'threads':<12} {_jit.threads()} of {os.cpu_count()}")
     files = getattr(getattr(element_2d_kernels.add_stiffness, "_cache", None), "_cache_file", None)

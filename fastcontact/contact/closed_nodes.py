@@ -13,11 +13,10 @@ import numpy as np
 
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.surface import Surface
+from fastcontact.round_off import SUM_ROUND_OFF
 
 # A node with less than this part of the mean area takes no share: its pressure would be anything.
 NO_AREA = 1e-3
-# Shares below this part of the largest are rounding errors.
-ROUNDING = 1e-16
 
 
 def carried(
@@ -55,7 +54,7 @@ def _received(closed: Mask, nodal: Array, shares: Array, areas: Array, side: Sur
     """Return the pressures (m,) that closed nodes take from others; arguments as of `carried`."""
     takers = _takers(closed, areas)
     moving = np.where(closed, shares - nodal * areas, shares)
-    moving[takers | (np.abs(moving) <= ROUNDING * np.abs(shares).max(initial=0.0))] = 0.0
+    moving[takers | (np.abs(moving) <= SUM_ROUND_OFF * np.abs(shares).max(initial=0.0))] = 0.0
     if not moving.any():
         return np.zeros_like(moving)
     # From ring to ring towards the takers, the farthest first.

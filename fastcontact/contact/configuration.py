@@ -43,6 +43,8 @@ class Configuration:
         What the last pairing has found at the secondary nodes, fluid included [pressure]; None before.
     rounded : bool
         Whether facet normals turn at rounded edges, see `pairing.pair`.
+    linearised : ndarray (n_points, dim), optional
+        Displacement at which the tangent of bodies is taken in finite strain [length]; None for small strains.
     friction_factor : float
         What the coefficient of friction is multiplied with [-].
     """
@@ -61,6 +63,7 @@ class Configuration:
     fluid_pressure: float = 0.0
     pressure: Array | None = None
     rounded: bool = False
+    linearised: Array | None = None
     friction_factor: float = 1.0
 
     @property

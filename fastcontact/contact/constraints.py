@@ -107,6 +107,14 @@ class Wetted(Protocol):
         """Of the fluid at the secondary nodes (n_nodes,) [pressure]."""
         ...
 
+    def force(self, displacement: Array) -> Array:
+        """Return the forces (n_points, dim) on the secondary side at a `displacement` (n_points, dim) [length] [force]."""
+        ...
+
+    def stiffness(self, displacement: Array) -> csr_array:
+        """Return the symmetric part (n_dofs, n_dofs) of minus the derivative of `force` [force / length]."""
+        ...
+
 
 class Tied(Protocol):
     """Linear equations that replace contact; see `tied.TiedPair`."""

@@ -1,7 +1,9 @@
 """Fluid that penetrates between the sides of a contact pair, wherever they are open and connected with its source.
 
 A node is open to the fluid if what presses it together is no more than the fluid, and at first if its gap is open; such nodes
-of one facet are connected. There the force is that of the fluid, on both sides alike, in the place of that of contact.
+of one facet are connected. There the fluid takes the place of contact: it presses the secondary side along its own normals,
+and the primary side along the normal of the gap, by the area that the other covers. In finite strain both are those of the
+deformed surface at which the bodies are linearised; how they turn and grow is part of the tangent.
 """
 
 from __future__ import annotations
@@ -9,18 +11,24 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, diags_array, eye_array, kron
 from scipy.sparse.csgraph import connected_components
 
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
+from fastcontact.contact.integration import facet_measure, fine_rule
 from fastcontact.contact.surface import Surface
+from fastcontact.linear.sparse_rows import Entries, rows_of
+from fastcontact.mesh import elements
+from fastcontact.mesh.area_vectors import weighted_area_vectors
 
 # A force that does not depend on the gap is a line of so small a slope: it vanishes at so many lengths of the side.
 FAR = 1e6
 # Gaps below this part of the length of the side are closed; pressures that differ by less of their size are the same.
 CLOSED, ALIKE = 1e-10, 1e-9
+# Mean gaps beside the edge of the contact, of which places between nodes are closed, may be so much below zero, in facets.
+EDGE = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,36 +41,99 @@ class Wetted:
         Constraints.
     pressure : ndarray (n_nodes,)
         At the secondary nodes [pressure].
+    spread : csr_array (n_points, n_nodes)
+        Forces on points, against the `areas` of the secondary nodes [force].
+    areas : AreaVectors
     """
 
     rows: Mask
     pressure: Array
+    spread: csr_array
+    areas: AreaVectors
+
+    def force(self, displacement: Array) -> Array:
+        """Return the forces (n_points, dim) on the secondary side at a `displacement` (n_points, dim) [length] [force]."""
+        return np.asarray(-(self.spread @ self.areas.at(displacement)[0]))
+
+    def stiffness(self, displacement: Array) -> csr_array:
+        """Return the symmetric part (n_dofs, n_dofs) of minus the derivative of `force` [force / length]."""
+        dim, derivative = displacement.shape[1], self.areas.at(displacement)[1]
+        K = csr_array(kron(self.spread, eye_array(dim)) @ derivative)
+        return csr_array(0.5 * (K + K.T))
 
 
-def wetted(constraints: Constraints, at: Configuration, side: Surface, source: Mask, points: Array) -> Constraints:
+@dataclass(frozen=True, eq=False)
+class AreaVectors:
+    """Area vectors of the deformed secondary side at its nodes, by area of the reference, outward (Nanson's formula).
+
+    Means over the facets around a node, with the squares of its shape function as weights, which are positive.
+    """
+
+    side: Surface
+    points: Array
+    axisymmetric: bool
+
+    def at(self, displacement: Array) -> tuple[Array, csr_array]:
+        """Return them (n_nodes, dim) [-] at a `displacement` (n_points, dim) [length], and their derivative.
+
+        The latter (n_nodes * dim, n_points * dim) [1 / length].
+        """
+        dim, n = self.points.shape[1], len(self.side.points)
+        areas, vectors, entries = np.zeros(n), np.zeros((n, dim)), Entries()
+        for block in self.side.blocks:
+            element, (xi, weights) = elements.get(block.element), fine_rule(block.element)
+            N, dN = element.shape(xi), element.gradient(xi)
+            measure = facet_measure(block.facets, block.element, self.points, xi, self.axisymmetric)
+            np.add.at(areas, block.local, (measure * weights) @ N**2)
+            corners = (self.points + displacement)[block.facets]
+            by_facet, derivative = weighted_area_vectors(
+                corners, N, dN, np.broadcast_to(weights, measure.shape), N**2, self.axisymmetric
+            )
+            np.add.at(vectors, block.local, by_facet)
+            rows, columns = (
+                (nodes[:, :, None] * dim + np.arange(dim)).reshape(len(nodes), -1)
+                for nodes in (block.local, block.facets)
+            )
+            entries.add(rows, columns, derivative.reshape(*rows.shape, -1))
+        share = np.divide(1.0, areas, out=np.zeros(n), where=areas > 0.0)
+        by_node = diags_array(np.repeat(share, dim)) @ entries.matrix((n * dim, self.points.size))
+        return vectors * share[:, None], csr_array(by_node)
+
+
+def wetted(constraints: Constraints, at: Configuration, areas: AreaVectors, source: Mask) -> Constraints:
     """Return constraints `constraints` under the fluid pressure of a configuration.
 
-    The fluid comes from the nodes `source` (n_nodes,) of the secondary side; `points` (n_points, dim) are reference
-    coordinates [length]. Contact pressures are those of the last pairing; before the first one what is closed is tight.
+    The fluid comes from the nodes `source` (n_nodes,) of the secondary side. Contact pressures are those of the last
+    pairing; before the first one what is closed is tight.
     """
     if not at.fluid_pressure > 0.0:
         return constraints
     assert constraints.areas is not None
     assert constraints.nodal is not None
+    side, points = areas.side, areas.points
     size = float(np.linalg.norm(np.ptp(points[side.points], axis=0)))
+    vectors = areas.at(np.zeros_like(points) if at.linearised is None else at.linearised)[0]
     gaps = constraints.gaps(at.displacement)
     nodal, node = constraints.nodal.weighted_gaps(np.where(constraints.usable, gaps, np.inf))
     if at.pressure is None:
         passable = nodal > CLOSED * size
-    else:  # a node that is pressed together is tight, even if places beside it are what is closed
-        passable = (nodal > -CLOSED * size) & (at.pressure <= (1.0 + ALIKE) * at.fluid_pressure)
+    else:
+        # A node that is pressed together is tight, even if places beside it are what is closed.
+        # Pressures of contact are forces per area of the reference.
+        nominal = at.fluid_pressure * (1.0 if at.linearised is None else np.linalg.norm(vectors, axis=1))
+        facet = size / side.n_facets ** (1.0 / (points.shape[1] - 1))
+        passable = (nodal > -EDGE * facet) & (at.pressure <= (1.0 + ALIKE) * nominal)
     nodes = reached(side, source, passable)
     rows = nodes[node] & constraints.usable
     far = FAR * size
     none = np.zeros(len(constraints))
+    B, weights = _along(constraints.B, rows, side, vectors[node])
+    strength = np.where(rows, at.fluid_pressure * constraints.areas, 0.0)
+    at_nodes = csr_array((strength, (np.arange(len(node)), node)), shape=(len(node), len(nodes)))
     return replace(
         constraints,
-        gap0=np.where(rows, constraints.gap0 - gaps - far, constraints.gap0),
+        B=B,
+        gap0=np.where(rows, -far - B @ at.displacement.ravel(), constraints.gap0),
         softness=np.where(
             rows,
             far / (at.fluid_pressure * constraints.areas),
@@ -70,8 +141,32 @@ def wetted(constraints: Constraints, at: Configuration, side: Surface, source: M
         ),
         equality=rows if constraints.equality is None else constraints.equality | rows,
         friction=None if constraints.friction is None else np.where(rows, 0.0, constraints.friction),
-        wetted=Wetted(rows, np.where(nodes, at.fluid_pressure, 0.0)),
+        wetted=Wetted(rows, np.where(nodes, at.fluid_pressure, 0.0), csr_array(weights.T @ at_nodes), areas),
     )
+
+
+def _along(B: csr_array, rows: Mask, side: Surface, vectors: Array) -> tuple[csr_array, csr_array]:
+    """Return B (m, n_dofs) along the own normals of the secondary `side` in `rows` (m,), and its weights (m, n_points).
+
+    `vectors` (m, dim) are area vectors by area [-]; the primary side has what they cover along the normal of the gap.
+    """
+    (m, n_dofs), dim = B.shape, vectors.shape[1]
+    entries = B.tocoo()
+    row, point, component = entries.row, entries.col // dim, entries.col % dim
+    ours = np.isin(point, side.points)
+    normal = np.zeros((m, dim))
+    np.add.at(normal, (row[ours], component[ours]), entries.data[ours])
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = np.divide(normal, length, out=normal, where=length > 0.0)
+    kept = ours & rows[row]
+    weights = csr_array(
+        (entries.data[kept] * normal[row[kept], component[kept]], (row[kept], point[kept])), shape=(m, n_dofs // dim)
+    )
+    covered = np.where(rows, -np.einsum("md,md->m", vectors, normal), 1.0)
+    theirs = csr_array((entries.data * covered[row] * ~kept, (row, entries.col)), shape=B.shape)
+    along = csr_array(theirs + rows_of(weights, -vectors))
+    along.eliminate_zeros()
+    return along, weights
 
 
 def reached(side: Surface, source: Mask, passable: Mask) -> Mask:

@@ -2,10 +2,9 @@
 """Projection of points on a curve in the plane along normals interpolated between its nodes."""
 
 from fastcontact._jit.decorators import interpretable_kernel, kernel
+from fastcontact.contact.search.projection_3d_kernels import MAX_ITERATIONS, STEP
 
-MOST_STEPS = 30
 MOST_FACETS = 8
-STEP = 1e-14
 # A projection that ends farther beyond its facet than this, in reference coordinates, is not trusted.
 FAR = 3.0
 
@@ -24,7 +23,7 @@ def _shape(count, s, values, slopes):
 @kernel
 def _newton(x, y, corners, normals, f, count, s, values, slopes):
     """Return s where (x, y) lies along the normal of facet f, extended beyond its ends, and whether it was found."""
-    for _ in range(MOST_STEPS):
+    for _ in range(MAX_ITERATIONS):
         _shape(count, s, values, slopes)
         px, py, tx, ty, nx, ny, mx, my = x, y, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for k in range(count):

@@ -17,11 +17,10 @@ from fastcontact.contact.pairing import Candidates, Pairing, normals
 from fastcontact.contact.projection import places
 from fastcontact.contact.surface import Surface
 from fastcontact.mesh import elements
+from fastcontact.round_off import SINGLE_PRECISION
 
 KINDS = ("unilateral", "bilateral", "bilateral_once_closed", "tied", "gap_only")
 Field = Callable[[Array], Array]
-# A vector of which less than this lies in a tangent plane is normal to it.
-ACROSS = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +140,7 @@ class PairOptions:
         normal = normals(directions)
         free = along - (normal @ along)[:, None] * normal
         length = np.linalg.norm(free, axis=1, keepdims=True)
-        slippery = self._slippery(candidates)[:, None] & (length > ACROSS * np.linalg.norm(along))
+        slippery = self._slippery(candidates)[:, None] & (length > SINGLE_PRECISION * np.linalg.norm(along))
         first = np.where(slippery, free / np.where(slippery, length, 1.0), directions[0])
         turned = (first, *(np.where(slippery, np.cross(normal, first), other) for other in directions[1:]))
         return turned, (np.where(slippery, 0.0, first), *turned[1:])

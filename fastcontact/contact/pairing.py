@@ -23,14 +23,14 @@ from fastcontact.contact.projection import (
     places,
     smooth_normals,
 )
+from fastcontact.contact.projection_kernels import INSIDE
 from fastcontact.contact.search.closest import Closest, closest_of_kinds
 from fastcontact.contact.surface import Surface
 from fastcontact.mesh import elements
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# In facet lengths: how far beyond both facets at a node a point may lie and still face it; what is rounding.
+# How far beyond both facets at a node a point may lie and still face it, in facet lengths.
 FOLDED = 0.5
-ROUNDING = 1e-10
 # Part of either facet at an edge over which rounded edges turn.
 ROUNDED = 0.1
 
@@ -159,7 +159,7 @@ def pair(
     if normals == "facet" and not rounded:
         inner = _at_smooth_ends(primary, coordinates, closest)
         paired = closest.overhang <= np.where(inner, max(projection_tolerance, FOLDED), projection_tolerance)
-        outside = paired & ~inner & (closest.overhang > ROUNDING)
+        outside = paired & ~inner & (closest.overhang > INSIDE)
         return _straight_on(
             Pairing(closest.facet, closest.xi, closest.normal, paired), candidates, primary, coordinates, outside
         )
@@ -175,7 +175,7 @@ def pair(
         normal = _round_edges(primary, coordinates, facet, xi, normal)
     paired = overhang <= projection_tolerance
     return _straight_on(
-        Pairing(facet, xi, normal, paired), candidates, primary, coordinates, paired & (overhang > ROUNDING)
+        Pairing(facet, xi, normal, paired), candidates, primary, coordinates, paired & (overhang > INSIDE)
     )
 
 

@@ -8,14 +8,13 @@ in `search.facet_tables`; facets with fewer nodes than the widest kind have zero
 import numpy as np
 
 from fastcontact._jit.decorators import innermost_kernel, interpretable_kernel, kernel
-from fastcontact.contact.search.straight_3d_kernels import cross, dot, minus, unit
+from fastcontact.contact.search.projection_3d_kernels import STEP, component, vector
+from fastcontact.contact.search.straight_3d_kernels import along, cross, dot, minus, unit
+from fastcontact.round_off import ROUND_OFF
 
 MAX_ITERATIONS = 15
-# In reference coordinates: a step below which the projection has converged, and what counts as inside a facet.
-STEP = 1e-13
+# A point that lies beyond its facet by less than this, in facet lengths, counts as inside.
 INSIDE = 1e-10
-# Facets that a projection leaves by amounts that differ by less are left alike: the first one is taken.
-TIE = 1e-12
 # A projection that ends farther beyond its facet than this, in facet lengths, is not trusted.
 BEYOND = 1.0
 # Columns of a Jacobian that span less than this part of the volume of a box are dependent.
@@ -50,15 +49,10 @@ def angles(nodes, beside, begin, end, out):
         for a in range(nodes.shape[1]):
             out[f, a] = 1.0
         for a in range(beside.shape[0]):
-            row = _row(nodes, f, a)
-            p, q = minus(_row(nodes, f, beside[a, 0]), row), minus(_row(nodes, f, beside[a, 1]), row)
+            row = vector(nodes, f, a)
+            p, q = minus(vector(nodes, f, beside[a, 0]), row), minus(vector(nodes, f, beside[a, 1]), row)
             sine = cross(p, q)
             out[f, a] = np.arctan2(np.sqrt(dot(sine, sine)), dot(p, q))
-
-
-@innermost_kernel
-def _row(nodes, f, a):
-    return nodes[f, a, 0], nodes[f, a, 1], nodes[f, a, 2]
 
 
 @interpretable_kernel
@@ -78,38 +72,12 @@ def coefficients(values, to_terms, first, begin, end, out):
 
 
 @innermost_kernel
-def _component(terms, f, d, s, t):
-    """Return one component of the polynomials of facet `f` at (s, t), and its derivatives."""
-    m = terms.shape[1]
-    a, b = terms[f, 1, d], terms[f, 2, d]
-    x, xs, xt = terms[f, 0, d] + a * s + b * t, a, b
-    if m >= 4:
-        a = terms[f, 3, d]
-        x, xs, xt = x + a * s * t, xs + a * t, xt + a * s
-    if m >= 6:
-        a, b = terms[f, 4, d], terms[f, 5, d]
-        x, xs, xt = x + a * s * s + b * t * t, xs + 2.0 * a * s, xt + 2.0 * b * t
-    if m >= 8:
-        a, b = terms[f, 6, d], terms[f, 7, d]
-        x, xs, xt = x + (a * s + b * t) * s * t, xs + (2.0 * a * s + b * t) * t, xt + (a * s + 2.0 * b * t) * s
-    if m >= 9:
-        a = terms[f, 8, d]
-        x, xs, xt = x + a * s * s * t * t, xs + 2.0 * a * s * t * t, xt + 2.0 * a * s * s * t
-    return x, xs, xt
-
-
-@innermost_kernel
 def _place(terms, f, s, t):
     """Return the value of the polynomials of facet `f` at (s, t), and their derivatives."""
-    x, xs, xt = _component(terms, f, 0, s, t)
-    y, ys, yt = _component(terms, f, 1, s, t)
-    z, zs, zt = _component(terms, f, 2, s, t)
+    x, xs, xt, _, _, _ = component(terms, f, 0, s, t)
+    y, ys, yt, _, _, _ = component(terms, f, 1, s, t)
+    z, zs, zt, _, _, _ = component(terms, f, 2, s, t)
     return (x, y, z), (xs, ys, zs), (xt, yt, zt)
-
-
-@innermost_kernel
-def _plus(a, factor, b):
-    return a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]
 
 
 @innermost_kernel
@@ -118,8 +86,8 @@ def _newton(point, terms, directions, f, s, t, height):
     for _ in range(MAX_ITERATIONS):
         foot, along_s, along_t = _place(terms, f, s, t)
         normal, turn_s, turn_t = _place(directions, f, s, t)
-        residual = minus(point, _plus(foot, height, normal))
-        p, q = _plus(along_s, height, turn_s), _plus(along_t, height, turn_t)
+        residual = minus(point, along(foot, normal, height))
+        p, q = along(along_s, turn_s, height), along(along_t, turn_t, height)
         across = cross(q, normal)
         volume = dot(p, across)
         if not abs(volume) > FLAT * np.sqrt(dot(p, p) * dot(q, q) * dot(normal, normal)):
@@ -161,7 +129,7 @@ def _beside(point, terms, directions, triangular, neighbours, f, height):
         middle = 1.0 / 3.0 if triangular[g] else 0.0
         s, t, converged = _newton(point, terms, directions, g, middle, middle, height)
         out = beyond(triangular[g], s, t) if converged else np.inf
-        if converged and max(out, INSIDE) < max(least, INSIDE) - TIE:
+        if converged and max(out, INSIDE) < max(least, INSIDE) - ROUND_OFF:  # of several left alike, the first one
             best, best_s, best_t, least = g, s, t, out
     return best, best_s, best_t, least
 

@@ -3,13 +3,14 @@
 
 In the reference configuration (total Lagrangian): nodal forces are integrals of P : dN/dX, the tangent is those of
 dN/dX : A : dN/dX (Bonet and Wood, 2008, chapter 9). For small strains the same loop takes P as the Cauchy stress and J as
-one plus the trace of the strain.
+one plus the trace of the strain. Bodies that expand by a temperature are measured from where they would then be without
+stress (an intermediate configuration: Lu and Pister, 1975): F is the elastic part of the deformation gradient.
 """
 
 import numpy as np
 
 from fastcontact._jit.decorators import kernel
-from fastcontact.elasticity.constitutive_kernels import add_second_derivative, cofactor, determinant, respond
+from fastcontact.elasticity.constitutive_kernels import add_second_derivative, cofactor, determinant, respond, voigt
 from fastcontact.elasticity.element_2d_kernels import TWO_PI, owned
 from fastcontact.mesh.jacobian_kernels import at_nodes, gradients, inverse_jacobian
 
@@ -44,6 +45,35 @@ def _deformation(displacement, cell, gradient, hoop, F):
             for j in range(gradient.shape[1]):
                 F[i, j] += displacement[cell[a], i] * gradient[a, j]
         F[2, 2] += displacement[cell[a], 0] * hoop[a]
+
+
+@kernel
+def _expanded(strain, N, cell, rise, finite, F, gradient, hoop):
+    """Take the expansion by a `rise` (n_points,) out of F, shape derivatives (n_nodes, dim) and `hoop` (n_nodes,), in place.
+
+    `strain` (6,) is that of a degree, with engineering shears. Return the ratio of the volumes, and how much longer fibres
+    along z are.
+    """
+    degrees = 0.0
+    for a in range(len(cell)):
+        degrees += N[a] * rise[cell[a]]
+    U, inverse = np.empty((3, 3)), np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            U[i, j] = 1.0 + degrees * strain[i] if i == j else 0.5 * degrees * strain[voigt(i, j)]
+    if not finite:
+        F -= U
+        for i in range(3):
+            F[i, i] += 1.0
+        return 1.0, U[2, 2]
+    cofactor(U, inverse)
+    ratio = determinant(U)
+    inverse /= ratio
+    F[:] = F @ inverse
+    dim = gradient.shape[1]
+    gradient[:] = gradient @ np.ascontiguousarray(inverse[:dim, :dim])
+    hoop *= inverse[2, 2]
+    return ratio, U[2, 2]
 
 
 @kernel
@@ -87,9 +117,12 @@ def _leave_out_initial_stress(G, J, P, turning, A):
 
 
 @kernel
-def _through(constants, D, bulk, finite, F, old, new, P, A, G):
-    """Respond with the F_zz at which P_zz vanishes, eliminated from A; return the energy, and whether it was found."""
-    F[2, 2] = 1.0 + old[8]
+def _through(constants, D, bulk, finite, thicker, F, old, new, P, A, G):
+    """Respond with the F_zz at which P_zz vanishes, eliminated from A; return the energy, and whether it was found.
+
+    Without stress the body is `thicker` by this ratio.
+    """
+    F[2, 2] = (1.0 + old[8]) / thicker if finite else 2.0 + old[8] - thicker
     for _ in range(THROUGH):
         energy = respond(constants, D, F, old, new, P, A)
         J = _dilatation(F, finite, G)
@@ -98,7 +131,7 @@ def _through(constants, D, bulk, finite, F, old, new, P, A, G):
         if not A[8, 8] > 0.0:
             return energy, False
         if abs(P[2, 2]) <= ENOUGH * A[8, 8]:
-            new[8] = F[2, 2] - 1.0
+            new[8] = F[2, 2] * thicker - 1.0 if finite else F[2, 2] + thicker - 2.0
             for row in range(8):
                 for column in range(8):
                     A[row, column] -= A[row, 8] * A[8, column] / A[8, 8]
@@ -179,7 +212,7 @@ def _cauchy(F, P, finite, out):
 @kernel
 def linearise(
     points, cells, N, dN, weights, polynomials, axisymmetric, plane_stress, finite, geometric, displacement,
-    constants, moduli, bulk,
+    constants, moduli, bulk, expansion, rise,
     material, old, slots, owner, part, data, force, new, stress, energy,
 ):  # fmt: skip
     """Add the tangent to `data` (n_blocks, dim, dim) and forces to `force` (n_points, dim), in rows of nodes of a `part`.
@@ -187,14 +220,15 @@ def linearise(
     Of its cells, those whose first node it has, it fills the history `new` (n_cells, n_q, 9), the Cauchy `stress`
     (n_cells, n_q, n_components) and `energy` (n_cells, 2): elastic, plastic work. With `bulk` (n_materials, 2): bulk
     modulus of the dilatation projected on `polynomials` (n_q, m), and of the rest. Returns a status and the number of a
-    cell, zero and -1 where all went well. With `geometric` 2 the tangent is whole; 1 leaves out how dJ/dF turns by pressure,
+    cell, zero and -1 where all went well. A `rise` (n_points,) of the temperature, which may be empty, brings strains of
+    `expansion` (n_materials, 6) a degree. With `geometric` 2 the tangent is whole; 1 leaves out how dJ/dF turns by pressure,
     0 the initial-stress stiffness and how dJ/dF turns under tension, so that it is positive semidefinite.
     """
     n_cells, n_nodes = cells.shape
     n_q, dim, m = N.shape[0], points.shape[1], polynomials.shape[1]
     gradient, hoop, volume = np.empty((n_q, n_nodes, dim)), np.zeros((n_q, n_nodes)), np.empty(n_q)
     x, jacobian, inverse = np.empty((n_nodes, dim)), np.empty((dim, dim)), np.empty((dim, dim))
-    F, J, G = np.empty((n_q, 3, 3)), np.empty(n_q), np.empty((3, 3))
+    F, J, G, thicker = np.empty((n_q, 3, 3)), np.empty(n_q), np.empty((3, 3)), np.ones(n_q)
     P, A, product = np.empty((3, 3)), np.empty((9, 9)), np.empty((9, dim))
     local, forces = np.empty((n_nodes, n_nodes, dim, dim)), np.empty((n_nodes, dim))
     mass, projection, dilatation = np.empty((m, m)), np.empty((m, n_nodes * dim)), np.empty(m)
@@ -208,6 +242,10 @@ def linearise(
         local[:], forces[:], mass[:], projection[:], dilatation[:] = 0.0, 0.0, 0.0, 0.0, 0.0
         for q in range(n_q):
             _deformation(displacement, cells[c], gradient[q], hoop[q], F[q])
+            if len(rise):
+                strain = expansion[material[c, q]]
+                ratio, thicker[q] = _expanded(strain, N[q], cells[c], rise, finite, F[q], gradient[q], hoop[q])
+                volume[q] *= ratio
             J[q] = _dilatation(F[q], finite, G)
             if finite and not (J[q] > 0.0):
                 return INVERTED, c
@@ -237,7 +275,7 @@ def linearise(
             row = material[c, q]
             law, rest = constants[row], bulk[row, 1]
             if plane_stress:
-                own, settled = _through(law, moduli[row], rest, finite, F[q], old[c, q], history, P, A, G)
+                own, settled = _through(law, moduli[row], rest, finite, thicker[q], F[q], old[c, q], history, P, A, G)
                 if not settled:
                     return NO_PLANE_STRESS, c
                 if finite and geometric == 0:

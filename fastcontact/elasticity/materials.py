@@ -33,6 +33,7 @@ MODULI = ("E", "nu", "G")
 CONSTANTS = (*MODULI, "density", "expansion", "conductivity")
 
 
+@typed(ModelError)
 class Material:
     """A linear elastic material: its moduli in axes of its own, and what loads and temperature need to know of it.
 
@@ -127,7 +128,6 @@ class Material:
             bound_material._check_at([name for name in names if name != "axes"], *sample)
         return bound_material
 
-    @typed(ModelError)
     def constants_at(self, name: str, rows: Indices, N: Array) -> SimpleNamespace:
         """Return the constants in cells of an element, those that vary as arrays (n_rows * n,) [unit of the constant].
 
@@ -186,7 +186,6 @@ class Material:
             raise ModelError("the axes of the material depend on the position: ask for moduli_at(points, kinematics)")
         return np.asarray(self.moduli_at(np.zeros((1, 3 if kinematics == "3d" else 2)), kinematics)[0])
 
-    @typed(ModelError)
     def moduli_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
         """Return the moduli (n, 4, 4), in 3D (n, 6, 6) [pressure] at `points` (n, dim) [length]; see `moduli`.
 
@@ -202,7 +201,6 @@ class Material:
         D[inner] = np.linalg.inv(compliance[inner])
         return D
 
-    @typed(ModelError)
     def compliance_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
         """Return the compliance (n, 4, 4), in 3D (n, 6, 6) [1 / pressure] at `points` (n, dim) [length].
 
@@ -211,7 +209,6 @@ class Material:
         size = 6 if kinematics == "3d" else 4
         return np.asarray(self._compliance6(points, kinematics, constants)[:, :size, :size])
 
-    @typed(ModelError)
     def expansion_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
         """Return the strains (n, 4), in 3D (n, 6) [1 / temperature] of a degree at `points` (n, dim) [length].
 
@@ -230,7 +227,6 @@ class Material:
             )
         return np.asarray(strain[:, :size])
 
-    @typed(ModelError)
     def conductivity_at(self, points: Array, kinematics: str, constants: Any) -> Array:
         """Return the conductivity (n, dim, dim) [power / (length temperature)] at `points` (n, dim) [length].
 
@@ -458,7 +454,6 @@ class LinearElastic(Material):
             )
         return np.asarray(isotropic_moduli(np.array([self.E], float), np.array([self.nu], float), kinematics)[0])
 
-    @typed(ModelError)
     def moduli_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
         """Return the moduli (n, 4, 4), in 3D (n, 6, 6) [pressure] at `points` (n, dim) [length]; see `Material.moduli_at`."""
         given = self if constants is None else constants

@@ -78,7 +78,7 @@ class ElasticPlastic(NonlinearElastic):
         1956) [pressure].
     volumetric : str
         As of `LinearElastic`; ``"auto"`` projects the dilatation wherever elements can, since plastic flow keeps the volume.
-    density, expansion : float, optional
+    density, expansion, conductivity : float, optional
         As of `LinearElastic`.
 
     Examples
@@ -136,7 +136,6 @@ class ElasticPlastic(NonlinearElastic):
         table = [value for row in self.hardening for value in row]
         return [PLASTIC, self.shear_modulus, self.bulk_modulus, self.kinematic, len(self.hardening), *table]
 
-    @typed(ModelError)
     def yield_at(self, plastic_strain: Array) -> Array:
         """Return the yield stress (...) [pressure] at the equivalent plastic strains `plastic_strain` (...) [-]."""
         return np.interp(plastic_strain, *np.transpose(self.hardening))
@@ -172,7 +171,7 @@ class NeoHookean(Hyperelastic):
     ----------
     E, nu : float
         Young's modulus [pressure] and Poisson's ratio [-] of small strains: mu = E / (2 (1 + nu)), K = E / (3 (1 - 2 nu)).
-    volumetric, density, expansion
+    volumetric, density, expansion, conductivity
         As of `LinearElastic`: from nu = 0.49 on the dilatation is projected, so that elements do not lock.
 
     Examples
@@ -224,7 +223,7 @@ class MooneyRivlin(Polynomial):
         [pressure]; the shear modulus of small strains is 2 (C10 + C01).
     bulk : float
         Bulk modulus K [pressure].
-    volumetric, density, expansion
+    volumetric, density, expansion, conductivity
         As of `NeoHookean`.
 
     Examples
@@ -238,9 +237,13 @@ class MooneyRivlin(Polynomial):
     bulk: float = 0.0
 
     def __init__(
-        self, C10: float, C01: float, bulk: float, *, volumetric: str = "auto", density: Any = None, expansion: Any = None
+        self, C10: float, C01: float, bulk: float, *, volumetric: str = "auto", density: Any = None,
+        expansion: Any = None, conductivity: Any = None,
     ) -> None:  # fmt: skip
-        rest = {"bulk": float(bulk), "volumetric": volumetric, "density": density, "expansion": expansion}
+        rest = {
+            "bulk": float(bulk), "volumetric": volumetric, "density": density, "expansion": expansion,
+            "conductivity": conductivity,
+        }  # fmt: skip
         self._take({"C10": C10, "C01": C01}, rest)
 
 
@@ -257,7 +260,7 @@ class Yeoh(Polynomial):
         [pressure]; the shear modulus of small strains is 2 C10.
     bulk : float
         Bulk modulus K [pressure].
-    volumetric, density, expansion
+    volumetric, density, expansion, conductivity
         As of `NeoHookean`.
 
     Examples
@@ -273,9 +276,12 @@ class Yeoh(Polynomial):
 
     def __init__(
         self, C10: float, C20: float, C30: float, bulk: float, *, volumetric: str = "auto", density: Any = None,
-        expansion: Any = None,
+        expansion: Any = None, conductivity: Any = None,
     ) -> None:  # fmt: skip
-        rest = {"bulk": float(bulk), "volumetric": volumetric, "density": density, "expansion": expansion}
+        rest = {
+            "bulk": float(bulk), "volumetric": volumetric, "density": density, "expansion": expansion,
+            "conductivity": conductivity,
+        }  # fmt: skip
         self._take({"C10": C10, "C20": C20, "C30": C30}, rest)
 
 
@@ -294,7 +300,7 @@ class Ogden(Hyperelastic):
         Exponents [-], none of them zero.
     bulk : float
         Bulk modulus K of ``K (J - 1)^2 / 2`` [pressure].
-    volumetric, density, expansion
+    volumetric, density, expansion, conductivity
         As of `NeoHookean`.
 
     Examples
@@ -308,7 +314,8 @@ class Ogden(Hyperelastic):
     bulk: float = 0.0
 
     def __init__(
-        self, mu: Any, alpha: Any, bulk: float, *, volumetric: str = "auto", density: Any = None, expansion: Any = None
+        self, mu: Any, alpha: Any, bulk: float, *, volumetric: str = "auto", density: Any = None,
+        expansion: Any = None, conductivity: Any = None,
     ) -> None:  # fmt: skip
         try:
             terms = [tuple(float(v) for v in np.atleast_1d(np.asarray(value, float))) for value in (mu, alpha)]
@@ -318,7 +325,10 @@ class Ogden(Hyperelastic):
             raise ModelError(f"Ogden has {len(terms[0])} mu and {len(terms[1])} alpha: give as many of both")
         if not all(map(math.isfinite, terms[0] + terms[1])) or 0.0 in terms[1]:
             raise ModelError("mu and alpha of Ogden must be finite, and no alpha zero")
-        rest = {"bulk": bulk, "volumetric": volumetric, "density": density, "expansion": expansion}
+        rest = {
+            "bulk": bulk, "volumetric": volumetric, "density": density, "expansion": expansion,
+            "conductivity": conductivity,
+        }  # fmt: skip
         self._set(sum(terms[0]), "(the sum of mu)", {"mu": terms[0], "alpha": terms[1], **rest})
 
     @property

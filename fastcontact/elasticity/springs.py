@@ -56,42 +56,13 @@ def grounded(
     along: Mapping[str, float] | None = None,
     direction: Array | None = None,
 ) -> Springs:
-    """Return springs from each of the `nodes` (n,) to the ground, as `between` describes them.
+    """Return springs from each of the `nodes` (n,) to the ground, as `joined` describes those between nodes.
 
     Along every axis of `stiffness` [force / length], and `along` or across the unit vector `direction` (dim,) [-].
     """
     directions, values = _frame(stiffness, along or {}, direction, dim)
     rows = nodal_rows(np.tile(nodes, len(values))[:, None], np.repeat(directions, len(nodes), axis=0)[:, None], n_dofs)
     return Springs(name, rows, np.repeat(values, len(nodes)), True)
-
-
-def between(
-    name: str,
-    points: Array,
-    first: int,
-    second: int,
-    stiffness: Mapping[int, float],
-    along: Mapping[str, float],
-    direction: Array | None = None,
-) -> Springs:
-    """Return springs between two of the `points` (n_points, dim) [length].
-
-    Along every axis of `stiffness` [force / length]; ``along["axial"]`` and ``along["transverse"]`` [force / length] act
-    along and across their line, or the unit vector `direction` (dim,) [-]. ModelError if the two are one, or are at one place
-    and have no line between them.
-    """
-    if first == second:
-        raise ModelError(
-            f"{name}: both ends are point {first}; without a second node a spring is attached to the ground"
-        )
-    dim = points.shape[1]
-    if along and direction is None:
-        direction = _line(name, points, first, second)
-    directions, values = _frame(stiffness, along, direction, dim)
-    rows = nodal_rows(
-        np.tile([first, second], (len(values), 1)), np.stack([-directions, directions], axis=1), points.size
-    )
-    return Springs(name, rows, values, False)
 
 
 def joined(
@@ -102,16 +73,26 @@ def joined(
     along: Mapping[str, float],
     direction: Array | None = None,
 ) -> Springs:
-    """Return springs between pairs of the `points` (n_points, dim) [length], as `between` describes them for one pair.
+    """Return springs between pairs of the `points` (n_points, dim) [length].
 
-    `ends` (n,) of int each are the first and the second points; `direction` (dim,) [-].
+    `ends` (n,) of int each are the first and the second points. Springs act along every axis of `stiffness`
+    [force / length]; ``along["axial"]`` and ``along["transverse"]`` [force / length] act along and across the line of a pair,
+    or the unit vector `direction` (dim,) [-]. ModelError if the two points of a pair are one, or are at one place and have
+    no line between them.
     """
-    parts = [
-        between(name, points, int(first), int(second), stiffness, along, direction)
-        for first, second in zip(*ends, strict=True)
-    ]
-    rows = csr_array(vstack([part.rows for part in parts], format="csr"))
-    return Springs(name, rows, np.concatenate([part.stiffness for part in parts]), False)
+    rows, values = [], []
+    for first, second in np.transpose(ends).tolist():
+        if first == second:
+            raise ModelError(
+                f"{name}: both ends are point {first}; without a second node a spring is attached to the ground"
+            )
+        axial = _line(name, points, first, second) if along and direction is None else direction
+        directions, k = _frame(stiffness, along, axial, points.shape[1])
+        rows.append(
+            nodal_rows(np.tile([first, second], (len(k), 1)), np.stack([-directions, directions], axis=1), points.size)
+        )
+        values.append(k)
+    return Springs(name, csr_array(vstack(rows, format="csr")), np.concatenate(values), False)
 
 
 def _line(name: str, points: Array, first: int, second: int) -> Array:

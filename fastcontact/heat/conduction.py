@@ -21,7 +21,7 @@ from fastcontact.mesh.mesh import Mesh
 
 @dataclass(frozen=True, eq=False)
 class Conduction:
-    """Solid cells that conduct heat, in the reference configuration.
+    """Solid cells that conduct heat, in the reference configuration or a deformed one.
 
     Attributes
     ----------
@@ -31,12 +31,15 @@ class Conduction:
     materials : sequence of Material
     number : mapping of str to ndarray of int (n_cells,)
         By solid element: every cell's material.
+    displacement : ndarray (n_points, dim), optional
+        Of the configuration; conductivities are those of reference positions [length].
     """
 
     mesh: Mesh
     kinematics: str
     materials: Sequence[Material]
     number: Mapping[str, Numbers]
+    displacement: Array | None = None
 
     def check(self) -> None:
         """Raise ModelError if some of the cells have no conductivity."""
@@ -84,8 +87,9 @@ class Conduction:
         mesh, (xi, weights) = self.mesh, integration_rule(elements.get(name))
         N, dN = elements.get(name).shape(xi), elements.get(name).gradient(xi)
         nodes = mesh.cells[name][rows]
-        gradient, _ = gradients_at(mesh.points[nodes], dN)
-        volume = cell_volumes(mesh.points[nodes], N, dN, self.kinematics == "axisymmetric") * weights
+        points = mesh.points if self.displacement is None else mesh.points + self.displacement
+        gradient, _ = gradients_at(points[nodes], dN)
+        volume = cell_volumes(points[nodes], N, dN, self.kinematics == "axisymmetric") * weights
         k, number = np.zeros((*volume.shape, mesh.dim, mesh.dim)), self.number[name][rows]
         for index in np.unique(number):
             cells = np.flatnonzero(number == index)

@@ -30,14 +30,63 @@ from fastcontact.linear.sparse_rows import Entries
 from fastcontact.mesh.mesh import Mesh
 
 
+class TemporaryHeat(Load):
+    """A prescribed temperature or a film, which acts in the load steps from one instant to another."""
+
+    begins: float
+    ends: float
+
+    @property
+    def label(self) -> str:
+        """What tells it from others of the same kind and group."""
+        return self.name if self.begins == -np.inf else f"{self.name} from {self.begins:g}"
+
+    @property
+    def temporary(self) -> bool:
+        """Whether it does not act in all load steps."""
+        return self.begins > -np.inf or self.ends < np.inf
+
+    def acts_from(self, begin: float) -> bool:
+        """Return whether it acts in the load step that begins at an instant."""
+        return self.begins <= begin < self.ends
+
+    def check(self, mesh: Mesh, kinematics: str) -> None:
+        """Raise MeshError or ModelError if it cannot act on this mesh."""
+        super().check(mesh, kinematics)
+        if not self.begins < self.ends:
+            raise ModelError(f"{self.name} begins at {self.begins:g} and ends at {self.ends:g}: it must begin before")
+
+
 @dataclass(frozen=True)
-class FixedTemperature(Load):
-    """A prescribed temperature of the nodes of a group [temperature]; histories multiply its rise over the reference."""
+class FixedTemperature(TemporaryHeat):
+    """A prescribed temperature of the nodes of a group [temperature]; histories multiply its rise over the reference.
+
+    One that begins later goes from the rise that it finds there, `reached` (n_points,), to the next point of its history.
+    """
 
     KIND = "the temperature"
     group: str
     value: Value
     ramp: Table | None = None
+    begins: float = -np.inf
+    ends: float = np.inf
+    reached: Array | None = None
+
+    def check(self, mesh: Mesh, kinematics: str) -> None:
+        """Raise MeshError or ModelError if it cannot act on this mesh."""
+        super().check(mesh, kinematics)
+        if self.begins > -np.inf and self.ramp is None:
+            raise ModelError(
+                f"{self.name} begins at {self.begins:g} without a ramp: give it one, to the next point of which it goes "
+                "from what it finds"
+            )
+
+    def history(self) -> tuple[Table | None, Table]:
+        """Return the history of the value, and that of what it finds: one goes as the other comes."""
+        later = [point for point in self.ramp or () if point[0] > self.begins]
+        if self.reached is None or not later:
+            return self.ramp, ()
+        return ((self.begins, 0.0), *later), ((self.begins, 1.0), (later[0][0], 0.0))
 
     def _check_place(self, mesh: Mesh, kinematics: str) -> None:
         check_points(mesh, self.group, "no temperature can be prescribed on it")
@@ -102,7 +151,7 @@ class NodalHeat(Heating):
 
 
 @dataclass(frozen=True)
-class Film(Load):
+class Film(TemporaryHeat):
     """Convection from a group of facets into surroundings: ``coefficient * (temperature - ambient)`` [power / area].
 
     Attributes
@@ -119,6 +168,8 @@ class Film(Load):
     coefficient: Value
     ambient: Value
     ramp: Table | None = None
+    begins: float = -np.inf
+    ends: float = np.inf
 
     @property
     def values(self) -> Sequence[Value]:  # type: ignore[override]

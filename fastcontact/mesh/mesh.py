@@ -166,7 +166,6 @@ class Mesh:
         """Names of all groups: cell groups, then point groups not already named."""
         return list(self.cell_groups) + [name for name in self.point_groups if name not in self.cell_groups]
 
-    @typed(MeshError)
     def split(self, numbers: AnyArray) -> dict[str, Indices]:
         """Return by element the rows (m,) of its cells among the cell `numbers` (n,); elements without any are absent."""
         rows = {}
@@ -176,7 +175,6 @@ class Mesh:
                 rows[name] = (numbers[inside] - start).astype(np.intp)
         return rows
 
-    @typed(MeshError)
     def cells_of(self, group: str, dim: int | None = None) -> dict[str, AnyArray]:
         """Return the connectivity (n_cells, n_nodes) of a cell group by element, only that of dimension `dim` if given.
 
@@ -195,7 +193,6 @@ class Mesh:
         rows = self.split(self.cell_groups[group])
         return {name: self.cells[name][r] for name, r in rows.items() if dim is None or elements.get(name).dim == dim}
 
-    @typed(MeshError)
     def points_of(self, group: str) -> AnyArray:
         """Return the sorted point numbers (n,) of a group: a point group, or else all nodes of a cell group.
 
@@ -213,7 +210,6 @@ class Mesh:
             return f"the mesh has no groups at all, so none is '{group}': name groups in the mesher, or with Mesh.with_groups"
         return unknown(kind, group, known)
 
-    @typed(MeshError)
     def point(self, group: str) -> int:
         """Return the number of the only point of a group.
 
@@ -229,7 +225,6 @@ class Mesh:
         kept = {name: getattr(self, name) for name in ("points", "cells", "cell_groups", "point_groups")}
         return Mesh(**{**kept, **changes})
 
-    @typed(MeshError)
     def with_groups(
         self, cells: Mapping[str, ArrayLike] | None = None, points: Mapping[str, ArrayLike] | None = None
     ) -> Mesh:
@@ -239,7 +234,6 @@ class Mesh:
             point_groups={**self.point_groups, **(points or {})},
         )
 
-    @typed(MeshError)
     def with_facet_group(
         self,
         name: str,
@@ -300,7 +294,6 @@ class Mesh:
         rows = self.split(self.cell_groups[group])
         return {kind: np.isin(np.arange(len(block)), rows.get(kind, [])) for kind, block in self.solids.items()}
 
-    @typed(MeshError)
     def with_facets(self, groups: Mapping[str, Mapping[str, ArrayLike]]) -> Mesh:
         """Return the mesh with new groups of facets; facets that it lacks are added, groups of the same names replaced.
 
@@ -321,7 +314,6 @@ class Mesh:
         kept = {group: numbers(self.split(members)) for group, members in self.cell_groups.items()}
         return self.replace(cells=cells, cell_groups={**kept, **{name: numbers(rows[name]) for name in rows}})
 
-    @typed(MeshError)
     def merged_groups(self, name: str, members: Iterable[str]) -> Mesh:
         """Return the mesh with a new cell group `name`, the union of the cell groups `members`."""
         parts = []

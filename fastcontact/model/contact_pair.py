@@ -30,7 +30,8 @@ class ContactPair:
 
     With an `obstacle`, `primary` is empty; `motion` is the obstacle's displacement at multiplier 1 [length], and `ramp`
     a history of its own or None. Components of `force` that are not None drive the obstacle at multiplier 1 [force]. It turns
-    by `rotation`, with the history `rotation_ramp`, by default `ramp`.
+    by `rotation`, with the history `rotation_ramp`, by default `ramp`. A pair that was found, not named, knows its least gap
+    then, `found_gap` [length].
     """
 
     name: str
@@ -45,6 +46,7 @@ class ContactPair:
     rotation: Rotation | None = None
     rotation_ramp: Table | None = None
     fluid: FluidPressure | None = None
+    found_gap: float | None = None
 
     @property
     def method(self) -> str:

@@ -11,6 +11,7 @@ from fastcontact.elasticity.incompatible_modes import BENDING
 from fastcontact.elasticity.initial_states import ALWAYS, COMPONENTS
 from fastcontact.elasticity.loads import listed
 from fastcontact.elasticity.nonlinear_materials import NonlinearElastic
+from fastcontact.heat.loads import TemporaryHeat
 from fastcontact.model.contact_pair import ContactPair
 
 KINDS = {
@@ -55,6 +56,8 @@ def sentences(model: Any) -> Iterator[str]:
         yield f"Temperature: {value} over {temperature.reference:g} in {where}{_history(temperature.ramp)}."
     for load in model.heat_loads:
         history = _history(load.ramp)
+        if isinstance(load, TemporaryHeat) and load.temporary:
+            history += f", from {max(load.begins, 0.0):g} to {load.ends:g}"
         yield f"Heat: {load.name.removeprefix('the ')}: {', '.join(map(_value, load.values))}{history}."
     for state in model.initial_states:
         parts = [f"{COMPONENTS[number]} = {value:g}" for number, value in state.components.items()]

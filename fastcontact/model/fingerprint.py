@@ -20,6 +20,7 @@ from fastcontact.contact.formulations import FORMULATIONS
 from fastcontact.elasticity.incompatible_modes import BENDING
 from fastcontact.elasticity.materials import LinearElastic, Material
 from fastcontact.elasticity.varying_constants import Varying
+from fastcontact.heat.loads import TemporaryHeat
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.model import Model
@@ -147,8 +148,10 @@ def _take_object(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: A
         fields = [field for field in fields if field.name != "incompatible_modes"]
     if isinstance(value, (ContactPair, Support)) and value.rotation is None:  # likewise
         fields = [field for field in fields if not field.name.startswith("rotation")]
-    if isinstance(value, ContactPair) and value.fluid is None:
-        fields = [field for field in fields if field.name != "fluid"]
+    if isinstance(value, TemporaryHeat):
+        fields = [field for field in fields if field.name not in ("begins", "ends", "reached") or value.temporary]
+    if isinstance(value, ContactPair):
+        fields = [f for f in fields if f.name != "found_gap" and (f.name != "fluid" or value.fluid is not None)]
     if isinstance(value, LinearElastic):  # what the choice comes to, and nothing where it is plain, as in older files
         fields = [field for field in fields if field.name != "volumetric"]
         add(b"mean dilatation" if value.averaged else b"")

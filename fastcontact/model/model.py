@@ -20,6 +20,7 @@ from fastcontact.elasticity.loads import Load
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, TemporaryConstraint
 from fastcontact.elasticity.temperature import Temperature
 from fastcontact.errors import ModelError
+from fastcontact.heat.loads import TemporaryHeat
 from fastcontact.model.checks import check_motions, check_overlap, check_penetration, check_ramps, check_supports
 from fastcontact.model.description import sentences
 from fastcontact.model.obstacle_rotation import check_turns
@@ -31,12 +32,15 @@ from fastcontact.model.ramp import PartHistory, Ramp, combined, multiplier
 from fastcontact.model.rigid_motions import free_motions, generalised, resisting, unstopped
 
 # What a user finds in a model beside `add_...`; the rest serves the analysis.
+# What acts in some load steps alone.
+TEMPORARY = (TemporaryConstraint, TemporaryHeat)
 PUBLIC = (
     "check", "contact", "couple", "describe", "fix", "fix_temperature", "internal_forces", "kinematics", "loads", "materials",
     "mesh", "prescribe", "relate", "relate_groups", "strain", "supports", "units",
 )  # fmt: skip
 
 
+@typed(ModelError)
 class Model(ModelSupports):
     """An elastic contact problem.
 
@@ -107,7 +111,6 @@ class Model(ModelSupports):
         """
         return "\n".join(sentences(self))
 
-    @typed(ModelError)
     def check(self, ramp: Ramp | None = None) -> None:
         """Check the whole model and the consistency of its histories with `ramp`; `solve` begins with this check.
 
@@ -132,13 +135,20 @@ class Model(ModelSupports):
         fastcontact.errors.ModelError: 1 rigid-body motion is not supported: body 'BLOCK': translation along x. ...
         """
         self.material_numbers()
-        if self.temperatures or self.initial_states:
-            self.refuse_nonlinear("temperatures and initial states are")
+        if self.initial_states:
+            self.refuse_nonlinear("initial stresses and strains are")
         fixed, prescribed = self.prescribed_by_ramp()
         self._tell_axis()
         forces = self.forces_by_ramp()
         self.thermal_forces_by_ramp()
-        self.check_heat()
+        for begin in self._changes():
+            acting = self._acting(begin)
+            try:
+                acting.check_heat()
+                if self.conducts and not acting.conducts:
+                    raise ModelError("no load of heat acts, so that nothing determines temperatures: add a film")
+            except ModelError as error:
+                raise _in_steps_after(begin, error) from None
         if ramp is not None:
             items: list[Support | Load | MultiPointConstraint | Temperature | InitialState] = [
                 *self.supports, *self.loads, *self.relations, *self.temperatures, *self.initial_states,
@@ -164,21 +174,22 @@ class Model(ModelSupports):
             self.mesh, self.kinematics, [(p.secondary, p.primary) for p in self.contact if p.obstacle is None]
         )
         for begin in self._changes():
-            acting = copy.copy(self)
-            acting.relations = [
-                r for r in self.relations if not isinstance(r, TemporaryConstraint) or r.acts_from(begin)
-            ]
             try:
-                acting._check_motions(fixed, list(self.force_driven.forces(forces).values()))
+                self._acting(begin)._check_motions(fixed, list(self.force_driven.forces(forces).values()))
             except ModelError as error:
-                raise ModelError(f"in the load steps after {begin:g}: {error}" if begin else str(error)) from None
+                raise _in_steps_after(begin, error) from None
+
+    def _acting(self, begin: float) -> Model:
+        """Return the model with what acts in the load step that begins at an instant."""
+        acting = copy.copy(self)
+        acting.relations = [r for r in self.relations if not isinstance(r, TemporaryConstraint) or r.acts_from(begin)]
+        acting.heat_loads = [r for r in self.heat_loads if not isinstance(r, TemporaryHeat) or r.acts_from(begin)]
+        return acting
 
     def _changes(self) -> list[float]:
-        """Return the instants at which temporary relations begin or end, and 0."""
-        temporary = [relation for relation in self.relations if isinstance(relation, TemporaryConstraint)]
-        return sorted(
-            {0.0, *(t for relation in temporary for t in (relation.begins, relation.ends) if 0.0 < t < np.inf)}
-        )
+        """Return the instants at which temporary relations, temperatures or films begin or end, and 0."""
+        temporary = [own for own in (*self.relations, *self.heat_loads) if isinstance(own, TEMPORARY)]
+        return sorted({0.0, *(t for own in temporary for t in (own.begins, own.ends) if 0.0 < t < np.inf)})
 
     def _check_relations(self, fixed: Mask, prescribed: Mapping[PartHistory, Array], ramp: Ramp) -> None:
         relations = [relation for relation in self.relations if not isinstance(relation, TemporaryConstraint)]
@@ -202,3 +213,8 @@ class Model(ModelSupports):
         k = len(motions)
         gaps, driven_by = np.vstack([*rows, np.empty((0, k))]), np.vstack([*works, np.empty((0, k))])
         check_motions(self.mesh, motions.combined(unstopped(gaps, driven_by)))
+
+
+def _in_steps_after(begin: float, error: ModelError) -> ModelError:
+    """Return an error of the load steps that begin at an instant."""
+    return ModelError(f"in the load steps after {begin:g}: {error}") if begin else error

@@ -78,6 +78,9 @@ XDMF_TYPES = {
 
 STEP_ROW = np.dtype([("index", "<i8"), ("load_factor", "<f8"), ("notes_first", "<i8"), ("notes_count", "<i8")])
 
+# Where the rows of a contact pair for a step stand.
+PLACES = ("first", "count", "primary_first", "primary_count")
+
 # Where the rows of nodal stress by material of a step stand.
 SIDES_STEP = np.dtype([("first", "<i8"), ("count", "<i8")])
 
@@ -120,14 +123,14 @@ def primary_row(dim: int) -> np.dtype[Any]:
 def contact_step(dim: int) -> np.dtype[Any]:
     """Return the type of the row that a contact pair has for each step: its rows, resultant, radius, work, obstacle.
 
-    Files of schema 2 from before `primary_row` have neither that table nor its place.
+    All but the `PLACES` are attributes of a `step.ContactResult`, NaN for None. Files of schema 2 from before `primary_row`
+    have neither that table nor its place.
     """
     sums = [("force", "<f8", (dim,)), ("radius", "<f8", (2,)), ("dissipation", "<f8")]
     sums.append(("obstacle_displacement", "<f8", (dim,)))  # NaN between bodies
     sums += [("obstacle_angle", "<f8"), ("torque", "<f8")]  # NaN where nothing turns
     sums += [("middle", "<f8", (dim,)), ("tangent", "<f8", (dim,))]  # NaN without a tangent
-    places = [(name, "<i8") for name in ("first", "count", "primary_first", "primary_count")]
-    return np.dtype([*places, *sums])
+    return np.dtype([*((name, "<i8") for name in PLACES), *sums])
 
 
 def material_row(dim: int) -> np.dtype[Any]:

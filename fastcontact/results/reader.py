@@ -33,6 +33,9 @@ from fastcontact.results.units import units_of_results
 if TYPE_CHECKING:
     import pandas
 
+# Resultants of contact that are None where files have NaN.
+OR_NONE = ("obstacle_displacement", "obstacle_angle", "torque", "tangent")
+
 
 @typed(FileError)
 def open_results(path: PathLike) -> Results:
@@ -432,29 +435,19 @@ def _rows(table: Any, step: Any, prefix: str, name: str) -> Any:
 def _read_contact(pair: Any, number: int, name: str, formulation: str) -> ContactResult:
     step = pair["steps"][number]
     rows = _rows(pair["rows"], step, "", f"the contact table of '{name}'")
-    columns = {column: np.ascontiguousarray(rows[column]) for column in rows.dtype.names}
+    columns: dict[str, Any] = {column: np.ascontiguousarray(rows[column]) for column in rows.dtype.names}
     for mask in {"active", "sticking"} & set(columns):
         columns[mask] = columns[mask].astype(bool)
-    inner, outer = step["radius"].tolist()
-    # Early files of schema 1 have no shear, sticking, dissipation or obstacles: their analyses had none.
-    known = step.dtype.names
-    moved = step["obstacle_displacement"].copy() if "obstacle_displacement" in known else np.array([np.nan])
-    faced = {}
-    if "primary_first" in known:  # earlier files of schema 2 have no forces on the primary side
+    # Earlier files have fewer of these, and no forces on the primary side: defaults of a ContactResult stand for them.
+    resultants: dict[str, Any] = {}
+    for column in set(step.dtype.names).difference(layout.PLACES):
+        value = step[column]
+        if column in OR_NONE and not np.isfinite(value).all():
+            value = None
+        resultants[column] = value.item() if isinstance(value, np.generic) else value
+    resultants["radius"] = tuple(step["radius"].tolist())
+    faced: dict[str, Any] = {}
+    if "primary_first" in step.dtype.names:
         table = _rows(pair["primary"], step, "primary_", f"the table of primary forces of '{name}'")
         faced = {f"primary_{column}": np.ascontiguousarray(table[column]) for column in ("points", "force_vectors")}
-    turned = [float(step[n]) if n in known and np.isfinite(step[n]) else None for n in ("obstacle_angle", "torque")]
-    return ContactResult(
-        name=name,
-        formulation=formulation,
-        force=step["force"].copy(),
-        radius=(inner, outer),
-        obstacle_angle=turned[0],
-        torque=turned[1],
-        dissipation=float(step["dissipation"]) if "dissipation" in known else 0.0,
-        obstacle_displacement=moved if np.isfinite(moved).all() else None,
-        middle=step["middle"].copy() if "middle" in known else None,  # type: ignore[arg-type]
-        tangent=step["tangent"].copy() if "tangent" in known and np.isfinite(step["tangent"]).all() else None,
-        **faced,  # type: ignore[arg-type]
-        **columns,  # type: ignore[arg-type]
-    )
+    return ContactResult(name=name, formulation=formulation, **resultants, **faced, **columns)

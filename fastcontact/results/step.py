@@ -381,11 +381,12 @@ class StepResult:
     def work(self) -> dict[str, float]:
         """Energies at the end of the step, and works of all steps so far [energy].
 
-        ``strain_energy``, of springs of the model, too, and of temperatures as if they were forces; ``plastic_work``;
-        ``external_work``, of loads, supports and obstacles; ``friction_work``; ``friction_while_touching``, what of it nodes
-        do in the step in which they close, which is too large in long steps; ``penalty_energy``, of springs at contacts
-        and of layers that are stretched; ``energy_released``, what breaking these has taken, as their law has it;
-        ``imbalance``, the external work less all others. Empty in files from before it was told, and behind steps of these.
+        ``strain_energy``, of springs of the model, too, and of temperatures as if they were forces, but the elastic energy
+        of nonlinear bodies; ``plastic_work``; ``external_work``, of loads, supports, obstacles and heat; ``friction_work``;
+        ``friction_while_touching``, what of it nodes do in the step in which they close, which is too large in long steps;
+        ``penalty_energy``, of springs at contacts and of layers that are stretched; ``energy_released``, what breaking
+        these has taken, as their law has it; ``imbalance``, the external work less all others. Empty in files from before
+        it was told, and behind steps of these.
         """
         return dict(self.iterations.get("work", {}))
 

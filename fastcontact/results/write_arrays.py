@@ -5,17 +5,14 @@ What a step adds counts only when the number of steps is raised, which the write
 
 from __future__ import annotations
 
-import contextlib
 import json
-import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import cache
-from importlib import metadata
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fastcontact._tools.versions import versions
 from fastcontact.arrays import AnyArray
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results import layout
@@ -93,11 +90,13 @@ def _write_steps_group(
 
 def write_own(file: Any, mesh: Mesh, kinematics: str, case_text: str, units: Mapping[str, str]) -> None:
     """Write /fastcontact: the mesh with all its cells and groups, the case, and room for the steps."""
+    import h5py
+
     group = file.create_group("fastcontact")
     group.attrs["schema"] = np.int64(layout.SCHEMA)
     group["kinematics"] = as_json(kinematics)
     group["case"] = as_json(case_text)
-    group["versions"] = as_json(_versions())
+    group["versions"] = as_json({**versions(), "hdf5": h5py.version.hdf5_version})
     if units:
         group["units"] = as_json(dict(units))
     stored = group.create_group("mesh")
@@ -128,18 +127,6 @@ def _write_groups(parent: Any, name: str, groups: Any) -> None:
     group["names"] = as_json(list(groups))
     group["sizes"] = np.array([len(members) for members in groups.values()], np.int64)
     _packed(group, "members", np.concatenate([np.empty(0, np.int32), *groups.values()]))
-
-
-@cache
-def _versions() -> dict[str, str]:
-    import h5py
-
-    packages = ("fastcontact", "numpy", "scipy", "numba", "pyamg", "h5py")
-    versions = {"python": ".".join(map(str, sys.version_info[:3])), "hdf5": h5py.version.hdf5_version}
-    for package in packages:
-        with contextlib.suppress(metadata.PackageNotFoundError):
-            versions[package] = metadata.version(package)
-    return versions
 
 
 def _packed(parent: Any, name: str, values: AnyArray) -> None:
@@ -281,15 +268,9 @@ def _append_contact(pair: Any, number: int, contact: ContactResult | None) -> No
         for name in table.dtype.names or ():
             table[name] = getattr(contact, name)
         row["first"], row["count"] = len(pair["rows"]), len(table)
-        row["force"], row["radius"] = contact.force, contact.radius
-        row["dissipation"] = contact.dissipation
-        moved = contact.obstacle_displacement
-        row["obstacle_displacement"] = np.nan if moved is None else moved
-        for name in {"obstacle_angle", "torque"} & set(row.dtype.names or ()):  # likewise in newer files alone
+        for name in set(row.dtype.names or ()).difference(layout.PLACES):
             value = getattr(contact, name)
             row[name] = np.nan if value is None else value
-        if "tangent" in (row.dtype.names or ()):  # not in a file of an earlier schema that is resumed
-            row["middle"], row["tangent"] = contact.middle, np.nan if contact.tangent is None else contact.tangent
         _extend(pair["rows"], table)
         if "primary" in pair:  # not in files begun before there was such a table
             faced = np.zeros(len(contact.primary_points), pair["primary"].dtype)

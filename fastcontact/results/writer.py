@@ -45,6 +45,7 @@ MARGIN = 1 << 19
 INDICES = 1 << 18
 
 
+@typed(FileError)
 class ResultWriter:
     """A result file to which one step after the other is written.
 
@@ -102,7 +103,6 @@ class ResultWriter:
     ...     fastcontact.solve(model, ramp=fastcontact.linear_ramp(20), on_step=out.write)
     """
 
-    @typed(FileError)
     def __init__(
         self,
         path: PathLike,
@@ -183,7 +183,6 @@ class ResultWriter:
                 run["log"] = {"failed_step": error.history}
             self._finish(run)
 
-    @typed(FileError)
     def write(self, step: StepResult) -> None:
         """Append a step; when this returns the step is safe from a crash of the process, unless it is in the background.
 
@@ -250,7 +249,6 @@ class ResultWriter:
                 f"step {step.index} belongs to another case than step {index}: write it to a file of its own"
             )
 
-    @typed(FileError)
     def close(self, log: Any = None, warnings: Iterable[str] = ()) -> None:
         """Finish the file; a second call does nothing.
 

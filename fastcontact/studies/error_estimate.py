@@ -22,6 +22,8 @@ from fastcontact.elasticity.initial_states import StressOffset
 from fastcontact.elasticity.smoothed_stress import smoothed_stress
 from fastcontact.errors import ModelError
 from fastcontact.mesh import elements
+from fastcontact.mesh.area_vectors import area_vectors
+from fastcontact.mesh.topology import same_facets
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.studies.error_norms import stress_in_cells
@@ -131,7 +133,8 @@ def _add_contact(model: Model, result: ContactResult, smooth: dict[str, Array], 
         reference = elements.get(block.element)
         N = reference.shape(xi)
         area = facet_measure(block.facets, block.element, mesh.points, xi, model.kinematics == "axisymmetric") * weights
-        normals = _normals(mesh.points[block.facets], reference.gradient(xi))
+        normals = area_vectors(mesh.points[block.facets], reference.gradient(xi))
+        normals /= np.linalg.norm(normals, axis=2, keepdims=True)
         for number, name in enumerate(mesh.solids):
             facet, cell, local = _owners(name, mesh.cells[name], block.facets)
             if not len(facet):
@@ -150,16 +153,6 @@ def _add_contact(model: Model, result: ContactResult, smooth: dict[str, Array], 
             np.add.at(contact, first[number] + cell, np.where(length > 0, value, 0.0))
 
 
-def _normals(corners: Array, gradient: Array) -> Array:
-    """Return unit outward normals (n_facets, n_q, dim) of oriented facets."""
-    tangent = np.einsum("qkj,fkd->fqdj", gradient, corners)
-    if corners.shape[2] == 3:
-        normal = np.cross(tangent[..., 0], tangent[..., 1])
-    else:
-        normal = np.stack([tangent[..., 1, 0], -tangent[..., 0, 0]], axis=-1)
-    return np.asarray(normal / np.linalg.norm(normal, axis=2, keepdims=True))
-
-
 def _traction(stress: Array, normal: Array) -> Array:
     """Return stress times normal (..., dim)."""
     tensor = stress[..., [[0, 3], [3, 1]] if normal.shape[-1] == 2 else [[0, 3, 5], [3, 1, 4], [5, 4, 2]]]
@@ -169,15 +162,8 @@ def _traction(stress: Array, normal: Array) -> Array:
 def _owners(name: str, cells: Numbers, facets: Numbers) -> tuple[Indices, Indices, Indices]:
     """Return the facets that belong to cells of a kind, those cells, and the facets' nodes as local nodes of the cells."""
     near = np.flatnonzero(np.isin(cells, facets).sum(axis=1) >= facets.shape[1])
-    found_facets, found_cells, found_local = [], [], []
-    wanted = {tuple(sorted(facet)): row for row, facet in enumerate(facets.tolist())}
-    for cell in near.tolist():
-        nodes = cells[cell].tolist()
-        for side in elements.get(name).facets:
-            row = wanted.get(tuple(sorted(nodes[k] for k in side)))
-            if row is not None:
-                found_facets.append(row)
-                found_cells.append(cell)
-                found_local.append([nodes.index(k) for k in facets[row].tolist()])
-    local = np.array(found_local, np.intp).reshape(len(found_local), facets.shape[1])
-    return np.array(found_facets, np.intp), np.array(found_cells, np.intp), local
+    sides = [list(side) for side in elements.get(name).facets if len(side) == facets.shape[1]]
+    rows = np.array([same_facets(facets, cells[near][:, side]) for side in sides], np.intp).reshape(-1, len(near))
+    cell, side = np.nonzero(rows.T >= 0)
+    owners, row = cells[near[cell]], rows[side, cell]
+    return row, near[cell], np.argmax(owners[:, None] == facets[row][:, :, None], axis=2)

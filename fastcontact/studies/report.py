@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from fastcontact._tools.html_table import html_table
+from fastcontact._tools.versions import versions
 from fastcontact.arrays import AnyArray
 from fastcontact.cases.case import Case
-from fastcontact.cases.summary import versions
 from fastcontact.results.conversions import data_frame
 from fastcontact.results.units import units_of_results
 from fastcontact.studies.quantities import unit

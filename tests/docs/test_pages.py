@@ -16,7 +16,10 @@ def name(page):
 
 @pytest.mark.filterwarnings("default::pytest.PytestWarning")
 @pytest.mark.parametrize("page", [page for page in PAGES if any(map(pages.runnable, pages.blocks(page)))], ids=name)
-def test_all_blocks_of_a_page_run(page, tmp_path):
+def test_all_blocks_of_a_page_run(page, tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        "fastcontact.studies.execute._processors", lambda: 1
+    )  # processes are what `cluster.md` asks for
     for block in pages.run_page(page, tmp_path):
         text = f"{name(page)}:{block.line} was not run: it needs {', '.join(block.missing)}"
         warnings.warn(pytest.PytestWarning(text), stacklevel=1)

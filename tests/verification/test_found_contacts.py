@@ -55,6 +55,23 @@ def test_stacked_blocks_touch_at_their_faces_and_pass_the_pressure_on(kinematics
         assert contact.pressure == pytest.approx(np.full(len(contact.points), 2.0), rel=1e-6)
 
 
+@pytest.mark.parametrize("loaded", [True, False])
+def test_a_clearance_that_was_found_is_told_only_where_nothing_closes(loaded):
+    """A wall 0.2 beside a stack of two stands for the hole round a shank."""
+    wall = fc.generate.renamed(block((1.0, 2.0), (2, 4), origin=(1.2, 0.0), name="WALL"), lambda group: f"W {group}")
+    model = elastic_model(union(stacked("quad4", 2, 3), wall), "plane_strain", E=100.0, nu=0.0)
+    assert sorted(round(pair.gap[0], 9) for pair in model.add_contacts(distance=0.3)) == [0.0, 0.2, 0.2]
+    for group in ("A BOTTOM", "W BOTTOM"):
+        model.fix(group, "xy")
+    model.prescribe("B TOP", x=0.0, y=-0.01 if loaded else 0.01)
+    if loaded:
+        fc.solve(model, 1)  # warnings are errors
+        return
+    with pytest.warns(fc.FastcontactWarning, match="never closed") as told:
+        fc.solve(model, 1)
+    assert sum("the smallest gap is 0.2" in str(warning.message) for warning in told) == 2
+
+
 def test_a_body_in_a_corner_has_a_pair_for_each_wall():
     seat = fc.generate.merge_points(
         union(block((3.0, 1.0), (6, 2)), block((1.0, 2.0), (2, 4), origin=(2.0, 1.0))), 1e-9

@@ -298,6 +298,34 @@ def test_free_expansion_by_conduction_is_without_stress():
     assert first.temperature == pytest.approx(70.0)
 
 
+def test_temperatures_and_films_come_and_go():
+    mesh = fc.generate.block((1.0, 0.5), (4, 2))
+    model = fc.Model(mesh, "plane_strain", reference_temperature=20.0)
+    model.add_material(fc.LinearElastic(E=1.0, nu=0.3, conductivity=2.0))
+    model.fix("LEFT", "xy")
+    model.fix_temperature("LEFT", 100.0, ramp=[(0.0, 1.0), (4.0, 1.0)])
+    model.add_film("RIGHT", 2.0, 20.0, ends=2.0)
+    model.fix_temperature("RIGHT", 220.0, ramp=[(0.0, 0.0), (1.0, 0.0), (2.0, 1.0), (4.0, 1.0)], begins=1.0, ends=3.0)
+    steps = fc.solve(model, [1.0, 1.5, 2.0, 3.0, 4.0])
+    ends = [step.temperature[mesh.points_of("RIGHT")] for step in steps]
+    assert ends == [pytest.approx(value, rel=1e-12) for value in (60.0, 140.0, 220.0, 220.0, 100.0)]
+    films = [step.heat["films"] for step in steps]
+    assert films == pytest.approx([-40.0, -120.0, -200.0, 0.0, 0.0], rel=1e-12)
+    text = model.describe()
+    assert "from 0 to 2" in text
+    assert "from 1 to 3" in text
+
+
+def test_spans_that_cannot_be_are_refused():
+    model = fc.Model(fc.generate.block(), "plane_strain")
+    with pytest.raises(fc.errors.ModelError, match="begins at 1 without a ramp: give it one"):
+        model.fix_temperature("RIGHT", 220.0, begins=1.0)
+    with pytest.raises(
+        fc.errors.ModelError, match="the film on 'RIGHT' begins at 2 and ends at 1: it must begin before"
+    ):
+        model.add_film("RIGHT", 2.0, 20.0, begins=2.0, ends=1.0)
+
+
 def test_ends_of_a_period_have_one_temperature():
     mesh = fc.generate.block((1.0, 4.0), (2, 8), "quad4")
     model = fc.Model(mesh, "plane_stress")

@@ -16,13 +16,12 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh, lobp
 
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.errors import ConvergenceError, ModelError
+from fastcontact.linear.multigrid.hierarchy import COARSEST
 from fastcontact.linear.multigrid.solver import Multigrid
 from fastcontact.linear.protocol import LinearSolver
 
 # Error of vectors, to the square of which eigenvalues are right.
 ACCURACY = 1e-5
-# Below so many unknowns all eigenvalues are found at once.
-FEW = 200
 UNSTABLE = (
     "the settled step is not stable: small motions about it grow by themselves, or what has no mass is free; take a lower "
     "load, hold what slides (hold_sliding=True), or leave out the stiffness by stresses (stress_stiffening=False)"
@@ -58,7 +57,7 @@ def lowest(
         If the iteration does not end.
     """
     K, M = matrices
-    if free.sum() < max(FEW, 3 * n):
+    if free.sum() < max(COARSEST, 3 * n):
         return _of_few(K, M, np.flatnonzero(free), n, shift)
     shifted = bsr_array(K + shift * M)
     shifted.sort_indices()

@@ -7,11 +7,13 @@ Contact Mechanics, 2006, section 5.3: the active set held). Penalties are spring
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import block_diag, bsr_array, csr_array, diags_array, vstack
 
+from fastcontact.analysis.contact_resultants import end_of
+from fastcontact.analysis.wear import at_points
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
@@ -98,29 +100,13 @@ def held_contact(model: Model, step: StepResult | None, held: HeldMotions, hold_
             continue
         if bound.options.cohesion is not None:
             raise ModelError(f"modes know no cohesion or adhesion: tie contact '{pair.name}', or leave it out")
-        at = _configuration(model, step, contact)
+        at = Configuration.undeformed(model.mesh.points) if step is None else end_of(step, step, pair.name)
+        if contact is not None and contact.wear is not None:
+            at = replace(at, worn=at_points(contact.points, contact.wear, model.mesh.n_points))
         position = at.obstacle if contact is not None else np.zeros(model.mesh.dim)
         constraints = model.force_driven.constraints(pair.name, bound.constraints(at), position)
         conditions += _conditions(bound, constraints, contact, hold_sliding)
     return conditions
-
-
-def _configuration(model: Model, step: StepResult | None, contact: ContactResult | None) -> Configuration:
-    """Return the configuration of both sides of a pair."""
-    if step is None or contact is None:
-        return Configuration.undeformed(model.mesh.points)
-    still = np.zeros(model.mesh.dim)
-    obstacle = still if contact.obstacle_displacement is None else contact.obstacle_displacement
-    angle, u = contact.obstacle_angle or 0.0, step.displacement
-    return Configuration(u, u, obstacle, obstacle, angle=angle, angle_start=angle, worn=_worn(model, contact))
-
-
-def _worn(model: Model, contact: ContactResult) -> Array | None:
-    if contact.wear is None:
-        return None
-    depth = np.zeros(model.mesh.n_points)
-    depth[contact.points] = contact.wear
-    return depth
 
 
 def _conditions(

@@ -40,7 +40,8 @@ def settled_step(
     state = replace(state, obstacles=problem.obstacles_at(load, state.u))
     loaded = with_loads(problem, load)
     start, expected = prepare_start(problem, state, load, loaded)
-    settled, u, _ = equilibrium(problem, start, load, loaded, expected)
+    balanced = equilibrium(problem, start, load, loaded, expected)
+    settled, u = balanced.settled, balanced.u
     if settled is None:
         none = np.empty(0)
         solution = Equilibrium(u, none, none, np.empty(0, bool), np.empty(0, bool), 1)

@@ -458,32 +458,27 @@ def _friction(law: Interaction, n_steps: int) -> dict[str, Any]:
 def _law(content: Content, material: Material, axes: Any, modes: bool) -> Any:
     """Return the material of the model along axes, with its expansion and incompatible modes where elements have them."""
     if content.heat == "alone":
-        return _with_axes(HELD, axes, conductivity=_conductivity(content, material))
+        return _with_axes(material, HELD, axes, conductivity=_conductivity(content, material))
     assert material.law is not None
     law, expansion = material.law(axes), material.expansion
-    if isinstance(law, NonlinearElastic) and content.heat:
-        raise material.location.refuse(f"material '{material.name}': heat is supported in elastic bodies only")
-    if isinstance(law, NonlinearElastic):
-        if modes:
-            content.note(
-                material.location, f"material '{material.name}': incompatible modes are left out, since it is nonlinear"
-            )
-        law = copy.copy(law)
-        object.__setattr__(law, "density", material.density)
-        return law
-    law = replace(law, incompatible_modes=modes, density=material.density)
+    if isinstance(law, NonlinearElastic) and modes:
+        content.note(
+            material.location, f"material '{material.name}': incompatible modes are left out, since it is nonlinear"
+        )
+        modes = False
+    law = _with(law, incompatible_modes=modes, density=material.density)
     if content.heat or material.conductivity is not None:
-        law = _with_axes(law, axes, conductivity=_conductivity(content, material))
+        law = _with_axes(material, law, axes, conductivity=_conductivity(content, material))
     heated = content.heat or any(given.block.keyword == "TEMPERATURE" for step in content.steps for given in step.given)
     if expansion is None:
         if heated:
             content.note(
                 material.location, f"material '{material.name}' has no *EXPANSION: temperatures do not strain it"
             )
-        return replace(law, expansion=0.0) if heated else law
+        return _with(law, expansion=0.0) if heated else law
     if not heated:
         content.note(material.location, f"material '{material.name}': without temperatures the expansion has no effect")
-    return _with_axes(law, axes, expansion=expansion)
+    return _with_axes(material, law, axes, expansion=expansion)
 
 
 def _conductivity(content: Content, material: Material) -> float | tuple[float, ...] | None:
@@ -498,13 +493,27 @@ def _conductivity(content: Content, material: Material) -> float | tuple[float, 
     return None
 
 
-def _with_axes(law: Any, axes: Any, **constants: Any) -> Any:
+def _with(law: Any, **constants: Any) -> Any:
+    """Return a material with further constants; hyperelastic ones are not made from their fields."""
+    if not isinstance(law, NonlinearElastic):
+        return replace(law, **constants)
+    law = copy.copy(law)
+    for name, value in constants.items():
+        object.__setattr__(law, name, value)
+    return law
+
+
+def _with_axes(material: Material, law: Any, axes: Any, **constants: Any) -> Any:
     """Return a material with further constants, orthotropic where these differ along the axes."""
     if isinstance(law, LinearElastic) and any(isinstance(value, tuple) for value in constants.values()):
+        if isinstance(law, NonlinearElastic):
+            raise material.location.refuse(
+                f"material '{material.name}': expansion and conductivity along axes are supported in elastic materials only"
+            )
         G = law.E / (2.0 * (1.0 + law.nu))
         kept = {name: getattr(law, name) for name in ("density", "expansion", "conductivity")}
         law = Orthotropic((law.E,) * 3, (law.nu,) * 3, (G,) * 3, axes, **kept)
-    return replace(law, **constants)
+    return _with(law, **constants)
 
 
 def _parts(step: Step) -> list[float]:

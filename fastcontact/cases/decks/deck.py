@@ -212,7 +212,7 @@ def read_deck(path: PathLike) -> Deck:
     Warns
     -----
     FastcontactWarning
-        If a step has NLGEOM, and small strains are solved nevertheless: with plasticity, temperatures, couplings.
+        If a step has NLGEOM, and small strains are solved nevertheless: with plasticity, couplings.
 
     Examples
     --------

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
-from typing import Any
+from typing import Any, Generic
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import Assembled, Element, Face
 from fastcontact.cases.decks.blocks import Block, Location, Row
 from fastcontact.cases.decks.content import Content, Given, Interaction, Material, Step
-from fastcontact.cases.decks.histories import ByShape, Histories
+from fastcontact.cases.decks.histories import ByShape, Histories, Name
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.cases.decks.refusals import refusing
 from fastcontact.contact.conductance import Conductance
@@ -164,6 +164,30 @@ class Exchange:
     coefficient: float | None = None
 
 
+class Spans(Generic[Name]):
+    """From which load factor to which things act, in steps that give them and let them go."""
+
+    def __init__(self) -> None:
+        self._begun: dict[Name, float] = {}
+        self._over: dict[Name, list[tuple[float, float]]] = {}
+
+    def advance(self, history: Histories[Name], begin: float) -> None:
+        """Go on to the step that begins at a load factor, before the history does."""
+        for name in history.dying:
+            self._over.setdefault(name, []).append((self._begun.pop(name), begin))
+        for name in (*history.changing, *history.first):
+            self._begun.setdefault(name, begin)
+
+    def of(self, names: Iterable[Name]) -> dict[tuple[float, float], list[Name]]:
+        """Return the names that act between the same load factors."""
+        alike: dict[tuple[float, float], list[Name]] = {}
+        for name in names:
+            last = [(self._begun[name], np.inf)] if name in self._begun else []
+            for span in (*self._over.get(name, ()), *last):
+                alike.setdefault(span, []).append(name)
+        return {(begin, end): members for (begin, end), members in alike.items() if begin < end}
+
+
 class HeatConditions:
     """Prescribed temperatures, heat at nodes, fluxes and films of a deck with their histories."""
 
@@ -177,6 +201,9 @@ class HeatConditions:
         self.powers: Histories[int] = Histories(content)
         self.fluxes: Histories[Exchange] = Histories(content)
         self.films: Histories[Exchange] = Histories(content, rest=self.rest)
+        self.fixed: Spans[int] = Spans()
+        self.blown: Spans[Exchange] = Spans()
+        self.film_of: dict[tuple[str, Face | None], Exchange] = {}
         self.begun = False
 
     @property
@@ -224,8 +251,21 @@ class HeatConditions:
                 raise row.location.refuse(f"the coefficient {row.number(3):g} of the film must not be negative")
             for name in self._places(keyword, row, row.number(3) if film else None):
                 if film:
-                    self.rest[name] = self.reference
+                    self._in_place_of_others(name, row)
                 history.give(name, row.number(2), given.amplitude, row.location)
+
+    def _in_place_of_others(self, film: Exchange, row: Row) -> None:
+        """Let a film take the place of one with another coefficient on the same face."""
+        self.rest[film] = self.reference
+        before = self.film_of.get((film.keyword, film.face))
+        if before is not None and before != film:
+            if before in self.films.changing:
+                raise row.location.refuse(
+                    f"{film.coefficient:g} is the second coefficient here in one step, after {before.coefficient:g}"
+                )
+            if before in self.films.tracks and self.films.tracks[before].alive:
+                self.films.dying[before] = None
+        self.film_of[film.keyword, film.face] = film
 
     def _places(self, keyword: str, row: Row, coefficient: float | None) -> list[Exchange]:
         """Return where a line of fluxes or films acts."""
@@ -245,17 +285,9 @@ class HeatConditions:
 
     def advance(self, number: int, step: Step) -> None:
         """Go on to the end of step `number`, from 1."""
-        for history, noun in ((self.temperatures, "a temperature"), (self.films, "a film")):
-            given: Histories[Any] = history  # type: ignore[assignment]
-            for name in given.changing:
-                if self.begun and name not in given.tracks:
-                    raise given.changing.get(name)[2].refuse(
-                        f"{noun} that comes in a later step is not supported: give it from the first one on"
-                    )
-            for name in given.dying:
-                raise step.location.refuse(
-                    f"{noun} of line {given.tracks[name].location.line} that is let go is not supported"
-                )
+        begin = float(number - 1) if self.begun else -np.inf
+        self.fixed.advance(self.temperatures, begin)
+        self.blown.advance(self.films, begin)
         for other in self.histories:
             other.advance(number, step)
         self.begun = self.begun or bool(step.heat)
@@ -263,27 +295,40 @@ class HeatConditions:
     def loads(self, thickness: float) -> list[Callable[[Model], None]]:
         """Make the groups of all loads of heat in the mesh; return what adds each of them to a model."""
         found, made = self.found, []  # type: DeckMesh, list[Callable[[Model], None]]
-        risen = [(self._risen(table), names) for table, names in self.temperatures.alike()]
-        for _, points, value, table in ByShape.of(risen):
+        spans: list[tuple[float, float]] = []
+        risen = ByShape()
+        for table, names in self.temperatures.alike():
+            for span, points in self.fixed.of(names).items():
+                spans += [span] * (span not in spans)
+                risen.add(spans.index(span), self._risen(table), points)
+        for number, points, value, table in risen:
             group = found.add_points(f"temperature {len(made)}", points)
-            made.append(partial(Model.fix_temperature, group=group, value=_above(value, self.reference), ramp=table))
+            fixed = {"value": _above(value, self.reference), "ramp": table, **_between(spans[number])}
+            made.append(partial(Model.fix_temperature, group=group, **fixed))
         for _, points, value, table in ByShape.of(self.powers.alike()):
             group = found.add_points(f"heat {len(made)}", points)
             powers = tuple((time, power / thickness) for time, power in table)
             made.append(partial(Model.add_nodal_heat, group=group, value=value, ramp=powers))
-        on_faces: dict[tuple[str, Table, float | None], list[Face]] = {}
-        for history in (self.fluxes, self.films):
-            for table, names in history.alike():
-                for name in names:
-                    if name.face is not None:
-                        on_faces.setdefault((name.keyword, table, name.coefficient), []).append(name.face)
-                        continue
-                    group = found.add_solids(f"heat source {len(made)}", name.elements)
-                    made.append(partial(Model.add_heat_source, value=1.0, groups=group, ramp=table))
-        for (keyword, table, coefficient), faces in on_faces.items():
+        on_faces: dict[tuple[str, Table], list[Face]] = {}
+        for table, fluxes in self.fluxes.alike():
+            for flux in fluxes:
+                if flux.face is not None:
+                    on_faces.setdefault((flux.keyword, table), []).append(flux.face)
+                    continue
+                group = found.add_solids(f"heat source {len(made)}", flux.elements)
+                made.append(partial(Model.add_heat_source, value=1.0, groups=group, ramp=table))
+        for (keyword, table), faces in on_faces.items():
             group = found.add_facets(f"{keyword.lower()} {len(made)}", faces)
-            flux = partial(Model.add_heat_flux, group=group, value=1.0, ramp=table)
-            made.append(flux if coefficient is None else self._film(group, coefficient, table))
+            made.append(partial(Model.add_heat_flux, group=group, value=1.0, ramp=table))
+        blown: dict[tuple[Table, float, tuple[float, float]], list[Face]] = {}
+        for table, films in self.films.alike():
+            for span, members in self.blown.of(films).items():
+                for film in members:
+                    assert film.face is not None
+                    blown.setdefault((table, film.coefficient or 0.0, span), []).append(film.face)
+        for (table, coefficient, span), faces in blown.items():
+            group = found.add_facets(f"film {len(made)}", faces)
+            made.append(partial(self._film(group, coefficient, table), **_between(span)))
         return made
 
     def _risen(self, table: Table) -> Table:
@@ -296,6 +341,11 @@ class HeatConditions:
         ramp = tuple((time, value / size) for time, value in rise) if size else None
         ambient = self.reference + size
         return partial(Model.add_film, group=group, coefficient=coefficient, ambient=ambient, ramp=ramp)
+
+
+def _between(span: tuple[float, float]) -> dict[str, float]:
+    """Return the arguments of a model's methods for what acts between two load factors."""
+    return {name: at for name, at in zip(("begins", "ends"), span, strict=True) if np.isfinite(at)}
 
 
 def _above(value: Any, reference: float) -> Any:

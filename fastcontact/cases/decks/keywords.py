@@ -1,98 +1,128 @@
-"""The keywords of decks: which parameters each takes here, which have no effect, and what is outside of fastcontact."""
+"""The keywords of decks: where each may stand, what reads it, the parameters it takes, and what is outside of fastcontact."""
 
 from __future__ import annotations
 
 import difflib
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Literal
 
+from fastcontact.cases.decks import (
+    cohesive,
+    connections,
+    cyclic_symmetry,
+    geometry,
+    heat,
+    nonlinear,
+    pretension,
+    properties,
+    stepping,
+    temperatures,
+)
 from fastcontact.cases.decks.blocks import Block
+
+# In place of the parameters of a keyword that may have any.
+ANYTHING = "*"
 
 
 @dataclass(frozen=True)
 class Keyword:
-    """What a keyword takes: parameters that mean something here, and those that have no effect on the result."""
+    """Where a keyword may stand, what reads it there, and its parameters: with a meaning here, or without effect."""
 
-    used: frozenset[str] = frozenset()
-    harmless: frozenset[str] = frozenset()
-    anything: bool = False
+    place: Literal["deck", "part", "material", "interaction", "model", "step", "procedure"]
+    read: Callable[..., None] | None = None
+    used: str = ""
+    harmless: str = ""
 
-
-def _keyword(used: str = "", harmless: str = "") -> Keyword:
-    return Keyword(frozenset(filter(None, used.split("; "))), frozenset(filter(None, harmless.split("; "))))
+    @property
+    def parameters(self) -> set[str]:
+        """All that it takes."""
+        return {*self.used.split("; "), *self.harmless.split("; ")} - {""}
 
 
 # Parameters of steps that steer their solution.
 STEERING = "SOLVER; DIRECT; STABILIZE; ALLSDTOL; CONTINUE; EXPLICIT; DELTMX; MXDEM; END"
 # Keywords that are translated.
 TRANSLATED = {
-    "AMPLITUDE": _keyword("NAME; TIME; DEFINITION; VALUE"),
-    "ASSEMBLY": _keyword("NAME"),
-    "BOUNDARY": _keyword("OP; AMPLITUDE; FIXED; TYPE"),
-    "CHANGE FRICTION": _keyword("INTERACTION"),
-    "CLEARANCE": _keyword("SLAVE; MASTER; SECONDARY; MAIN; VALUE"),
-    "CFLUX": _keyword("OP; AMPLITUDE"),
-    "CLOAD": _keyword("OP; AMPLITUDE"),
-    "CONTACT PAIR": _keyword("INTERACTION; TYPE; ADJUST; SMALL SLIDING", "CPSET"),
-    "COUPLING": _keyword("REF NODE; SURFACE; ORIENTATION", "CONSTRAINT NAME"),
-    "COHESIVE BEHAVIOR": _keyword("TYPE; ELIGIBILITY"),
-    "CONDUCTIVITY": Keyword(anything=True),
-    "COUPLED TEMPERATURE-DISPLACEMENT": _keyword("STEADY STATE", STEERING),
-    "CYCLIC SYMMETRY MODEL": _keyword("N; TIE", "NGRAPH; CHECK; ELSET"),
-    "DAMAGE EVOLUTION": _keyword("TYPE; SOFTENING; MIXED MODE BEHAVIOR; POWER; MODE MIX RATIO", "DEGRADATION"),
-    "DAMAGE INITIATION": _keyword("CRITERION"),
-    "DAMAGE STABILIZATION": Keyword(anything=True),
-    "DENSITY": _keyword(),
-    "DFLUX": _keyword("OP; AMPLITUDE"),
-    "DISTRIBUTING": _keyword(),
-    "DISTRIBUTION": _keyword("NAME; LOCATION", "TABLE"),
-    "DISTRIBUTION TABLE": Keyword(anything=True),
-    "DLOAD": _keyword("OP; AMPLITUDE"),
-    "DSFLUX": _keyword("OP; AMPLITUDE"),
-    "DSLOAD": _keyword("OP; AMPLITUDE"),
-    "ELASTIC": _keyword("TYPE"),
-    "ELEMENT": _keyword("TYPE; ELSET"),
-    "ELSET": _keyword("ELSET; GENERATE; INSTANCE", "INTERNAL; UNSORTED"),
-    "END ASSEMBLY": _keyword(),
-    "END INSTANCE": _keyword(),
-    "END PART": _keyword(),
-    "END STEP": _keyword(),
-    "EQUATION": _keyword(),
-    "EXPANSION": _keyword("TYPE", "ZERO"),
-    "FILM": _keyword("OP; AMPLITUDE"),
-    "FREQUENCY": _keyword("", "EIGENSOLVER; NORMALIZATION; SOLVER; STORAGE; GLOBAL"),
-    "FRICTION": _keyword(),
-    "GAP": _keyword("ELSET"),
-    "GAP CONDUCTANCE": _keyword("PRESSURE"),
-    "GAP HEAT GENERATION": _keyword(),
-    "HEADING": Keyword(anything=True),
-    "HEAT TRANSFER": _keyword("STEADY STATE", STEERING),
-    "HYPERELASTIC": _keyword("NEO HOOKE; MOONEY-RIVLIN; YEOH; OGDEN; N", "MODULI"),
-    "INITIAL CONDITIONS": _keyword("TYPE"),
-    "INSTANCE": _keyword("NAME; PART"),
-    "KINEMATIC": _keyword(),
-    "MATERIAL": _keyword("NAME"),
-    "MPC": _keyword(),
-    "NODE": _keyword("NSET; SYSTEM"),
-    "NSET": _keyword("NSET; GENERATE; INSTANCE", "INTERNAL; UNSORTED; FREQUENCY"),
-    "ORIENTATION": _keyword("NAME; SYSTEM; DEFINITION"),
-    "PART": _keyword("NAME"),
-    "PHYSICAL CONSTANTS": Keyword(anything=True),
-    "PLASTIC": _keyword("HARDENING"),
-    "PRE-TENSION SECTION": _keyword("SURFACE; NODE"),
-    "RIGID BODY": _keyword("NSET; ELSET; REF NODE; ROT NODE"),
-    "SFILM": _keyword("OP; AMPLITUDE"),
-    "SOLID SECTION": _keyword("ELSET; MATERIAL; ORIENTATION", "CONTROLS"),
-    "SPECIFIC HEAT": Keyword(anything=True),
-    "SPRING": _keyword("ELSET"),
-    "STATIC": _keyword("", STEERING),
-    "STEP": _keyword("NLGEOM; AMPLITUDE", "NAME; INC; PERTURBATION; UNSYMM; EXTRAPOLATION; CONVERT SDI; SOLVER"),
-    "SURFACE": _keyword("NAME; TYPE", "INTERNAL"),
-    "SURFACE BEHAVIOR": _keyword("PRESSURE-OVERCLOSURE; NO SEPARATION"),
-    "SURFACE INTERACTION": _keyword("NAME"),
-    "TEMPERATURE": _keyword("OP; AMPLITUDE"),
-    "TIE": _keyword("POSITION TOLERANCE; ADJUST; CYCLIC SYMMETRY; NAME", "TYPE; NO ROTATION"),
-    "TRANSFORM": _keyword("NSET; TYPE"),
-    "UNCOUPLED TEMPERATURE-DISPLACEMENT": _keyword("STEADY STATE", STEERING),
+    # What the reader itself opens and closes.
+    "ASSEMBLY": Keyword("deck", None, "NAME"),
+    "CHANGE FRICTION": Keyword("deck", None, "INTERACTION"),
+    "COUPLING": Keyword("deck", None, "REF NODE; SURFACE; ORIENTATION", "CONSTRAINT NAME"),
+    "DISTRIBUTING": Keyword("deck"),
+    "END ASSEMBLY": Keyword("deck"),
+    "END INSTANCE": Keyword("deck"),
+    "END PART": Keyword("deck"),
+    "END STEP": Keyword("deck"),
+    "HEADING": Keyword("deck", None, ANYTHING),
+    "INSTANCE": Keyword("deck", None, "NAME; PART"),
+    "KINEMATIC": Keyword("deck"),
+    "MATERIAL": Keyword("deck", None, "NAME"),
+    "PART": Keyword("deck", None, "NAME"),
+    "STEP": Keyword(
+        "deck", None, "NLGEOM; AMPLITUDE", "NAME; INC; PERTURBATION; UNSYMM; EXTRAPOLATION; CONVERT SDI; SOLVER"
+    ),
+    "SURFACE INTERACTION": Keyword("deck", None, "NAME"),
+    # In parts, or in decks without any.
+    "DISTRIBUTION": Keyword("part", properties.distribution, "NAME; LOCATION", "TABLE"),
+    "DISTRIBUTION TABLE": Keyword("part", properties.distribution_table, ANYTHING),
+    "ELEMENT": Keyword("part", geometry.cells, "TYPE; ELSET"),
+    "ELSET": Keyword("part", geometry.element_set, "ELSET; GENERATE; INSTANCE", "INTERNAL; UNSORTED"),
+    "NODE": Keyword("part", geometry.nodes, "NSET; SYSTEM"),
+    "NSET": Keyword("part", geometry.node_set, "NSET; GENERATE; INSTANCE", "INTERNAL; UNSORTED; FREQUENCY"),
+    "ORIENTATION": Keyword("part", properties.orientation, "NAME; SYSTEM; DEFINITION"),
+    "SOLID SECTION": Keyword("part", properties.section, "ELSET; MATERIAL; ORIENTATION", "CONTROLS"),
+    "SURFACE": Keyword("part", geometry.surface, "NAME; TYPE", "INTERNAL"),
+    # Below *MATERIAL.
+    "CONDUCTIVITY": Keyword("material", heat.conductivity, ANYTHING),
+    "DENSITY": Keyword("material", properties.density),
+    "ELASTIC": Keyword("material", properties.elastic, "TYPE"),
+    "EXPANSION": Keyword("material", temperatures.expansion, "TYPE", "ZERO"),
+    "HYPERELASTIC": Keyword("material", nonlinear.hyperelastic, "NEO HOOKE; MOONEY-RIVLIN; YEOH; OGDEN; N", "MODULI"),
+    "PLASTIC": Keyword("material", nonlinear.plastic, "HARDENING"),
+    "SPECIFIC HEAT": Keyword("material", heat.specific_heat, ANYTHING),
+    # Below *SURFACE INTERACTION.
+    "COHESIVE BEHAVIOR": Keyword("interaction", cohesive.keep, "TYPE; ELIGIBILITY"),
+    "DAMAGE EVOLUTION": Keyword(
+        "interaction", cohesive.keep, "TYPE; SOFTENING; MIXED MODE BEHAVIOR; POWER; MODE MIX RATIO", "DEGRADATION"
+    ),
+    "DAMAGE INITIATION": Keyword("interaction", cohesive.keep, "CRITERION"),
+    "DAMAGE STABILIZATION": Keyword("interaction", cohesive.stabilization, ANYTHING),
+    "FRICTION": Keyword("interaction", properties.friction),
+    "GAP CONDUCTANCE": Keyword("interaction", heat.gap_conductance, "PRESSURE"),
+    "GAP HEAT GENERATION": Keyword("interaction", heat.gap_heat_generation),
+    "SURFACE BEHAVIOR": Keyword("interaction", properties.behaviour, "PRESSURE-OVERCLOSURE; NO SEPARATION"),
+    # Of the whole model.
+    "AMPLITUDE": Keyword("model", properties.amplitude, "NAME; TIME; DEFINITION; VALUE"),
+    "CLEARANCE": Keyword("model", connections.clearance, "SLAVE; MASTER; SECONDARY; MAIN; VALUE"),
+    "CONTACT PAIR": Keyword("model", connections.contact_pair, "INTERACTION; TYPE; ADJUST; SMALL SLIDING", "CPSET"),
+    "CYCLIC SYMMETRY MODEL": Keyword("model", cyclic_symmetry.cyclic_symmetry_model, "N; TIE", "NGRAPH; CHECK; ELSET"),
+    "EQUATION": Keyword("model", connections.equation),
+    "GAP": Keyword("model", properties.gap, "ELSET"),
+    "INITIAL CONDITIONS": Keyword("model", temperatures.initial_conditions, "TYPE"),
+    "MPC": Keyword("model", connections.multi_point),
+    "PHYSICAL CONSTANTS": Keyword("model", heat.physical_constants, ANYTHING),
+    "PRE-TENSION SECTION": Keyword("model", pretension.pretension_section, "SURFACE; NODE"),
+    "RIGID BODY": Keyword("model", connections.rigid_body, "NSET; ELSET; REF NODE; ROT NODE"),
+    "SPRING": Keyword("model", properties.spring, "ELSET"),
+    "TIE": Keyword("model", connections.tie, "POSITION TOLERANCE; ADJUST; CYCLIC SYMMETRY; NAME", "TYPE; NO ROTATION"),
+    "TRANSFORM": Keyword("model", connections.transform, "NSET; TYPE"),
+    # Supports and loads, in steps.
+    "BOUNDARY": Keyword("step", stepping.given, "OP; AMPLITUDE; FIXED; TYPE"),
+    "CFLUX": Keyword("step", stepping.given, "OP; AMPLITUDE"),
+    "CLOAD": Keyword("step", stepping.given, "OP; AMPLITUDE"),
+    "DFLUX": Keyword("step", stepping.given, "OP; AMPLITUDE"),
+    "DLOAD": Keyword("step", stepping.given, "OP; AMPLITUDE"),
+    "DSFLUX": Keyword("step", stepping.given, "OP; AMPLITUDE"),
+    "DSLOAD": Keyword("step", stepping.given, "OP; AMPLITUDE"),
+    "FILM": Keyword("step", stepping.given, "OP; AMPLITUDE"),
+    "SFILM": Keyword("step", stepping.given, "OP; AMPLITUDE"),
+    "TEMPERATURE": Keyword("step", stepping.given, "OP; AMPLITUDE"),
+    # Procedures of steps.
+    "COUPLED TEMPERATURE-DISPLACEMENT": Keyword("procedure", stepping.heated, "STEADY STATE", STEERING),
+    "FREQUENCY": Keyword("procedure", stepping.frequency, "", "EIGENSOLVER; NORMALIZATION; SOLVER; STORAGE; GLOBAL"),
+    "HEAT TRANSFER": Keyword("procedure", stepping.heated, "STEADY STATE", STEERING),
+    "STATIC": Keyword("procedure", stepping.static, "", STEERING),
+    "UNCOUPLED TEMPERATURE-DISPLACEMENT": Keyword("procedure", stepping.heated, "STEADY STATE", STEERING),
 }
 # Requests for output, all of which is in the results, and controls of convergence, which has criteria of its own.
 OUTPUT = (
@@ -142,14 +172,17 @@ _SPELLED = {name.replace(" ", ""): name for name in (*TRANSLATED, *OUTPUT, *REFU
 def spelled(block: Block) -> Block:
     """Return a block with blanks in its keyword and parameters where they belong: CalculiX reads it without any."""
     keyword = _SPELLED.get(block.keyword.replace(" ", ""), block.keyword)
-    known = TRANSLATED.get(keyword, Keyword())
-    names = {name.replace(" ", ""): name for name in known.used | known.harmless}
+    known = TRANSLATED.get(keyword)
+    names = {name.replace(" ", ""): name for name in known.parameters} if known else {}
     parameters = {names.get(name.replace(" ", ""), name): value for name, value in block.parameters.items()}
     return replace(block, location=replace(block.location, keyword=keyword), parameters=parameters)
 
 
-def check(block: Block, about: str) -> None:
-    """Refuse a keyword that is unknown or outside of fastcontact, and parameters that are; `about` names a material."""
+def checked(block: Block, about: str) -> Keyword:
+    """Return what a keyword is; refuse unknown ones, those outside of fastcontact, and such parameters.
+
+    `about` names a material.
+    """
     keyword = block.keyword
     if keyword in REFUSED:
         raise block.location.refuse(f"{about}*{keyword} {REFUSED[keyword]}")
@@ -159,6 +192,7 @@ def check(block: Block, about: str) -> None:
         meant = f"; is *{near[0]} meant?" if near else ""
         raise block.location.refuse(f"unknown keyword *{keyword}{meant}")
     for name in block.parameters:
-        if not known.anything and name not in known.used | known.harmless:
-            takes = ", ".join(sorted(known.used | known.harmless)) or "none"
+        if known.used != ANYTHING and name not in known.parameters:
+            takes = ", ".join(sorted(known.parameters)) or "none"
             raise block.location.refuse(f"the parameter {name[:40]} of *{keyword} is not supported; it takes {takes}")
+    return known

@@ -94,8 +94,6 @@ def strain_of(content: Content, laws: list[Any]) -> tuple[str, str]:
     reasons = {
         "plasticity": any(isinstance(law, ElasticPlastic) for law in laws),
         "a nearly incompressible elastic material": any(law.averaged for law in laws),
-        "temperatures": bool(content.heat)
-        or any(given.block.keyword == "TEMPERATURE" for step in content.steps for given in step.given),
         "initial stresses": bool(content.stresses),
         "couplings, rigid bodies and multi-point constraints": bool(
             content.links or content.pins or content.multi_points

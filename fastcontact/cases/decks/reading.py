@@ -2,80 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from fastcontact.cases.decks import (
-    cohesive,
-    connections,
-    cyclic_symmetry,
-    geometry,
-    heat,
-    nonlinear,
-    pretension,
-    properties,
-    stepping,
-    temperatures,
-)
+from fastcontact.cases.decks import connections, geometry, heat, properties, stepping
 from fastcontact.cases.decks.blocks import Block
 from fastcontact.cases.decks.content import Content, Instance, Interaction, Material, Part, Step
-from fastcontact.cases.decks.keywords import OUTPUT, check, spelled
+from fastcontact.cases.decks.keywords import OUTPUT, checked, spelled
 
-IN_PARTS: dict[str, Callable[[Content, Part, Block], None]] = {
-    "NODE": geometry.nodes,
-    "ELEMENT": geometry.cells,
-    "NSET": geometry.node_set,
-    "ELSET": geometry.element_set,
-    "SURFACE": geometry.surface,
-    "SOLID SECTION": properties.section,
-    "ORIENTATION": properties.orientation,
-    "DISTRIBUTION": properties.distribution,
-    "DISTRIBUTION TABLE": properties.distribution_table,
-}
-OF_MATERIALS: dict[str, Callable[[Content, Material, Block], None]] = {
-    "ELASTIC": properties.elastic,
-    "PLASTIC": nonlinear.plastic,
-    "HYPERELASTIC": nonlinear.hyperelastic,
-    "DENSITY": properties.density,
-    "EXPANSION": temperatures.expansion,
-    "CONDUCTIVITY": heat.conductivity,
-    "SPECIFIC HEAT": heat.specific_heat,
-}
-OF_INTERACTIONS: dict[str, Callable[[Content, Interaction, Block], None]] = {
-    "SURFACE BEHAVIOR": properties.behaviour,
-    "FRICTION": properties.friction,
-    "COHESIVE BEHAVIOR": cohesive.keep,
-    "DAMAGE INITIATION": cohesive.keep,
-    "DAMAGE EVOLUTION": cohesive.keep,
-    "DAMAGE STABILIZATION": cohesive.stabilization,
-    "GAP CONDUCTANCE": heat.gap_conductance,
-    "GAP HEAT GENERATION": heat.gap_heat_generation,
-}
-OF_MODELS: dict[str, Callable[[Content, Block], None]] = {
-    "AMPLITUDE": properties.amplitude,
-    "GAP": properties.gap,
-    "INITIAL CONDITIONS": temperatures.initial_conditions,
-    "PHYSICAL CONSTANTS": heat.physical_constants,
-    "PRE-TENSION SECTION": pretension.pretension_section,
-    "SPRING": properties.spring,
-    "CONTACT PAIR": connections.contact_pair,
-    "CLEARANCE": connections.clearance,
-    "CYCLIC SYMMETRY MODEL": cyclic_symmetry.cyclic_symmetry_model,
-    "TIE": connections.tie,
-    "EQUATION": connections.equation,
-    "MPC": connections.multi_point,
-    "RIGID BODY": connections.rigid_body,
-    "TRANSFORM": connections.transform,
-}
 IN_LAYERS = ("DAMAGE INITIATION", "DAMAGE EVOLUTION", "DAMAGE STABILIZATION")
-IN_STEPS = ("BOUNDARY", "CLOAD", "DLOAD", "DSLOAD", "TEMPERATURE", *heat.OF_HEAT)
-PROCEDURES: dict[str, Callable[[Content, Step, Block], None]] = {
-    "STATIC": stepping.static,
-    "FREQUENCY": stepping.frequency,
-    "HEAT TRANSFER": stepping.heated,
-    "COUPLED TEMPERATURE-DISPLACEMENT": stepping.heated,
-    "UNCOUPLED TEMPERATURE-DISPLACEMENT": stepping.heated,
-}
 
 
 @dataclass
@@ -96,13 +31,14 @@ class Reader:
         if keyword in OUTPUT:
             content.outputs.append(block.location)
             return
-        check(block, f"material '{self.material.name}': " if self.material else "")
+        known = checked(block, f"material '{self.material.name}': " if self.material else "")
+        read = known.read or getattr(self, "_" + keyword.lower().replace(" ", "_"))
         if self.coupling is not None and keyword not in ("KINEMATIC", "DISTRIBUTING"):
             raise self.coupling.location.refuse("*KINEMATIC or *DISTRIBUTING must follow")
-        if keyword in OF_MATERIALS:
+        if known.place == "material":
             if self.material is None:
                 raise block.location.refuse("belongs below *MATERIAL")
-            OF_MATERIALS[keyword](content, self.material, block)
+            read(content, self.material, block)
             return
         if self.material is not None and keyword in IN_LAYERS:
             name = self.material.name
@@ -110,33 +46,33 @@ class Reader:
                 f"material '{name}': damage of bodies is outside of fastcontact, that of layers is not"
             )
         self.material = None
-        if keyword in OF_INTERACTIONS:
+        if known.place == "interaction":
             if self.interaction is None:
                 raise block.location.refuse("belongs below *SURFACE INTERACTION")
-            OF_INTERACTIONS[keyword](content, self.interaction, block)
+            read(content, self.interaction, block)
             return
         self.interaction = None
-        if keyword in IN_PARTS:
+        if known.place == "part":
             self._not_in_step(block)
             if self.instance is not None:
                 raise block.location.refuse(
                     "is not supported inside of an instance: put it into the part or the assembly"
                 )
-            IN_PARTS[keyword](content, self._open_part(), block)
-        elif keyword in OF_MODELS:
+            read(content, self._open_part(), block)
+        elif known.place == "model":
             if keyword != "AMPLITUDE":
                 self._not_in_step(block)
             self._not_in_part(block)
-            OF_MODELS[keyword](content, block)
-        elif keyword in IN_STEPS:
+            read(content, block)
+        elif known.place == "step":
             self._not_in_part(block)
-            stepping.given(content, self.step, block)
-        elif keyword in PROCEDURES:
+            read(content, self.step, block)
+        elif known.place == "procedure":
             if self.step is None:
                 raise block.location.refuse("belongs into a step")
-            PROCEDURES[keyword](content, self.step, block)
+            read(content, self.step, block)
         else:
-            getattr(self, "_" + keyword.lower().replace(" ", "_"))(block)
+            read(block)
 
     def _open_part(self) -> Part:
         return self.part or self.content.root
@@ -155,14 +91,10 @@ class Reader:
     def _assembly(self, block: Block) -> None:
         self.part = None
 
-    def _end_assembly(self, block: Block) -> None:
-        self.part = None
+    _end_part = _end_assembly = _assembly
 
     def _part(self, block: Block) -> None:
         self.part = geometry.new_part(self.content, block)
-
-    def _end_part(self, block: Block) -> None:
-        self.part = None
 
     def _instance(self, block: Block) -> None:
         self.instance = geometry.instance(self.content, block)

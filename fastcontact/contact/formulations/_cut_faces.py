@@ -14,6 +14,7 @@ from fastcontact._jit import parallel
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.formulations import _cut_faces_kernels
 from fastcontact.contact.formulations._overlap import Coupling, Overlap
+from fastcontact.contact.prescribed_normals import FACING
 from fastcontact.contact.search.box_tree_kernels import build, tree_order
 from fastcontact.contact.search.closest import closest_of_kinds
 from fastcontact.contact.search.facet_tables import tables
@@ -22,8 +23,6 @@ from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements, quadrature
 
-# Facets face each other if their normals enclose more than about 95 degrees.
-FACING = -0.1
 # How far off what faces a facet may be: in distances of the closest primary facet, and radii of the facet itself.
 DISTANCES, RADII = 2.0, 3.0
 # Work on a secondary facet beside that on a node of a cell, for threads.
@@ -127,7 +126,7 @@ def _facing(ours: _Polygons, theirs: _Polygons, reach: Array) -> Indices:
         pairs = np.empty((room, 2), np.intp)
         count = _cut_faces_kernels.facing_pairs(
             ours.nodes, ours.count, ours.origin, ours.axes, ours.radius, reach, theirs.nodes, theirs.count,
-            np.ascontiguousarray(theirs.axes[:, 2]), numbers, tree, FACING, pairs,
+            np.ascontiguousarray(theirs.axes[:, 2]), numbers, tree, -FACING, pairs,
         )  # fmt: skip
         if count <= room:
             return pairs[np.lexsort((pairs[:count, 1], pairs[:count, 0]))]

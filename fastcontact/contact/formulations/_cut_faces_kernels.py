@@ -9,13 +9,12 @@ import numpy as np
 
 from fastcontact._jit.decorators import inlined_kernel, innermost_kernel, interpretable_kernel, kernel
 from fastcontact.contact.search.box_tree_kernels import DEPTH
+from fastcontact.contact.search.projection_3d_kernels import MAX_ITERATIONS
+from fastcontact.contact.search.straight_3d_kernels import FINAL
+from fastcontact.round_off import ROUND_OFF
 
 # A polygon of up to 4 corners clipped by one of up to 4 has at most 8.
 MOST = 12
-# Pieces smaller than this fraction of the facet are rounding errors of the cut.
-SLIVER = 1e-12
-# Newton's method on a facet; its error is the square of the last step.
-MAX_ITERATIONS, STEP = 30, 1e-8
 
 
 @interpretable_kernel
@@ -125,7 +124,7 @@ def _common(corners, count, others, n_others, origin, axes, subject, window, spa
     for k in range(n_others):  # facets that face each other turn opposite ways
         window[k, 0], window[k, 1] = spare[n_others - 1 - k, 0], spare[n_others - 1 - k, 1]
     count = _clip(subject, count, window, n_others, spare)
-    if count < 3 or _area(subject, count) <= SLIVER * whole:
+    if count < 3 or _area(subject, count) <= ROUND_OFF * whole:
         return 0
     return count
 
@@ -253,7 +252,7 @@ def _locate(flat, x, y, xi, terms):
         step_s, step_t = (d * off_x - b * off_y) / area, (a * off_y - c * off_x) / area
         xi[0] += step_s
         xi[1] += step_t
-        if n_terms == 3 or (abs(step_s) < STEP and abs(step_t) < STEP):
+        if n_terms == 3 or (abs(step_s) < FINAL and abs(step_t) < FINAL):
             _fill_terms(n_terms, xi[0], xi[1], terms)
             return abs(area)
     return 0.0

@@ -20,11 +20,10 @@ from fastcontact.contact.integration import facet_measure, fine_rule
 from fastcontact.contact.pair_options import spread
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.mesh import elements
+from fastcontact.round_off import SINGLE_PRECISION
 
 # A line is determined by a seventh of it, a parabola by two fifths; values at the other end count no more than thirtyfold.
 DETERMINED = 1e-3
-# Facets whose mass matrix differs by less than this part are whole.
-WHOLE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +61,7 @@ class WholeFacets:
         degrees = np.full(len(mass), 2)
         degrees[~mass.any(axis=(1, 2))] = -1
         size = np.einsum("fkk->f", self.mass)
-        partly = np.flatnonzero((degrees == 2) & (np.abs(mass - self.mass).max(axis=(1, 2)) > WHOLE * size))
+        partly = np.flatnonzero((degrees == 2) & (np.abs(mass - self.mass).max(axis=(1, 2)) > SINGLE_PRECISION * size))
         whole, partial, T = self.mass[partly], mass[partly], self.to_corners
         linear = _smallest(T @ whole @ T.T, T @ partial @ T.T) > DETERMINED
         degrees[partly] = np.where(_smallest(whole, partial) > DETERMINED, 2, np.where(linear, 1, 0))

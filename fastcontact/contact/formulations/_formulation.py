@@ -192,9 +192,10 @@ class Formulation(ABC):
         constraints = replace(constraints, equality=self.never_opening(constraints.positions, at))
         if self.options.source is None:
             return constraints
-        from fastcontact.contact.fluid_pressure import wetted
+        from fastcontact.contact.fluid_pressure import AreaVectors, wetted
 
-        return wetted(constraints, at, self.secondary, self.options.source[self.secondary.points], self.points)
+        areas = AreaVectors(self.secondary, self.points, self.axisymmetric)
+        return wetted(constraints, at, areas, self.options.source[self.secondary.points])
 
     def _softened(self, constraints: Constraints, at: Configuration) -> Constraints:
         """Return constraints with the compliance of normal and tangential penalties, if any."""

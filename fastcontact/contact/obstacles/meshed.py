@@ -12,13 +12,11 @@ from fastcontact.contact.obstacles._facets import Block, SurfaceFacets, surface_
 from fastcontact.contact.search.closest import Closest, closest_of_kinds
 from fastcontact.errors import ContactError
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
+from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 
 # A point counts as beyond the border of an open surface if it stands out farther than this part of a facet, and leans
 # by more than this over its height: borders on a plane of symmetry, where facets never stand quite upright, still hold.
 BEYOND, LEAN = 0.05, 0.27
-# Within this part of a facet the direction to the closest point is rounding; the facet's normal takes its place.
-TOUCHING = 1e-6
 
 
 @typed(ContactError)
@@ -90,7 +88,6 @@ class MeshedSurface:
                 f"point {shared[0]}): a rigid surface stands apart, so give it points of its own or a mesh of its own"
             )
 
-    @typed(ContactError)
     def distance(self, points: Array) -> tuple[Array, Array]:
         """See `Obstacle.distance`; infinite beyond the border of an open surface."""
         dim = self.mesh.dim
@@ -103,7 +100,8 @@ class MeshedSurface:
         apart = points - closest.position
         extents = [np.linalg.norm(np.ptp(block.corners, axis=1), axis=1) for block in self._facets.blocks]
         size = np.concatenate(extents)[closest.facet]
-        touching = closest.distance <= TOUCHING * size
+        # There the direction to the closest point is rounding; the facet's normal takes its place.
+        touching = closest.distance <= SINGLE_PRECISION * size
         outside = np.einsum("nd,nd->n", apart, sense) >= 0
         distance = np.where(outside, closest.distance, -closest.distance)
         normal = smooth if self.crease else np.where(on_ridge[:, None], smooth, closest.normal)

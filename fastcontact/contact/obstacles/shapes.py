@@ -59,7 +59,6 @@ class HalfSpace:
     point: tuple[float, ...]
     normal: tuple[float, ...]
 
-    @typed(ContactError)
     def distance(self, points: Array) -> tuple[Array, Array]:
         """See `Obstacle.distance`."""
         dim = points.shape[1]
@@ -102,7 +101,6 @@ class Sphere:
     def __post_init__(self) -> None:
         _positive(R=self.R)
 
-    @typed(ContactError)
     def distance(self, points: Array) -> tuple[Array, Array]:
         """See `Obstacle.distance`."""
         apart = points - _vector("centre", self.centre, points.shape[1])
@@ -145,7 +143,6 @@ class Cylinder:
     def __post_init__(self) -> None:
         _positive(R=self.R, length=float(np.linalg.norm(self.axis)))
 
-    @typed(ContactError)
     def distance(self, points: Array) -> tuple[Array, Array]:
         """See `Obstacle.distance`."""
         if points.shape[1] != 3:
@@ -187,7 +184,6 @@ class Height:
     def __post_init__(self) -> None:
         _direction(self.side)
 
-    @typed(ContactError)
     def distance(self, points: Array) -> tuple[Array, Array]:
         """See `Obstacle.distance`."""
         sign = _direction(self.side)
@@ -276,7 +272,6 @@ class FlatPunch:
         _positive(radius=self.radius)
         _direction(self.side)
 
-    @typed(ContactError)
     def distance(self, points: Array) -> tuple[Array, Array]:
         """See `Obstacle.distance`; infinite beyond the edge, where a body may rise beside the punch."""
         sign = _direction(self.side)

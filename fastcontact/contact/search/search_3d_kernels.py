@@ -7,9 +7,8 @@ from fastcontact._jit.decorators import inlined_kernel, interpretable_kernel
 from fastcontact.contact.search.box_tree_kernels import DEPTH, FAR, open_box, square_to_box
 from fastcontact.contact.search.projection_3d_kernels import component, frame, onto_sides, project, vector
 from fastcontact.contact.search.straight_3d_kernels import ON_SIDE, along, cross, dot, minus, on_bilinear, on_flat, unit
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# Facets whose closest points lie nearer together than this, in facet sizes, meet there and are equally close.
-SAME_PLACE = 1e-9
 # Squared distances to boxes and facets are rounded: from far away by more than the size of the places that are the same.
 ROUNDING = 1.0 + 1e-14
 
@@ -43,10 +42,11 @@ def closest_facets(points, order, begin, end, facets, domain, numbers, tree, clo
             if square == np.inf:
                 continue
             gap = minus(trial, place)
+            # Facets whose closest points are the same place meet there and are equally close.
             tied = closest >= 0 and (dot(gap, gap) <= same * same or square == best)
             if (numbers[f] < numbers[closest]) if tied else (square < best):
                 closest, best_s, best_t, place, certain, converged = f, s, t, trial, inside, good
-                same = SAME_PLACE * _size(tree.low, tree.high, box)
+                same = LENGTH_ROUND_OFF * _size(tree.low, tree.high, box)
             if square < best:
                 best = square
                 reach = np.sqrt(best) + same

@@ -7,13 +7,12 @@ Vectors are tuples of three numbers: Numba would count references to arrays in e
 import numpy as np
 
 from fastcontact._jit.decorators import kernel
+from fastcontact.round_off import ROUND_OFF
 
 # A point nearer to a side of the domain, in reference coordinates, lies on it.
-ON_SIDE = 1e-12
+ON_SIDE = ROUND_OFF
 # Steps of Newton's method shrink quadratically: after one like this the next would be lost in rounding.
 FINAL = 1e-8
-# Tangents with a smaller sine squared between them are parallel.
-PARALLEL = 1e-12
 # Sines squared between the sides of a triangle: below the first, area is lost in rounding; below the other, half its digits.
 COLLAPSED, NEEDLE = 1e-14, 1e-10
 
@@ -119,7 +118,7 @@ def on_bilinear(r, a, b, c, reach):
     aa, ab, bb, ac, bc, cc = dot(a, a), dot(a, b), dot(b, b), dot(a, c), dot(b, c), dot(c, c)
     ar, br, cr = dot(a, r), dot(b, r), dot(c, r)
     determinant = aa * bb - ab * ab
-    if not determinant > PARALLEL * aa * bb:
+    if not determinant > ROUND_OFF * aa * bb:
         return 0.0, 0.0, np.nan
     s, t = (bb * ar - ab * br) / determinant, (aa * br - ab * ar) / determinant
     if abs(s) > 1.0 or abs(t) > 1.0:

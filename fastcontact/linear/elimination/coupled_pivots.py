@@ -17,11 +17,8 @@ from scipy.sparse.linalg import splu
 from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.elimination.condition import condition
+from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION
 
-# Constraints whose inverse is larger, in units of their entries, are linearly dependent up to round-off.
-SINGULAR = 1e12
-# Coupled columns with a larger condition number suit no elimination: errors would grow.
-ILL_CONDITIONED = 1e6
 # Entries are added up on the blocks of nodes where at least this part of them does not cancel.
 LUMPED = 0.3
 
@@ -106,7 +103,7 @@ class CoupledPivots:
             self._factors = splu(csc_array(P))
         except RuntimeError:  # exactly singular
             raise CoupledError() from None
-        if not condition(P, self.solve, self.solve_transposed) < ILL_CONDITIONED:
+        if not condition(P, self.solve, self.solve_transposed) < 1.0 / SINGLE_PRECISION:  # errors would grow
             raise CoupledError()
 
     def solve(self, b: Array) -> Array:
@@ -174,6 +171,6 @@ def _inverses(blocks: Array) -> Array:
         inverses = np.asarray(np.linalg.inv(blocks), np.float64)
     except np.linalg.LinAlgError:
         raise RepeatedError() from None
-    if not (np.abs(blocks).max(axis=(1, 2)) * np.abs(inverses).max(axis=(1, 2)) < SINGULAR).all():
+    if not (np.abs(blocks).max(axis=(1, 2)) * np.abs(inverses).max(axis=(1, 2)) < 1.0 / ROUND_OFF).all():
         raise RepeatedError()
     return inverses

@@ -18,10 +18,8 @@ from fastcontact.linear.krylov import krylov_kernels
 # given the 2-norm of r.
 Multiply = Callable[[Array, Array], None]
 Precondition = Callable[[Array, float, Array], None]
-# Search directions of conjugate residuals that a new one is made orthogonal to; older ones are forgotten. Where so many
-# iterations leave more of the residual than SLOWLY, as many more are kept, up to MOST_KEPT: friction of nearly incompressible
-# bodies stands still without them; elsewhere they cost more than they save.
-KEPT, SLOWLY, MOST_KEPT = 20, 0.1, 100
+# Search directions of conjugate residuals that a new one is made orthogonal to; older ones are forgotten.
+KEPT = 20
 # A step of conjugate residuals that leaves more of the residual than this is lost.
 LOST = 0.98
 
@@ -106,7 +104,7 @@ class ConjugateResiduals(Iteration):
     """Preconditioned generalised conjugate residuals, truncated (Eisenstat, Elman and Schultz, 1983); see `Iteration`.
 
     For matrices that are not symmetric. Every iteration makes the residual as small as the directions kept allow, so it
-    never grows; the preconditioner may vary. Directions are few at first, and more wherever the residual falls slowly.
+    never grows; the preconditioner may vary.
     """
 
     def __init__(self, n: int) -> None:
@@ -114,7 +112,6 @@ class ConjugateResiduals(Iteration):
         # Directions of unit image, and their images with the sign reversed: `advance` then serves to orthogonalise.
         self._kept: deque[tuple[Array, Array]] = deque()
         self._spare: list[tuple[Array, Array]] = []
-        self._room, self._made, self._before = KEPT, 0, 0.0
         self._lost = False  # the last step
 
     @property
@@ -125,9 +122,8 @@ class ConjugateResiduals(Iteration):
     def start(self) -> None:
         """See `Iteration.start`."""
         super().start()
-        self._spare = [*self._spare, *self._kept][:KEPT]
+        self._spare += self._kept
         self._kept.clear()
-        self._room, self._made, self._before = KEPT, 0, self.norm
         self._lost = False
 
     def step(self, multiply: Multiply, precondition: Precondition) -> bool:
@@ -150,15 +146,10 @@ class ConjugateResiduals(Iteration):
 
     def _keep(self, z: Array, q: Array, size: float) -> None:
         """Store a direction and its image, of norm `size`, replacing the oldest one when full."""
-        if len(self._kept) >= self._room:
+        if len(self._kept) == KEPT:
             pair = self._kept.popleft()
         else:
             pair = self._spare.pop() if self._spare else (np.empty_like(z), np.empty_like(q))
         krylov_kernels.scaled(1.0 / size, z, pair[0])
         krylov_kernels.scaled(-1.0 / size, q, pair[1])
         self._kept.append(pair)
-        self._made += 1
-        if self._made % KEPT == 0:
-            if self.norm > SLOWLY * self._before:
-                self._room = min(self._room + KEPT, MOST_KEPT)
-            self._before = self.norm

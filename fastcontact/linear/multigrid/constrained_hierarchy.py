@@ -24,11 +24,9 @@ from fastcontact.linear.multigrid.stiffened_nodes import FreeMotions, composed, 
 from fastcontact.linear.multigrid.symmetric_change import SymmetricChange
 from fastcontact.linear.springs import Springs
 
-# By how much equations may stiffen a node, beside its own stiffness, before the finest spectrum is estimated again.
-SPECTRUM_CHANGED = 2.0
 # Largest eigenvalue of the finest level, beside its diagonal, from which it counts as wide; 3 to 4 on well-shaped hexahedra.
 WIDE = 6.0
-# Nodes that equations stiffen by this factor need more than the smoother and the coarser levels of K.
+# Nodes that equations stiffen by this factor need more than the smoother, its bounds, and the coarser levels of K.
 MUCH = 4.0
 
 
@@ -75,7 +73,7 @@ class ConstrainedHierarchy:
         # Equations raise the spectrum of coarser levels, and that of the finest where they or springs stiffen its nodes, or
         # where it is wide already: on flat and on nearly incompressible cells.
         self.hierarchy.set_bounds()
-        finest = added is not None or self.stiffening > SPECTRUM_CHANGED or self.hierarchy.bounds[0] > WIDE
+        finest = added is not None or self.stiffening > MUCH or self.hierarchy.bounds[0] > WIDE
         self.hierarchy.set_bounds(range(0 if finest else 1, len(self.hierarchy.levels) - 1))
 
     def _change_levels(self, elimination: Elimination | None, springs: Springs | None) -> None:

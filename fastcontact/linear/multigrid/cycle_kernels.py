@@ -13,7 +13,7 @@ from numba import prange
 
 from fastcontact._jit.decorators import kernel, parallel_kernel
 from fastcontact.linear.multigrid.block_products import row_times
-from fastcontact.linear.multigrid.symmetric_storage_kernels import CHUNK
+from fastcontact.linear.multigrid.symmetric_storage_kernels import CHUNK, FIRST
 
 # Up to so many block rows, waking another thread costs more than it saves.
 ALONE = 4 * CHUNK
@@ -51,7 +51,7 @@ def multiply(indptr, indices, numbers, x, factor, share, z, y, rows, cols):
     """
     n = indptr.shape[0] - 1
     if n <= ALONE:
-        _multiply(0, n, indptr, indices, numbers, x, factor, share, z, y, rows, cols)
+        _multiply(FIRST, n, indptr, indices, numbers, x, factor, share, z, y, rows, cols)
         return
     for c in prange((n + CHUNK - 1) // CHUNK):
         _multiply(c * CHUNK, min(n, (c + 1) * CHUNK), indptr, indices, numbers, x, factor, share, z, y, rows, cols)
@@ -81,7 +81,7 @@ def relax(inverse, r, first, second, d, x, rows, begin):
     """
     n = r.shape[0] // len(rows)
     if n <= ALONE:
-        _relax(0, n, inverse, r, first, second, d, x, rows, begin)
+        _relax(FIRST, n, inverse, r, first, second, d, x, rows, begin)
         return
     for c in prange((n + CHUNK - 1) // CHUNK):
         _relax(c * CHUNK, min(n, (c + 1) * CHUNK), inverse, r, first, second, d, x, rows, begin)
@@ -153,7 +153,7 @@ def subtract_rows(numbers, indptr, indices, data, x, y, rows):
     """
     n = numbers.shape[0]
     if n <= ALONE:
-        _subtract_rows(0, n, numbers, indptr, indices, data, x, y, rows)
+        _subtract_rows(FIRST, n, numbers, indptr, indices, data, x, y, rows)
         return
     for c in prange((n + CHUNK - 1) // CHUNK):
         _subtract_rows(c * CHUNK, min(n, (c + 1) * CHUNK), numbers, indptr, indices, data, x, y, rows)

@@ -20,15 +20,14 @@ from fastcontact.linear.elimination.loaded import LoadedIteration
 from fastcontact.linear.elimination.pivot_order import RepeatedError
 from fastcontact.linear.field_compliance import FieldCompliance, FieldEquations
 from fastcontact.linear.multigrid.border import Border
-from fastcontact.linear.protocol import FrictionTerms, Monitor
+from fastcontact.linear.protocol import MILD, FrictionTerms, Monitor
 from fastcontact.linear.sparse_rows import scaled
 from fastcontact.linear.springs import Springs
 
 log = logging.getLogger("fastcontact")
 # Equations whose own stiffness exceeds that of the unknowns they act on by this factor are eliminated: as springs they
-# take half as many iterations again there, and the root of the ratio as many beyond. The second where pivots are coupled,
-# whose weights are nearly right only.
-STIFF, STIFF_COUPLED = 10.0, 300.0
+# take half as many iterations again there, and the root of the ratio as many beyond.
+STIFF = MILD
 
 
 class LoadedMultigrid(LoadedIteration):
@@ -150,15 +149,10 @@ class LoadedMultigrid(LoadedIteration):
         diagonal = self._solver.diagonal()
         yielding = np.divide(1.0, diagonal, out=np.zeros(len(diagonal)), where=diagonal > 0.0)
         softness = B.multiply(B) @ yielding
-        for least in (STIFF, STIFF_COUPLED):
-            stiff = softness > least * C
-            try:
-                parts = _Parts.of(B, c, C, stiff, nodes, size, through, self._functions)
-            except RepeatedError:
-                continue
-            if not parts.coupled or least == STIFF_COUPLED:
-                return parts
-        return _Parts.of(B, c, C, C == 0.0, nodes, size, through, self._functions)
+        try:
+            return _Parts.of(B, c, C, softness > STIFF * C, nodes, size, through, self._functions)
+        except RepeatedError:
+            return _Parts.of(B, c, C, C == 0.0, nodes, size, through, self._functions)
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,11 +184,6 @@ class _Parts:
             return cls(stiff, elimination, None)
         acting = None if through is None else csr_array(through[~stiff])
         return cls(stiff, elimination, Springs(csr_array(B[~stiff]), 1.0 / C[~stiff], acting))
-
-    @property
-    def coupled(self) -> bool:
-        """Whether equations eliminated have pivots in common."""
-        return self.elimination is not None and self.elimination.coupled
 
     @property
     def giving(self) -> bool:

@@ -5,11 +5,12 @@ The rows are divided into parts. Each part adds into a stretch of its own, from 
 stretches are then added in the order of the parts, so that the number of threads changes no bit.
 """
 
+import numpy as np
 from numba import prange
 
 from fastcontact._jit.decorators import kernel, parallel_kernel
 from fastcontact.linear.multigrid.block_products import add_row_transposed
-from fastcontact.linear.multigrid.symmetric_storage_kernels import CHUNK
+from fastcontact.linear.multigrid.symmetric_storage_kernels import CHUNK, FIRST
 
 
 @parallel_kernel
@@ -52,10 +53,10 @@ def multiply_transposed(indptr, indices, data, ends, first, last, begin, x, work
     """
     parts, n = ends.shape[0] - 1, y.shape[0] // len(cols)
     if parts == 1:
-        _add_part(0, indptr, indices, data, ends, first, last, begin, x, work, rows, cols)
-        _gather(0, n, first, last, begin, work, y, cols)
+        _add_part(FIRST, indptr, indices, data, ends, first, last, begin, x, work, rows, cols)
+        _gather(FIRST, n, first, last, begin, work, y, cols)
         return
     for p in prange(parts):
-        _add_part(p, indptr, indices, data, ends, first, last, begin, x, work, rows, cols)
+        _add_part(np.int64(p), indptr, indices, data, ends, first, last, begin, x, work, rows, cols)
     for c in prange((n + CHUNK - 1) // CHUNK):
         _gather(c * CHUNK, min(n, (c + 1) * CHUNK), first, last, begin, work, y, cols)

@@ -45,8 +45,6 @@ WATCH_CONTRAST_FROM = 6
 ALIKE = 0.02
 # What a change of the hierarchy costs, the elimination of its equations included, in iterations.
 CHANGE = 15
-# Residuals that fall by less are taken to fall by this.
-SLOWEST = 0.999
 # A warm start of a nonsymmetric solution is improved by this factor, but not to less than this part of its tolerance, and by
 # so many iterations at most where that is met. Beside much stiffer pivots, each time that the next start is not better by
 # STOOD these were too few, and become twice as many, up to LONGEST_WARM.
@@ -187,7 +185,7 @@ class Multigrid:
         cg.x[:] = 0.0 if guess is None else guess
         self._begin(cg, f)
         enough = self._enough(tolerance or 0.0) * scale
-        made, raised, first = 0, 0, cg.norm
+        made, raised = 0, 0
         watched_from = WATCH_EVERY if self._contrast <= MILD else WATCH_CONTRAST_FROM
         while cg.norm > enough:
             if made >= MAX_ITERATIONS or raised > RAISES:
@@ -195,13 +193,9 @@ class Multigrid:
                     f"conjugate gradients stand at a relative residual of {cg.norm / scale:.1e} after {made} iterations, "
                     f"above {self.tolerance:.1e}: use the direct solver, or look for near-incompressible or thin parts"
                 )
-            watch = monitor if made >= watched_from and made % WATCH_EVERY == 0 else None
-            error = (
-                self._contrast * cg.norm / scale * _amplification(cg.norm / first, made) if watch is not None else 0.0
-            )
-            if watch is not None:
+            if monitor is not None and made >= watched_from and made % WATCH_EVERY == 0:
                 u = self._reduced.displacement(cg.x)
-                if watch(u, self._reduced.multiplier(u, f), error):
+                if monitor(u, self._reduced.multiplier(u, f), self._contrast * cg.norm / scale):
                     break
             if cg.step(self._reduced.multiply, self.precondition):
                 made += 1
@@ -379,16 +373,6 @@ class Multigrid:
     def multiplier(self, elimination: Elimination | None, u: Array, f: Array, springs: Springs | None = None) -> Array:
         """Return the multipliers (m,) of the equations at the displacement `u`."""
         return multiplier(self.K, elimination, springs, u, f)
-
-
-def _amplification(left: float, made: int) -> float:
-    """Return by how much the error of a solution may exceed its residual, of which `made` iterations `left` a part.
-
-    Conjugate gradients reduce errors by ``(sqrt(k) - 1) / (sqrt(k) + 1)`` in an iteration, k the condition number, which is
-    what separates errors from residuals.
-    """
-    rate = min(left, SLOWEST) ** (1.0 / made)
-    return ((1.0 + rate) / (1.0 - rate)) ** 2
 
 
 def _alike(new: Elimination | None, old: Elimination | None) -> bool:

@@ -20,6 +20,8 @@ from fastcontact.linear.multigrid.block_products import row_times, row_times_bot
 
 # Block rows that one thread takes at a time.
 CHUNK = 256
+# Where a single part begins: of a literal 0, or an unsigned number, Numba compiles another copy of what works on parts.
+FIRST = np.int64(0)
 
 
 @innermost_kernel
@@ -204,7 +206,7 @@ def multiply(storage, numbers, x, factor, share, z, y, rows):
     n, length = y.shape[0] // len(rows), storage[3]
     count = (n + length - 1) // length
     if count == 1:
-        _multiply_part(0, n, storage, numbers, x, factor, share, z, y, rows)
+        _multiply_part(FIRST, n, storage, numbers, x, factor, share, z, y, rows)
         return
     for p in prange(count):
         _multiply_part(p * length, min(n, (p + 1) * length), storage, numbers, x, factor, share, z, y, rows)

@@ -34,6 +34,7 @@ from fastcontact.linear.multigrid.solver import (
 from fastcontact.linear.protocol import TOLERANCE, FrictionTerms, LinearSolver, Loaded, Product
 from fastcontact.linear.solvers.direct import Direct
 from fastcontact.linear.springs import Springs
+from fastcontact.round_off import ROUND_OFF
 
 log = logging.getLogger("fastcontact")
 # Unknowns up to which a factorisation replaces multigrid.
@@ -45,8 +46,6 @@ STIFFENED, STIFFENED_COUPLED = 3e4, 6.0
 # by the number of components of a displacement. In 3D a factorisation and a step by it cost 300 and 0.04 where two bodies
 # touch, three times as much in stacks with friction (measured, see bench/README.md).
 COST, COST_OF_UNKNOWN = 1000, {1: 0.0, 2: 0.0, 3: 0.08}
-# Where forces stay out of balance, the tolerance is lowered down to this; round-off leaves little below it.
-TIGHT = 1e-12
 
 
 class Amg(Multigrid, LinearSolver):
@@ -105,7 +104,7 @@ class Amg(Multigrid, LinearSolver):
         """See `LinearSolver.improve`: lower the tolerance, or let factors take over where round-off is near."""
         if self.instead is not None:
             return self.instead.improve(excess)
-        if self._may_factorise and not self.tolerance > TIGHT * excess:
+        if self._may_factorise and not self.tolerance > ROUND_OFF * excess:
             self._factorise(
                 f"multigrid gave up and factors took over, which cost more time and memory: at its tolerance of "
                 f"{self.tolerance:.1e} it leaves forces out of balance by {excess:.1e} times what is allowed"

@@ -133,13 +133,8 @@ class Element:
         return self.corner_shape(self.nodes) @ np.linalg.pinv(self.corner_shape(points))
 
 
-def product_values(factors: Array) -> Array:
-    """Return the products (m, n_nodes) [-] of `factors` (m, n_nodes, 3) [-], one of each coordinate."""
-    return factors.prod(axis=2)
-
-
 def product_gradients(factors: Array, slopes: Array) -> Array:
-    """Return the derivatives (m, n_nodes, 3) [-] of the products.
+    """Return the derivatives (m, n_nodes, 3) [-] of products of three factors, one of each coordinate.
 
     From the `factors` (m, n_nodes, 3) [-] and the derivative of each in its coordinate, `slopes` (m, n_nodes, 3) [-].
     """
@@ -166,3 +161,19 @@ def product_of_two(first: ModuleType, second: ModuleType, I: Indices, J: Indices
         return np.concatenate([along_first, along_second], axis=2)
 
     return shape, gradient
+
+
+def with_mid_nodes(simplex: ModuleType) -> tuple[Array, Function, Function]:
+    """Return nodes (n_nodes, dim) [-], shape functions and derivatives of a linear simplex with mid nodes on its edges."""
+    corners, (first, second) = simplex.ELEMENT.nodes, np.array(simplex.ELEMENT.edges).T
+
+    def shape(xi: Array) -> Array:
+        L = simplex.shape(xi)
+        return np.column_stack([L * (2 * L - 1), 4 * L[:, first] * L[:, second]])
+
+    def gradient(xi: Array) -> Array:
+        L, dL = simplex.shape(xi)[:, :, None], simplex.gradient(xi)
+        along_edges = 4 * (L[:, first] * dL[:, second] + L[:, second] * dL[:, first])
+        return np.concatenate([(4 * L - 1) * dL, along_edges], axis=1)
+
+    return np.vstack([corners, (corners[first] + corners[second]) / 2]), shape, gradient

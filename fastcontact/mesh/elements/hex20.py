@@ -3,7 +3,7 @@
 import numpy as np
 
 from fastcontact.mesh.elements import hex8
-from fastcontact.mesh.elements._element import Array, Element, product_gradients, product_values
+from fastcontact.mesh.elements._element import Array, Element, product_gradients
 from fastcontact.mesh.quadrature import gauss_cube
 
 FIRST, SECOND = np.array(hex8.EDGES).T
@@ -21,7 +21,7 @@ def _middle_factors(xi: Array) -> tuple[Array, Array]:
 def shape(xi: Array) -> Array:
     """Shape functions (m, 20) [-] at `xi` (m, 3) [-]."""
     corner = hex8.shape(xi) * (xi @ hex8.NODES.T - 2)
-    return np.column_stack([corner, product_values(_middle_factors(xi)[0])])
+    return np.column_stack([corner, _middle_factors(xi)[0].prod(axis=2)])
 
 
 def gradient(xi: Array) -> Array:

@@ -2,24 +2,14 @@
 
 import numpy as np
 
-from fastcontact.mesh.elements import quad4
-from fastcontact.mesh.elements._element import Array, Element, product_gradients, product_values
+from fastcontact.mesh.elements import line2, quad4
+from fastcontact.mesh.elements._element import Element, product_of_two
 from fastcontact.mesh.quadrature import gauss_cube
 
 NODES = np.column_stack([np.tile(quad4.NODES, (2, 1)), np.repeat([-1.0, 1.0], 4)])
 EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
-
-
-def shape(xi: Array) -> Array:
-    """Shape functions (m, 8) [-] at `xi` (m, 3) [-]."""
-    return product_values((1 + xi[:, None] * NODES) / 2)
-
-
-def gradient(xi: Array) -> Array:
-    """Derivatives (m, 8, 3) [-] at `xi` (m, 3) [-]."""
-    factors = (1 + xi[:, None] * NODES) / 2
-    return product_gradients(factors, np.broadcast_to(NODES / 2, factors.shape))
-
+# Node i is the product of the quad4 function I[i] in x, y and the line2 function J[i] in z.
+shape, gradient = product_of_two(quad4, line2, I=np.tile(np.arange(4), 2), J=np.repeat([0, 1], 4))
 
 ELEMENT = Element(
     name="hex8", nodes=NODES, edges=EDGES,

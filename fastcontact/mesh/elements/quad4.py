@@ -2,24 +2,14 @@
 
 import numpy as np
 
-from fastcontact.mesh.elements._element import Array, Element
+from fastcontact.mesh.elements import line2
+from fastcontact.mesh.elements._element import Element, product_of_two
 from fastcontact.mesh.quadrature import gauss_square
 
 NODES = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 EDGES = ((0, 1), (1, 2), (2, 3), (3, 0))
-
-
-def shape(xi: Array) -> Array:
-    """Shape functions (m, 4) [-] at `xi` (m, 2) [-]."""
-    s, t = xi[:, 0:1], xi[:, 1:2]
-    return (1 + s * NODES[:, 0]) * (1 + t * NODES[:, 1]) / 4
-
-
-def gradient(xi: Array) -> Array:
-    """Derivatives (m, 4, 2) [-] at `xi` (m, 2) [-]."""
-    s, t = xi[:, 0:1], xi[:, 1:2]
-    return np.stack([NODES[:, 0] * (1 + t * NODES[:, 1]), NODES[:, 1] * (1 + s * NODES[:, 0])], axis=2) / 4
-
+# Node i is the product of the line2 functions I[i] in s and J[i] in t.
+shape, gradient = product_of_two(line2, line2, I=np.array([0, 1, 1, 0]), J=np.array([0, 0, 1, 1]))
 
 ELEMENT = Element(
     name="quad4", nodes=NODES, edges=EDGES, facets=EDGES, shape=shape, gradient=gradient, quadrature=gauss_square(2),

@@ -7,8 +7,6 @@ from fastcontact.mesh.quadrature import tetrahedron_1
 
 NODES = np.vstack([np.zeros(3), np.eye(3)])
 EDGES = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))
-# Derivatives of the barycentric coordinates.
-SLOPES = np.vstack([-np.ones(3), np.eye(3)])
 
 
 def shape(xi: Array) -> Array:
@@ -18,7 +16,7 @@ def shape(xi: Array) -> Array:
 
 def gradient(xi: Array) -> Array:
     """Derivatives (m, 4, 3) [-] at `xi` (m, 3) [-]."""
-    return np.tile(SLOPES, (len(xi), 1, 1))
+    return np.tile(np.vstack([-np.ones(3), np.eye(3)]), (len(xi), 1, 1))
 
 
 ELEMENT = Element(

@@ -43,6 +43,7 @@ class _Leaves:
     root: AnyArray
 
 
+@typed(MeshError)
 class Forest:
     """A mesh that can be refined locally, as often as wanted.
 
@@ -64,7 +65,6 @@ class Forest:
     >>> mesh = forest.mesh()
     """
 
-    @typed(MeshError)
     def __init__(self, mesh: Mesh, curves: Iterable[Curve] = ()) -> None:
         for name, block in mesh.cells.items():
             if name not in CORNERS:

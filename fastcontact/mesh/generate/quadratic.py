@@ -66,7 +66,6 @@ class Circle:
         if not (math.isfinite(self.radius) and self.radius > 0.0):
             raise MeshError(f"radius = {self.radius} is out of range: it must be greater than 0")
 
-    @typed(MeshError)
     def project(self, points: Array) -> Array:
         """Return the points (n, 2) [length] of the circle nearest to `points` (n, 2) [length]."""
         arms = points - np.asarray(self.centre)

@@ -73,10 +73,10 @@ def group_names(groups: Sequence[str] | str | None) -> tuple[str, ...] | None:
     return names
 
 
+@typed(ModelError)
 class ModelBase:
     """Mesh, kinematics, and what was added to them."""
 
-    @typed(ModelError)
     def __init__(
         self,
         mesh: Mesh,

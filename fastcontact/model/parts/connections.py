@@ -21,10 +21,10 @@ from fastcontact.model.ramp import History, table_of
 from fastcontact.model.relation_rows import NORMAL, along, directions_of, less_first, matched
 
 
+@typed(ModelError)
 class ModelConnections(ModelInitialStates):
     """A model with relations, couplings, springs and pretension."""
 
-    @typed(ModelError)
     def add_pretension(
         self,
         name: str,
@@ -93,7 +93,6 @@ class ModelConnections(ModelInitialStates):
         if force is not None:
             self._add(PretensionForce(section_of_bolt))
 
-    @typed(ModelError)
     def couple(self, group: str, component: str) -> None:
         """Constrain all nodes of a group to the same displacement component.
 
@@ -120,7 +119,6 @@ class ModelConnections(ModelInitialStates):
             rows = less_first(along(nodes, vectors, self.n_dofs))
             self.relations.append(MultiPointConstraint(f"couple('{group}', '{name}')", rows))
 
-    @typed(ModelError)
     def relate_groups(
         self,
         first: str,
@@ -175,7 +173,6 @@ class ModelConnections(ModelInitialStates):
                 )
             )
 
-    @typed(ModelError)
     def add_periodicity(
         self,
         first: str,
@@ -233,7 +230,6 @@ class ModelConnections(ModelInitialStates):
         self.relations.extend(relations)
         self.periodic_interfaces.append(interface)
 
-    @typed(ModelError)
     def add_cyclic_symmetry(
         self,
         first: str,
@@ -298,7 +294,6 @@ class ModelConnections(ModelInitialStates):
         else:
             self.periodic_interfaces.append(interface)
 
-    @typed(ModelError)
     def relate(
         self, terms: Iterable[tuple[str | int, str, float]], value: float = 0.0, *, ramp: History = None
     ) -> None:
@@ -338,7 +333,6 @@ class ModelConnections(ModelInitialStates):
         rows = csr_array((values, dofs, np.array([0, len(dofs)])), shape=(1, self.n_dofs))
         self.relations.append(MultiPointConstraint(name, rows, float(value), table_of(ramp, f"the ramp of {name}")))
 
-    @typed(ModelError)
     def add_coupling(
         self,
         reference: str,
@@ -390,7 +384,6 @@ class ModelConnections(ModelInitialStates):
             coupling(self.mesh, self.kinematics, (reference, group), kind, sorted(axes), (weighting, radius))
         )
 
-    @typed(ModelError)
     def add_spring(
         self,
         group: str | int,

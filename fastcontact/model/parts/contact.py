@@ -39,10 +39,10 @@ from fastcontact.model.repeated_pairs import check_repeated, joined_already
 log = logging.getLogger("fastcontact")
 
 
+@typed(ModelError)
 class ModelContact(ModelConnections):
     """A model with contact pairs."""
 
-    @typed(ModelError)
     def add_contact(
         self,
         name: str,
@@ -126,7 +126,6 @@ class ModelContact(ModelConnections):
             log.info("contact '%s': %s, since %s", name, method(formulation, given), reason)
         self._add_pair(ContactPair(name, secondary, primary, formulation, given))
 
-    @typed(ModelError)
     def add_contacts(
         self,
         *,
@@ -183,6 +182,7 @@ class ModelContact(ModelConnections):
                 log.info("contact '%s' is left out, since another one joins its facets already", pair.name)
                 continue
             self.add_contact(pair.name, secondary=secondary, primary=primary, formulation=formulation, **options)
+            self.contact[-1] = dataclasses.replace(self.contact[-1], found_gap=pair.gap[0])
             added.append(pair)
         if not added and options:  # they are wrong or right all the same
             checked = copy.copy(self)
@@ -190,13 +190,13 @@ class ModelContact(ModelConnections):
             checked.add_contact("contacts", formulation=formulation, secondary=secondary, primary=primary, **options)
         return FoundContacts(self.mesh, tuple(added))
 
-    @typed(ModelError)
     def add_fluid_pressure(self, contact: str, pressure: float, *, source: str, ramp: History = None) -> None:
         """Let a fluid penetrate a contact pair: it acts on both sides wherever they are open and connected to its source.
 
         Starting at the source, the fluid advances from facet to facet where the sides are open, or where their contact
-        pressure does not exceed its own. There it acts on both sides along the contact normal (``fluid_pressure`` of the
-        results). Its action on other surfaces is a load, see `add_pressure`.
+        pressure does not exceed its own. There it acts on the secondary side along its own normals, in finite strain those
+        of the deformed surface, and on the primary side along its own (``fluid_pressure`` of the results). Its action on
+        other surfaces is a load, see `add_pressure`.
 
         Parameters
         ----------
@@ -228,7 +228,6 @@ class ModelContact(ModelConnections):
         self.bind(changed)
         self.contact[index] = changed
 
-    @typed(ModelError)
     def add_obstacle(
         self,
         name: str,
@@ -373,7 +372,6 @@ class ModelContact(ModelConnections):
             check_repeated(self.mesh, pair, other)
         self.contact.append(pair)
 
-    @typed(ModelError)
     def bind(self, pair: ContactPair, held: HeldMotions | None = None, *, sectors_alike: bool = True) -> Formulation:
         """Return the formulation of a contact pair on this mesh; see `add_contact` for the errors.
 

@@ -27,11 +27,13 @@ from fastcontact.model.rigid_motions import body_name
 HEAT_FLUX = ("heat_flux_x", "heat_flux_y", "heat_flux_z")
 
 
+@typed(ModelError)
 class ModelHeat(ModelMaterials):
     """A model that may conduct heat; steps then tell temperatures and fluxes, and materials with an expansion expand."""
 
-    @typed(ModelError)
-    def fix_temperature(self, group: str, value: Value, *, ramp: History = None) -> None:
+    def fix_temperature(
+        self, group: str, value: Value, *, ramp: History = None, begins: float | None = None, ends: float | None = None
+    ) -> None:
         """Prescribe the temperature of all nodes of a group.
 
         Parameters
@@ -41,6 +43,9 @@ class ModelHeat(ModelMaterials):
             A number, or a function from reference positions (n, dim) [length] to temperatures (n,) [temperature].
         ramp : Ramp or iterable of (float, float), optional
             History of the rise above `Model.reference_temperature`.
+        begins, ends : float, optional
+            Ends of load steps between which it is prescribed, by default always. One that begins later goes from the
+            temperatures that it finds to the next point of its `ramp` [-].
 
         Examples
         --------
@@ -48,9 +53,9 @@ class ModelHeat(ModelMaterials):
         >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain", reference_temperature=20.0)
         >>> model.fix_temperature("TOP", 120.0)
         """
-        self._heat(FixedTemperature(group, value, table_of(ramp, f"the ramp of the temperature on '{group}'")))
+        table = table_of(ramp, f"the ramp of the temperature on '{group}'")
+        self._heat(FixedTemperature(group, value, table, *_span(begins, ends)))
 
-    @typed(ModelError)
     def add_heat_flux(self, group: str, value: Value, *, ramp: History = None) -> None:
         """Apply a heat flux to a group of facets.
 
@@ -70,7 +75,6 @@ class ModelHeat(ModelMaterials):
         """
         self._heat(HeatFlux(group, value, table_of(ramp, f"the ramp of the heat flux on '{group}'")))
 
-    @typed(ModelError)
     def add_heat_source(self, value: Value, groups: Sequence[str] | str | None = None, *, ramp: History = None) -> None:
         """Apply a heat source to groups of solid cells.
 
@@ -91,7 +95,6 @@ class ModelHeat(ModelMaterials):
         """
         self._heat(HeatSource(group_names(groups), value, table_of(ramp, "the ramp of the heat source")))
 
-    @typed(ModelError)
     def add_nodal_heat(self, group: str, value: Value, *, ramp: History = None) -> None:
         """Apply a concentrated heat source to every node of a group.
 
@@ -111,8 +114,10 @@ class ModelHeat(ModelMaterials):
         """
         self._heat(NodalHeat(group, value, table_of(ramp, f"the ramp of the heat at nodes of '{group}'")))
 
-    @typed(ModelError)
-    def add_film(self, group: str, coefficient: Value, ambient: Value, *, ramp: History = None) -> None:
+    def add_film(
+        self, group: str, coefficient: Value, ambient: Value, *, ramp: History = None, begins: float | None = None,
+        ends: float | None = None,
+    ) -> None:  # fmt: skip
         """Apply convection to a group of facets: the outward flux is ``coefficient * (temperature - ambient)``.
 
         Parameters
@@ -124,6 +129,8 @@ class ModelHeat(ModelMaterials):
             Temperature of the surroundings [temperature].
         ramp : Ramp or iterable of (float, float), optional
             History of the rise of the ambient temperature above `Model.reference_temperature`.
+        begins, ends : float, optional
+            Ends of load steps between which it acts, by default always [-].
 
         Examples
         --------
@@ -131,7 +138,8 @@ class ModelHeat(ModelMaterials):
         >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
         >>> model.add_film("TOP", 1.5, 20.0)
         """
-        self._heat(Film(group, coefficient, ambient, table_of(ramp, f"the ramp of the film on '{group}'")))
+        table = table_of(ramp, f"the ramp of the film on '{group}'")
+        self._heat(Film(group, coefficient, ambient, table, *_span(begins, ends)))
 
     def _heat(self, load: FixedTemperature | Heating | Film) -> None:
         load.check(self.mesh, self.kinematics)
@@ -182,8 +190,10 @@ class ModelHeat(ModelMaterials):
                 raise ModelError(
                     f"'{support.group}' and '{other.group}' prescribe different temperatures at point {nodes[row]}"
                 )
-            new = nodes[~fixed[nodes]]
-            by_ramp.setdefault(support.ramp, np.zeros(self.mesh.n_points))[new] = rise[~fixed[nodes]]
+            new, (ramp, leaving) = nodes[~fixed[nodes]], support.history()
+            by_ramp.setdefault(ramp, np.zeros(self.mesh.n_points))[new] = rise[~fixed[nodes]]
+            if support.reached is not None and leaving:
+                by_ramp.setdefault(leaving, np.zeros(self.mesh.n_points))[new] = support.reached[new]
             fixed[nodes], given[nodes], owner[new] = True, rise, number
         return fixed, by_ramp
 
@@ -200,7 +210,6 @@ class ModelHeat(ModelMaterials):
             raise ModelError(
                 "temperatures are both given by add_temperature and conducted: prescribe them by fix_temperature"
             )
-        self.refuse_nonlinear("conduction of heat is")
         if self.interpolated:
             raise ModelError(
                 f"{self.interpolated[0]} joins meshes that differ, which no heat crosses: mesh its ends alike"
@@ -235,3 +244,8 @@ class ModelHeat(ModelMaterials):
         """Return the laws of conductance by contact pair."""
         given = {pair.name: pair.options.get("conductance") for pair in self.contact}
         return {name: Conductance(name, value) for name, value in given.items() if value is not None}
+
+
+def _span(begins: float | None, ends: float | None) -> tuple[float, float]:
+    """Return the instants between which a load acts, always where they are not given."""
+    return -np.inf if begins is None else float(begins), np.inf if ends is None else float(ends)

@@ -26,10 +26,10 @@ from fastcontact.model.parts.loads import ModelLoads
 from fastcontact.model.ramp import History, Table, table_of
 
 
+@typed(ModelError)
 class ModelInitialStates(ModelLoads):
     """A model with temperatures, initial stresses and strains."""
 
-    @typed(ModelError)
     def add_temperature(
         self,
         value: Value | Array,
@@ -79,7 +79,6 @@ class ModelInitialStates(ModelLoads):
             temperature.check(self.mesh)
         self.temperatures += temperatures
 
-    @typed(ModelError)
     def add_temperature_file(
         self,
         file: PathLike | Sequence[PathLike],
@@ -141,7 +140,6 @@ class ModelInitialStates(ModelLoads):
             raise ModelError(f"field '{field}' has {len(values)} instants without times: give the load factor of each")
         self.add_temperature(values, names, reference=reference, times=when)
 
-    @typed(ModelError)
     def add_initial_stress(
         self,
         groups: Sequence[str] | str | None = None,
@@ -179,7 +177,6 @@ class ModelInitialStates(ModelLoads):
         given = {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "yz": yz, "xz": xz}
         self._add_initial("stress", groups, given, axes, ramp)
 
-    @typed(ModelError)
     def add_initial_strain(
         self,
         groups: Sequence[str] | str | None = None,
@@ -223,7 +220,6 @@ class ModelInitialStates(ModelLoads):
             initial_state(kind, names, self._cells_of(names), given, axes, self.kinematics, table)
         )
 
-    @typed(ModelError)
     def temperature_rise(self, factors: Sequence[float]) -> Array | None:
         """Return the rise of the temperature (n_points,) [temperature], None without temperatures.
 
@@ -236,7 +232,15 @@ class ModelInitialStates(ModelLoads):
         ]
         return np.asarray(np.sum(rises, axis=0))
 
-    @typed(ModelError)
+    def expanding_rise(self, temperature_factors: Sequence[float], temperature: Array | None) -> Array | None:
+        """Return the rise of the temperature (n_points,) by which cells expand [temperature]; None where none does.
+
+        Both arguments as of `stress_offset`.
+        """
+        if temperature is not None and self.expands:
+            return np.asarray(temperature - self.reference_temperature)
+        return self.temperature_rise(temperature_factors)
+
     def stress_offset(
         self, temperature_factors: Sequence[float] = (), initial_factors: Sequence[float] = (),
         field: MaterialField | None = None, temperature: Array | None = None,
@@ -246,9 +250,7 @@ class ModelInitialStates(ModelLoads):
         The factors are those of a step result, `StepResult.iterations`; `field` is the `material_field`, where it is known;
         `temperature` (n_points,) [temperature] that of the step result, where heat is conducted.
         """
-        rise, states = self.temperature_rise(temperature_factors), []
-        if temperature is not None and self.expands:
-            rise = temperature - self.reference_temperature
+        rise, states = self.expanding_rise(temperature_factors, temperature), []
         if len(initial_factors):
             states = list(zip(initial_factors, self.initial_states, strict=True))
         if rise is None and not states:
@@ -276,7 +278,6 @@ class ModelInitialStates(ModelLoads):
             by_ramp[temperature.ramp] = by_ramp.get(temperature.ramp, 0.0) + forces
         return by_ramp
 
-    @typed(ModelError)
     def expansion_forces(self, field: MaterialField, rise: Array) -> Array:
         """Return the nodal forces (n_points, dim) [force] by which a rise of the temperature expands the cells.
 

@@ -32,10 +32,10 @@ from fastcontact.model.ramp import History, Table, table_of
 from fastcontact.model.spread_forces import SpreadForce, spread_of
 
 
+@typed(ModelError)
 class ModelLoads(ModelHeat):
     """A model with loads."""
 
-    @typed(ModelError)
     def add_pressure(self, group: str, value: Value, *, ramp: History = None) -> None:
         """Apply a pressure to a group of outer facets.
 
@@ -57,7 +57,6 @@ class ModelLoads(ModelHeat):
         """
         self._add(Pressure(group, value, table_of(ramp, f"the ramp of the pressure on '{group}'")))
 
-    @typed(ModelError)
     def add_traction(
         self,
         group: str,
@@ -86,7 +85,6 @@ class ModelLoads(ModelHeat):
         axes = axes_of(f"the traction on '{group}'", {"x": x, "y": y, "z": z}, self.mesh.dim)
         self._add(Traction(group, axes, table_of(ramp, f"the ramp of the traction on '{group}'")))
 
-    @typed(ModelError)
     def add_body_force(
         self,
         groups: Sequence[str] | str | None = None,
@@ -118,7 +116,6 @@ class ModelLoads(ModelHeat):
         axes = axes_of("the body force", {"x": x, "y": y, "z": z}, self.mesh.dim)
         self._add(BodyForce(names, axes, table_of(ramp, "the ramp of the body force")))
 
-    @typed(ModelError)
     def add_gravity(
         self,
         groups: Sequence[str] | str | None = None,
@@ -153,7 +150,6 @@ class ModelLoads(ModelHeat):
         axes = axes_of("gravity", {"x": x, "y": y, "z": z}, self.mesh.dim)
         self._add(Gravity(names, axes, table_of(ramp, "the ramp of gravity")))
 
-    @typed(ModelError)
     def add_centrifugal(
         self,
         speed: float,
@@ -199,7 +195,6 @@ class ModelLoads(ModelHeat):
         table = table_of(ramp, "the ramp of the centrifugal force")
         self._add(Centrifugal(names, speed, origin_in_space, tuple(direction), table))  # type: ignore[arg-type]
 
-    @typed(ModelError)
     def add_hydrostatic_pressure(
         self, group: str, *, weight: float, level: float, axis: str | None = None, ramp: History = None
     ) -> None:
@@ -230,7 +225,6 @@ class ModelLoads(ModelHeat):
             check_number(f"the {quantity} of the hydrostatic pressure on '{group}'", value)
         self.add_pressure(group, Hydrostatic(float(weight), float(level), along), ramp=ramp)
 
-    @typed(ModelError)
     def add_force(
         self,
         group: str,
@@ -299,7 +293,6 @@ class ModelLoads(ModelHeat):
         axes = axes_of(f"the force on '{group}'", {"x": x, "y": y, "z": z}, self.mesh.dim)
         self._add(kind(group, axes, table_of(ramp, f"the ramp of the force on '{group}'")))
 
-    @typed(ModelError)
     def add_moment(
         self,
         group: str,
@@ -355,7 +348,6 @@ class ModelLoads(ModelHeat):
         pressures = [load for load in self.loads if isinstance(load, Pressure)]
         return [(FollowingPressure(self.mesh, self.kinematics, load), load.ramp) for load in pressures]
 
-    @typed(ModelError)
     def load_vector(self, load: Load) -> Array:
         """Return the nodal forces (n_points, dim) of a load at multiplier 1 [force]."""
         density = None

@@ -17,10 +17,10 @@ from fastcontact.errors import ModelError
 from fastcontact.model.parts.base import ModelBase
 
 
+@typed(ModelError)
 class ModelMaterials(ModelBase):
     """A model with materials."""
 
-    @typed(ModelError)
     def add_material(self, material: Material, groups: Sequence[str] | str | None = None) -> None:
         """Assign a material to groups of solid cells.
 
@@ -48,6 +48,11 @@ class ModelMaterials(ModelBase):
         """Names of the `StepResult.cell_fields` that steps of this model have: none for linear elasticity."""
         return field_names([material for material, _ in self.materials], self.strain)
 
+    @property
+    def nonlinear(self) -> bool:
+        """Whether bodies have nonlinear laws or finite strains."""
+        return self.strain != "small" or any(isinstance(law, NonlinearElastic) for law, _ in self.materials)
+
     def nonlinear_bodies(self, field: MaterialField) -> NonlinearBodies | None:
         """Return the solid cells as nonlinear bodies; None where they are linear."""
         return nonlinear_bodies(self.mesh, self.kinematics, self.strain, field)
@@ -55,7 +60,7 @@ class ModelMaterials(ModelBase):
     def refuse_nonlinear(self, feature: str) -> None:
         """Raise ModelError if bodies are nonlinear, for `feature` is there for linear elasticity alone."""
         nonlinear = [type(law).__name__ for law, _ in self.materials if isinstance(law, NonlinearElastic)]
-        if self.strain != "small" or nonlinear:
+        if self.nonlinear:
             named = nonlinear[0] if nonlinear else f"strain='{self.strain}'"
             raise ModelError(f"{feature} there for linear elasticity alone, not with {named}")
 
@@ -117,7 +122,6 @@ class ModelMaterials(ModelBase):
         named = f", in {', '.join(repr(g) for g in groups)}" if groups else ""
         raise ModelError(f"{total} solid cells have no material{named}: add_material for their groups")
 
-    @typed(ModelError)
     def internal_forces(self, displacement: Array) -> Array:
         """Return the internal nodal forces (n_points, dim) [force] of the solid cells at a displacement.
 
@@ -151,6 +155,10 @@ class ModelMaterials(ModelBase):
         if bodies is not None:
             if self.strain == "small":
                 raise ModelError("forces of plastic bodies depend on their history, not on the displacement alone")
+            if self.temperatures or self.heat_loads:
+                raise ModelError(
+                    "forces of bodies that heat expands depend on their temperature, too: see step.reaction"
+                )
             return bodies.at(np.reshape(displacement, self.mesh.points.shape), bodies.beginning).force
         K = stiffness(self.mesh, self.kinematics, field.moduli, field.loops, None, field.treatment)
         return np.asarray(K @ np.ravel(displacement)).reshape(-1, self.mesh.dim)

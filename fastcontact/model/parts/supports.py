@@ -31,10 +31,10 @@ log = logging.getLogger("fastcontact")
 SupportAxes = Axes | Sequence[float]
 
 
+@typed(ModelError)
 class ModelSupports(ModelContact):
     """A model with supports."""
 
-    @typed(ModelError)
     def fix(self, group: str, components: str, *, axes: SupportAxes = None) -> None:
         """Fix displacement components of all nodes of a group at zero.
 
@@ -63,7 +63,6 @@ class ModelSupports(ModelContact):
         else:
             self._support(group, dict.fromkeys(components, 0.0), None)
 
-    @typed(ModelError)
     def prescribe(
         self,
         group: str,

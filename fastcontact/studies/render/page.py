@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from fastcontact._tools.html_table import html_table
-from fastcontact.cases.summary import versions
+from fastcontact._tools.versions import versions
 from fastcontact.results.plot._axes import png
 
 STYLE = """

@@ -29,7 +29,9 @@ LAWS = {
     'law = "neo_hookean"\nE = 6\nnu = 0.4995': fc.NeoHookean(E=6.0, nu=0.4995),
     'law = "mooney_rivlin"\nC10 = 1\nC01 = 0.2\nbulk = 100': fc.MooneyRivlin(1.0, 0.2, bulk=100.0),
     'law = "yeoh"\nC10 = 1\nC20 = -0.1\nC30 = 0.01\nbulk = 100': fc.Yeoh(1.0, -0.1, 0.01, bulk=100.0),
-    'law = "ogden"\nmu = [1, 0.2]\nalpha = [2, -1]\nbulk = 100': fc.Ogden([1.0, 0.2], [2.0, -1.0], bulk=100.0),
+    'law = "ogden"\nmu = [1, 0.2]\nalpha = [2, -1]\nbulk = 100\nexpansion = 2e-4\nconductivity = 0.2': (
+        fc.Ogden([1.0, 0.2], [2.0, -1.0], bulk=100.0, expansion=2e-4, conductivity=0.2)
+    ),
 }
 
 

@@ -137,11 +137,11 @@ def model_with(law, strain: str = "small") -> fc.Model:
     return model
 
 
-def test_temperatures_and_sensitivities_are_refused() -> None:
+def test_initial_states_are_refused() -> None:
     model = model_with(PLASTIC)
     model.fix("BOTTOM", "xy")
-    model.add_temperature(20.0)
-    with pytest.raises(fc.ModelError, match="temperatures and initial states are there for linear elasticity alone"):
+    model.add_initial_stress(xx=20.0)
+    with pytest.raises(fc.ModelError, match="initial stresses and strains are there for linear elasticity alone"):
         fc.solve(model, 1)
 
 

@@ -51,7 +51,8 @@ def test_our_own_column(tmp_path):
     assert "fastcontact_api.py PROBLEM.npz 3 ANSWER" in text
 
 
-@pytest.mark.parametrize("problem", ["half", pytest.param("octant", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("problem", ["half", "octant"])
 def test_rigid_plane_is_half_of_the_problem(tmp_path, problem):
     _, figures = run(tmp_path, problem, "--only", "fastcontact")
     part = 0.25 if problem == "octant" else 1.0

@@ -198,15 +198,52 @@ def test_what_is_refused(tmp_path, old, new, said):
         deck_of(tmp_path, text.replace(old, new))
 
 
-@pytest.mark.parametrize(
-    ("steps", "said"),
-    [
-        (["", "*FILM\nup, F2, 20., 3.\n"], r"\*FILM: a film that comes in a later step"),
-        (["", "*BOUNDARY\nUPPER, 11, 11, 3.\n"], r"\*BOUNDARY: a temperature that comes in a later step"),
-        (["", "*BOUNDARY, OP=NEW\nHOT, 11, 11, 3.\n"], r"a temperature of line \d+ that is let go"),
-    ],
-)
-def test_what_comes_and_goes_is_refused(tmp_path, steps, said):
-    text = two_bars() + MATERIALS + CONTACT + ENDS + "".join(STEP.format(s) for s in steps)
-    with pytest.raises(fc.CaseError, match=said):
-        deck_of(tmp_path, text)
+RESISTANCE = LENGTH / 50.0 + 1e-3 + LENGTH / 20.0
+
+
+def flows(found):
+    """Return the fluxes from the lower to the upper bar at the ends of steps."""
+    return [-step.heat["contacts"]["UB/LT"] / SIDE**2 for step in found if step.load_factor == round(step.load_factor)]
+
+
+def test_films_come_change_and_go_between_steps(tmp_path):
+    steps = (
+        "*FILM\n5, F2, 20., 10.\n",
+        "*FILM\n5, F2, 30., 40.\n",
+        "*FILM, OP=NEW\n",
+        "*FILM\n5, F2, 0., 10.\n",
+    )
+    _, found = solved(tmp_path, "DC3D8", CONTACT, "*BOUNDARY\nHOT, 11, 11, 100.\n", "", *steps)
+    films = [80.0 / (RESISTANCE + 0.1), 70.0 / (RESISTANCE + 0.025), 0.0, 100.0 / (RESISTANCE + 0.1)]
+    assert flows(found) == pytest.approx([0.0, *films], rel=1e-9, abs=1e-7)
+
+
+def test_temperatures_come_go_and_come_again_from_what_they_find(tmp_path):
+    """The film alone, then a temperature besides it, which the film does not change, then the film alone again."""
+    steps = (
+        "*FILM\n5, F2, 20., 10.\n",
+        "*BOUNDARY\nCOLD, 11, 11, 50.\n",
+        "*BOUNDARY, OP=NEW\nHOT, 11, 11, 100.\n",
+        "*BOUNDARY\nCOLD, 11, 11, 0.\n",
+    )
+    deck, found = solved(tmp_path, "DC3D8", CONTACT, "*BOUNDARY\nHOT, 11, 11, 100.\n", *steps)
+    alone, end = 80.0 / (RESISTANCE + 0.1), deck.points_of("COLD")
+    assert flows(found) == pytest.approx([alone, 50.0 / RESISTANCE, alone, 100.0 / RESISTANCE], rel=1e-9)
+    halves = fc.Ramp([0.5 * k for k in range(1, 9)], deck.ramp.table)
+    found, reached = fc.solve(deck.model, halves), 20.0 + alone / 10.0
+    halfway = {step.load_factor: step.temperature[end].mean() for step in found}
+    assert halfway[1.5] == pytest.approx(0.5 * (reached + 50.0), rel=1e-9)
+    assert halfway[3.5] == pytest.approx(0.5 * reached, rel=1e-9)
+    early = fc.solve(deck.model, fc.Ramp(halves.instants[:3], deck.ramp.table))
+    again = fc.solve(deck.model, halves, resume=early)  # in the middle of the step in which it comes
+    assert all(np.array_equal(a.temperature, b.temperature) for a, b in zip(again, found, strict=True))
+
+
+def test_two_films_on_a_face_and_heat_that_nothing_holds_are_refused(tmp_path):
+    head = two_bars() + MATERIALS + CONTACT
+    with pytest.raises(fc.CaseError, match="3 is the second coefficient here in one step, after 2"):
+        deck_of(tmp_path, head + ENDS + STEP.format("*FILM\n5, F2, 20., 2.\n*FILM\n5, F2, 20., 3.\n"))
+    gone = ENDS + STEP.format("") + STEP.format("*BOUNDARY, OP=NEW\n")
+    deck = deck_of(tmp_path, head + gone)
+    with pytest.raises(fc.ModelError, match="in the load steps after 1: nothing determines the temperature of body"):
+        deck.solve()

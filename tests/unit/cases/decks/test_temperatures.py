@@ -43,6 +43,26 @@ def test_expansion_along_axes(tmp_path):
     assert step.displacement[deck.point(7)] == pytest.approx([1e-3, 2e-3, 3e-3], rel=1e-9)
 
 
+@pytest.mark.parametrize("law", ["*Hyperelastic, MOONEY-RIVLIN\n0.5, 0.2, 0.01\n", "*Elastic\n200., 0.3\n"])
+@pytest.mark.filterwarnings("ignore:temperatures and initial states bring strains")
+def test_large_free_expansion(tmp_path, law):
+    text = heated("*Expansion\n1.e-3\n").replace("*Elastic\n200000., 0.\n", law).replace("*Step\n", "*Step, nlgeom\n")
+    deck = deck_of(tmp_path, text)
+    assert deck.model.strain == "finite"
+    (step,) = deck.solve()
+    assert step.displacement[deck.point(7)] == pytest.approx(0.1 * np.ones(3), rel=1e-9)
+    assert np.abs(step.stress).max() < 1e-9
+
+
+def test_heat_makes_a_held_bar_yield(tmp_path):
+    plastic = "*Plastic\n150., 0.\n160., 0.1\n"
+    deck = deck_of(tmp_path, heated("*Expansion\n1.e-5\n" + plastic, change=HELD))
+    (step,) = deck.solve()
+    p = (200.0 - 150.0) / (200_000.0 + 100.0)
+    assert step.cell_fields["plastic_strain"] == pytest.approx(p, rel=1e-9)
+    assert step.contact["ss/sm"].force[2] == pytest.approx(150.0 + 100.0 * p, rel=1e-9)
+
+
 def test_a_held_bar_is_pressed(tmp_path):
     deck = deck_of(tmp_path, heated(change=HELD))
     (step,) = deck.solve()

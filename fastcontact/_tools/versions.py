@@ -1,0 +1,22 @@
+"""Versions of fastcontact, Python and the libraries it uses."""
+
+from __future__ import annotations
+
+import contextlib
+import platform
+from functools import cache
+from importlib import metadata
+
+from fastcontact._version import __version__
+
+LIBRARIES = ("numpy", "scipy", "numba", "pyamg", "meshio", "h5py")
+
+
+@cache
+def versions() -> dict[str, str]:
+    """Return the versions by name, without those of packages that are installed in another way than as such."""
+    known = {"fastcontact": __version__, "python": platform.python_version()}
+    for name in LIBRARIES:
+        with contextlib.suppress(metadata.PackageNotFoundError):
+            known[name] = metadata.version(name)
+    return known

@@ -1,0 +1,49 @@
+"""The equilibrium at the end of a load step, of linear or of nonlinear bodies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from fastcontact.analysis.balance import Balance
+from fastcontact.analysis.geometry_loop import SettledContact
+from fastcontact.arrays import Array
+from fastcontact.elasticity.nonlinear_bodies import DeformedBodies
+
+
+@dataclass(frozen=True, eq=False)
+class StepEquilibrium:
+    """The equilibrium at the end of a load step.
+
+    Attributes
+    ----------
+    settled : SettledContact, optional
+        None without contact.
+    u : ndarray (n_dofs,)
+        [length]
+    balance : Balance
+    bodies : DeformedBodies, optional
+        Where they are nonlinear.
+    newton : list of dict
+        An entry for each of their iterations.
+    """
+
+    settled: SettledContact | None
+    u: Array
+    balance: Balance
+    bodies: DeformedBodies | None = None
+    newton: list[dict[str, Any]] = field(default_factory=list)
+
+    @property
+    def history(self) -> list[dict[str, Any]]:
+        """Geometry updates of the contact, an entry each."""
+        return self.settled.iterate.history if self.settled is not None else []
+
+    @property
+    def counts(self) -> dict[str, Any]:
+        """Of nonlinear bodies their history, with the pairings and active-set iterations of all iterations."""
+        if self.bodies is None:
+            return {}
+        names = {"geometry_updates": "pairings", "active_set_iterations": "active_set_iterations"}
+        counts = {name: sum(entry[key] for entry in self.newton) for name, key in names.items()}
+        return {**counts, "history": self.newton}
