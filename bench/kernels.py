@@ -130,7 +130,7 @@ def noting(found: list[list[Any]], work: Counter[int]) -> Callable[..., Any]:
 
 def is_interpretable(module: str, name: str) -> bool:
     """Return whether Python may run a kernel while it is not compiled."""
-    return hasattr(getattr(importlib.import_module(module), name), "interpretable")
+    return isinstance(getattr(importlib.import_module(module), name), interpreting.Interpretable)
 
 
 def called(number: int) -> dict[str, Any]:

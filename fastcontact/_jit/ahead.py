@@ -196,7 +196,7 @@ def expect(runs: Sequence[str]) -> None:
     """
     new, helpers = [run for run in runs if run not in _helped], min(numba.get_num_threads() - 1, MOST)
     python = Path(sys.executable or "").stem.startswith("python")
-    if not new or helpers < 1 or multiprocessing.parent_process() is not None or not python or not kernel_files.kept:
+    if not new or helpers < 1 or multiprocessing.parent_process() is not None or not python or not kernel_files.files:
         return
 
     def begin() -> None:

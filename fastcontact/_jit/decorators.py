@@ -70,10 +70,11 @@ def kernel(function: Callable[..., Any]) -> Any:
 def interpretable_kernel(function: Callable[..., Any]) -> Any:
     """Like `kernel`; where it is small and not compiled yet, Python runs it, to the same bits.
 
-    For sums, products, quotients and square roots alone: powers and sums of arrays are other ones in NumPy.
+    For sums, products, quotients and square roots alone: powers and sums of arrays are other ones in NumPy. Only for kernels
+    that no other one calls, as it is no kernel to Numba.
     """
-    compiled = kernel(function)
-    return interpreting.until_compiled(compiled) if hasattr(compiled, "_compile_for_args") else compiled
+    dispatcher = kernel(function)
+    return interpreting.Interpretable(dispatcher, cache.files.get(function)) if compiled() else dispatcher
 
 
 def parallel_kernel(function: Callable[..., Any]) -> Any:

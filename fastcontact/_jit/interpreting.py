@@ -6,9 +6,9 @@ The arithmetic is the same to the last bit: sums, products, quotients and square
 
 from __future__ import annotations
 
+import functools
 import time
 from collections.abc import Callable
-from functools import cache
 from types import FunctionType
 from typing import Any
 
@@ -24,26 +24,44 @@ ENTRIES, SECONDS = 200_000, 0.5
 EXACT = ("float64", "int64", "int32", "uint8", "bool")
 
 
-def until_compiled(kernel: Any) -> Any:
-    """Let Python run a kernel where it is small and no compiled version is kept; return the kernel."""
-    compiled, spent = kernel._compile_for_args, 0.0
+class Interpretable:
+    """A kernel that Python runs for as long as it is small and no compiled version is kept.
 
-    def choose(*arguments: Any) -> Callable[..., Any]:
-        """Return what computes a call, as Numba's dispatcher asks where it has no compiled version."""
-        if spent > SECONDS or entries(arguments) > ENTRIES or _kept(kernel, arguments):
-            return compiled(*arguments)  # type: ignore[no-any-return]
-        compiling.replace()
-        return timed
+    Attributes that it lacks are those of the compiled kernel.
 
-    def timed(*arguments: Any) -> Any:
-        nonlocal spent
+    Parameters
+    ----------
+    compiled : object
+        What Numba makes of the kernel.
+    files : KernelFiles, optional
+        Where compiled versions are kept.
+    """
+
+    def __init__(self, compiled: Any, files: KernelFiles | None) -> None:
+        functools.update_wrapper(self, compiled.py_func)
+        self._compiled, self._files, self._spent = compiled, files, 0.0
+        self._call: Callable[..., Any] = self._choose
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Return what the kernel returns."""
+        return self._call(*arguments)
+
+    def __getattr__(self, name: str) -> Any:
+        """Return an attribute of the compiled kernel."""
+        return getattr(self._compiled, name)
+
+    def _choose(self, *arguments: Any) -> Any:
+        """Compute a call by Python, or this and all later ones by the compiled kernel."""
         began = time.thread_time()
-        result = interpret(kernel, arguments)
-        spent += time.thread_time() - began
+        small = self._spent <= SECONDS and entries(arguments) <= ENTRIES
+        if not small or self.signatures or (self._files is not None and self._files.exist()):
+            self._call = self._compiled
+            return self._compiled(*arguments)
+        if self._spent == 0.0:
+            compiling.replace()
+        result = interpret(self, arguments)
+        self._spent += time.thread_time() - began
         return result
-
-    kernel._compile_for_args, kernel.interpretable = choose, True
-    return kernel
 
 
 def interpret(kernel: Any, arguments: tuple[Any, ...]) -> Any:
@@ -52,34 +70,21 @@ def interpret(kernel: Any, arguments: tuple[Any, ...]) -> Any:
         return _plain(as_python(kernel)(*map(_number, arguments)))
 
 
-def entries(arguments: Any) -> float:
-    """Return the number of entries of arrays and scalars; infinite where there is a type that NumPy computes otherwise."""
-    total = 0.0
-    for given in arguments:
-        if isinstance(given, tuple):
-            total += entries(given)
-        else:
-            exact = isinstance(given, bool | int | float) or getattr(given, "dtype", "") in EXACT
-            total += np.size(given) if exact else np.inf
-    return total
+def entries(given: Any) -> float:
+    """Return the number of entries of an array, a scalar or a tuple of these; infinite for a type that is not `EXACT`."""
+    if isinstance(given, tuple):
+        return float(sum(map(entries, given)))
+    exact = isinstance(given, bool | int | float) or getattr(given, "dtype", "") in EXACT
+    return float(np.size(given)) if exact else np.inf
 
 
-@cache
+@functools.cache
 def as_python(kernel: Any) -> Callable[..., Any]:
     """Return the function that a kernel is compiled from; kernels that it calls are Python, too."""
     function = getattr(kernel, "py_func", kernel)
     known, code = function.__globals__, function.__code__
     parts = {name: as_python(known[name]) for name in code.co_names if hasattr(known.get(name), "py_func")}
     return FunctionType(code, {**known, **parts}, function.__name__, function.__defaults__, function.__closure__)
-
-
-def _kept(kernel: Any, arguments: tuple[Any, ...]) -> bool:
-    """Return whether there is a file of the compiled kernel for these arguments."""
-    files = getattr(kernel._cache, "_cache_file", None)
-    if not isinstance(files, KernelFiles):
-        return False
-    types = tuple(kernel.typeof_pyval(given) for given in arguments)
-    return files.has(kernel._cache._index_key(types, kernel.targetctx.codegen()))
 
 
 def _number(given: Any) -> Any:

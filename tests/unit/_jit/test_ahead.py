@@ -70,7 +70,7 @@ def started(monkeypatch):
     monkeypatch.setattr(ahead, "start", lambda runs, helpers: found.append((runs, helpers)) or [])
     monkeypatch.setattr(ahead, "MOST", 3)
     monkeypatch.setattr(ahead.numba, "get_num_threads", lambda: 2)
-    monkeypatch.setattr(ahead.kernel_files, "kept", True)
+    monkeypatch.setattr(ahead.kernel_files, "files", {len: None})
     monkeypatch.setattr(compiling, "count", 0)
     monkeypatch.setattr(compiling, "helpers", [])
     monkeypatch.setattr(compiling, "waiters", [])
@@ -110,7 +110,7 @@ def test_no_help(started, monkeypatch, spoilt):
     elif spoilt == "works for another":
         monkeypatch.setattr(ahead.multiprocessing, "parent_process", object)
     elif spoilt == "not kept":
-        monkeypatch.setattr(ahead.kernel_files, "kept", False)
+        monkeypatch.setattr(ahead.kernel_files, "files", {})
     else:
         monkeypatch.setattr(ahead.sys, "executable", "/opt/cad/cad")
     monkeypatch.setattr(compiling, "count", 100)

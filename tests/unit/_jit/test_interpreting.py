@@ -5,6 +5,7 @@ import dis
 import importlib
 import os
 import pkgutil
+import shutil
 import subprocess
 import sys
 
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 
 import fastcontact as fc
-from fastcontact._jit import decorators, interpreting
+from fastcontact._jit import cache, decorators, interpreting
 
 pytestmark = pytest.mark.skipif(not decorators.compiled(), reason="kernels are not compiled")
 
@@ -28,7 +29,7 @@ def interpretable():
     for module in pkgutil.walk_packages(fc.__path__, "fastcontact."):
         if module.name.endswith("_kernels"):
             for name, kernel in vars(importlib.import_module(module.name)).items():
-                if hasattr(kernel, "interpretable") and kernel.__module__ == module.name:
+                if isinstance(kernel, interpreting.Interpretable) and kernel.__module__ == module.name:
                     yield module.name, name, kernel
 
 
@@ -56,6 +57,16 @@ def test_only_operations_with_one_result(module, name, kernel):
         ]
         integers = function.__name__ == "room"
         assert integers or not powers, (module, name, function.__name__)
+
+
+def test_no_kernel_calls_one_that_python_may_run():
+    """To Numba it would be no kernel."""
+    for module in pkgutil.walk_packages(fc.__path__, "fastcontact."):
+        place = importlib.import_module(module.name) if module.name.endswith("_kernels") else None
+        for kernel in [kernel for kernel in vars(place).values() if hasattr(kernel, "py_func")] if place else []:
+            known = kernel.py_func.__globals__
+            called = [name for name in kernel.py_func.__code__.co_names if name in known]
+            assert not [name for name in called if isinstance(known[name], interpreting.Interpretable)], kernel.__name__
 
 
 def same(one, other):
@@ -115,7 +126,7 @@ def test_runs_have_the_same_bits(make, element, formulation, least, monkeypatch)
     fc.solve(model, 1, linear_solver="direct")  # compiles what a replaced kernel could not be compiled into
     for module in [module for name, module in sys.modules.items() if name.startswith("fastcontact.")]:
         for name, value in list(vars(module).items()):
-            if hasattr(value, "interpretable"):
+            if isinstance(value, interpreting.Interpretable):
                 monkeypatch.setattr(module, name, both(value, compared))
     fc.solve(model, 1, linear_solver="direct")
     assert len(compared) >= least, sorted(compared)
@@ -141,6 +152,22 @@ def test_python_runs_a_kernel_until_it_has_taken_its_time_and_never_one_that_is_
         for _ in range(2)
     ]
     assert answers == ["2.0 0 1 2.0 1 float\n", "2.0 1 0 2.0 1 float\n"]
+
+
+class Bytes:
+    """Numba's file of a kernel, as far as it turns objects into bytes."""
+
+    _dump = bytes
+
+
+def test_only_files_of_the_kernel_as_it_is_now_count(tmp_path):
+    files, others = (cache.KernelFiles(tmp_path, "kernel", same, options, Bytes) for options in ("one", "another"))
+    assert not files.exist()
+    others.save("float64", b"machine code")
+    assert others.exist()
+    assert not files.exist()
+    shutil.rmtree(tmp_path)
+    assert not others.exist()
 
 
 def test_entries_of_small_types_are_none_that_python_may_compute():
