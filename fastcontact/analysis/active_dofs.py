@@ -73,6 +73,14 @@ class ActiveDofs:
         """Return the active components."""
         return self._system.displacement(v, lift)
 
+    def varied(self, v: Array) -> Array:
+        """Return by how much the active components (k,) change as the active unknowns do by v (l,) [length]."""
+        return self._system.displacement(v, np.zeros(len(self._system.free)))
+
+    def reduced(self, force: Array) -> Array:
+        """Return what nodal forces (n,) do on the active unknowns (l,) [force]."""
+        return self._system.reduced(force)
+
     def size(self, v: Array) -> float:
         """Return the largest of all unknowns, those that are not active as they were when the step began."""
         return largest(v)
@@ -158,12 +166,19 @@ class SurfaceDofs(ActiveDofs):
 
     def displacement(self, v: Array, lift: Array) -> Array:
         """See `ActiveDofs`."""
-        part = self._lift.copy()
-        if self._system.T is None:
-            part[self._own] += v
-        else:
-            part += self._T @ v
-        return part
+        return self._lift + self.varied(v)
+
+    def varied(self, v: Array) -> Array:
+        """See `ActiveDofs`."""
+        if self._system.T is not None:
+            return np.asarray(self._T @ v)
+        moved = np.zeros(len(self._dofs))
+        moved[self._own] = v
+        return moved
+
+    def reduced(self, force: Array) -> Array:
+        """See `ActiveDofs`."""
+        return force[self._unknowns] if self._system.T is None else np.asarray(self._T.T @ force[self._dofs])
 
     def size(self, v: Array) -> float:
         """See `ActiveDofs`."""

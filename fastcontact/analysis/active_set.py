@@ -17,10 +17,14 @@ once, and what follows is the method above from some start. A state counts as se
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import replace
+from functools import partial
 
-from fastcontact.analysis.solution import Accuracy, Equilibrium
-from fastcontact.arrays import Array, Mask
+import numpy as np
+from scipy.linalg import lu_factor, lu_solve
+
+from fastcontact.analysis.solution import Accuracy, Equilibrium, Response
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.linear.protocol import Loaded
 
@@ -67,11 +71,31 @@ def solve(
             continue
         sets = signs.of(u, forces, active, iteration)
         if sets.settled or iteration == accuracy.max_iterations:
-            return sets
+            return replace(sets, response=partial(_response, loaded, constraints, rows))
         seen.add(active.tobytes())
         one_by_one = one_by_one or sets.wanted.tobytes() in seen
         active = _first_changed(active, sets.wanted) if one_by_one else sets.wanted
         iteration += 1
+
+
+def _response(loaded: Loaded, constraints: Constraints, rows: Indices) -> Response:
+    """Return how a solution responds to further forces and gaps, the active constraints being `rows`."""
+    R, compliance = constraints.B[rows], constraints.normal_compliance
+    at_rest = loaded.involved_solution(np.zeros(R.shape[1]), None)
+    F = loaded.delassus(R)[1]
+    C = None if compliance is None else compliance.block(rows)
+    if C is not None:
+        F = F + (np.diag(C) if C.ndim == 1 else C)
+    factors = lu_factor(F) if len(rows) else None
+
+    def respond(force: Array, gaps: Array) -> Array:
+        u = loaded.involved_solution(force, None) - at_rest
+        if factors is None:
+            return u
+        forces = lu_solve(factors, -(R @ u + gaps[0, rows]))
+        return u + loaded.involved_solution(R.T @ forces, None) - at_rest
+
+    return respond
 
 
 def _first_changed(active: Mask, wanted: Mask) -> Mask:

@@ -44,9 +44,11 @@ class Criteria:
         Substeps are complete load steps, along whose path friction slides, but only the instants of the ramp yield
         results; ``iterations["substeps"]`` lists the ends of the substeps. 0: never.
     friction_while_touching : float, optional
-        A load step in which nodes that close within it do more than this fraction of the frictional work so far is halved,
-        too, at most `max_halvings` times: shear and frictional work depend on where nodes come into contact, which a step
-        does not know of nodes that do so within it. By default steps are not halved for this [-].
+        Nodes that close within a load step slide from where they touch on only. Steps in which shear at such nodes is more
+        than this fraction of what friction can carry in all are solved in increments on one Delassus operator, so many that
+        in each the fraction is smaller; 0.01 by default, 0.05 where friction is solved by multigrid iterations. Where a
+        number is given, steps after which such nodes have still done more than this fraction of the frictional work so far
+        are halved, too, at most `max_halvings` times: those of nonlinear bodies, which have no increments. 1: never [-].
 
     Examples
     --------

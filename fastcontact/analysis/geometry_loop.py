@@ -12,6 +12,7 @@ from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.analysis.anderson import Anderson
 from fastcontact.analysis.convergence_messages import active_set_cycles, geometry_moves, nearest_nodes
 from fastcontact.analysis.extrapolation import Extrapolation
+from fastcontact.analysis.geometry_newton import newton_step
 from fastcontact.analysis.inequalities import StepContext, solve_inequalities
 from fastcontact.analysis.iterate import Iterate, initially_active, pair_surfaces
 from fastcontact.analysis.problem import Problem
@@ -50,17 +51,19 @@ class Plan:
     limit: int
     semismooth: bool
     extrapolate: bool
+    newton: bool
 
     @classmethod
     def of(cls, problem: Problem) -> Plan:
         """Return the plan that the criteria, the formulations and the linear solver of a problem ask for."""
-        criteria = problem.criteria
+        criteria, iterative = problem.criteria, problem.solver.iterative
         fixed = 0 if criteria.keep_pairing else criteria.geometry_updates
         return cls(
             until_settled=fixed is None,
             limit=criteria.max_geometry_updates if fixed is None else fixed,
-            semismooth=fixed is None and any(pair.geometry_in_loop for pair in problem.pairs.values()),
-            extrapolate=fixed is None and problem.solver.iterative,
+            semismooth=fixed is None and iterative and any(pair.geometry_in_loop for pair in problem.pairs.values()),
+            extrapolate=fixed is None,
+            newton=not iterative and problem.floating_bodies is None,
         )
 
 
@@ -149,7 +152,11 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
         elif scatter := watch.seen(fraction, settled.force, moved.change, moved.size, tolerances.noise(moved.size)):
             _log_scatter(scatter, problem.criteria.geometry)
             return replace(settled, scatter=scatter)
-        mixed = mixing.next(moved.before, fraction, solution, tolerances.inexact, constraints)
+        mixed = None
+        if plan.newton and solution.settled:
+            mixed = newton_step(step, constraints, solution, moved.before, fraction)
+        if mixed is None:
+            mixed = mixing.next(moved.before, fraction, solution, tolerances.inexact, constraints)
         iterate.u = iterate.u if mixed is None else step.dofs.put(iterate.u, mixed)
         tolerances.tighten(moved.relative, solution.residual)
         if plan.extrapolate and update == PATIENT_UPDATES:

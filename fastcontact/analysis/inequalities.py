@@ -12,9 +12,10 @@ from fastcontact.analysis import active_set
 from fastcontact.analysis.active_dofs import ActiveDofs, constraints_on_unknowns
 from fastcontact.analysis.convergence_messages import friction_exceeded, no_contact_stops, not_balanced
 from fastcontact.analysis.floating_bodies import FloatingBodies
+from fastcontact.analysis.friction.path import Path, completed, shifted
 from fastcontact.analysis.iterate import Iterate
 from fastcontact.analysis.problem import Problem, StepLoad
-from fastcontact.analysis.solution import Accuracy, Solution
+from fastcontact.analysis.solution import Accuracy, Slid, Solution
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.constraints import Constraints, StackedConstraints
@@ -38,6 +39,8 @@ class StepContext:
     loaded : Loaded
         The matrix with the right-hand side of the step, for the active unknowns.
     dofs : ActiveDofs
+    path : Path or Slid, optional
+        To solve friction along, or where its last increment begins.
     """
 
     problem: Problem
@@ -45,6 +48,7 @@ class StepContext:
     load: StepLoad
     loaded: Loaded
     dofs: ActiveDofs
+    path: Path | Slid | None = None
 
     @cached_property
     def prescribed_motion(self) -> Array:
@@ -105,7 +109,11 @@ def _solve(
     from fastcontact.analysis.friction import solve as friction
 
     condensed = replace(condensed, driven=step.driven(constraints))
-    iterate.frictional = friction.solve(step.loaded, condensed, active, accuracy, u, iterate.frictional)
+    slid = step.path if isinstance(step.path, Slid) and len(step.path.slip) == len(constraints) else None
+    path = step.path if isinstance(step.path, Path) else None
+    condensed = condensed if slid is None else shifted(condensed, slid)
+    solution = friction.solve(step.loaded, condensed, active, accuracy, u, iterate.frictional, path)
+    iterate.frictional = solution if slid is None else completed(solution, slid)
     return iterate.frictional
 
 

@@ -127,6 +127,14 @@ class SharedNodes:
         vectors = np.einsum("mk,mkd->md", weight[:, None] * along, self.frame)
         return np.einsum("md,mkd->mk", self.summed(vectors), self.frame)
 
+    def gathered(
+        self, constraints: Constraints, gap: Array, normal: Array, traction: Array
+    ) -> tuple[Array, Array, Array]:
+        """Return gaps (m,) [length], normal (m,) and tangential (m, dim) forces of places, from those of constraints."""
+        tangents = np.stack(constraints.directions, axis=1)
+        forces = self._mean(np.einsum("md,mkd->mk", traction, tangents), np.ones(len(gap)))
+        return self._at_places(self.part) @ gap, self.summed(normal), np.einsum("mk,mkd->md", forces, tangents)
+
     def shared(self, solution: Solution, constraints: StackedConstraints, u: Array) -> Solution:
         """Return a solution of `once` at displacements `u` (n_dofs,) [length] with forces that all constraints share."""
         representative = self.place
@@ -147,6 +155,7 @@ class SharedNodes:
             slip=np.where(self.idle[:, None], turned(solution.slip), solution.slip),
             active=active,
             sticking=solution.sticking[representative],
+            work=None if solution.work is None else self.along * solution.work[:, representative],
             tangential=self.along[:, None]
             * np.where(self.idle[:, None], turned(solution.tangential), solution.tangential),
         )

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -34,6 +35,10 @@ class Accuracy:
     max_newton_steps: int | None = None
 
 
+# How unknowns (n,) [length] change with forces (n,) [force] and with gaps and slips (1 + k, m) [length].
+Response = Callable[[Array, Array], Array]
+
+
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
     """A solution under a set of active constraints.
@@ -52,6 +57,8 @@ class Equilibrium:
         The set that the signs of this solution ask for; equal to `active` when every inequality holds.
     iterations : int
         Linear solutions made.
+    response : callable, optional
+        Makes the `Response` of this solution under its active set.
     """
 
     u: Array
@@ -60,6 +67,7 @@ class Equilibrium:
     active: Mask
     wanted: Mask
     iterations: int
+    response: Callable[[], Response] | None = field(default=None, repr=False)
 
     @property
     def settled(self) -> bool:
@@ -75,6 +83,25 @@ class Equilibrium:
     def tangential(self) -> None:
         """Tangential forces: none without friction."""
         return None
+
+
+@dataclass(frozen=True, eq=False)
+class Slid:
+    """Constraints at the beginning of the last increment of a load step.
+
+    Attributes
+    ----------
+    slip : ndarray (m, dim)
+        Since the beginning of the step [length].
+    work : ndarray (2, m)
+        Of friction since then, and what of it constraints did while they closed [energy].
+    normal : ndarray (m,)
+        Normal forces [force].
+    """
+
+    slip: Array
+    work: Array
+    normal: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +129,12 @@ class FrictionalEquilibrium:
         Newton iterations.
     directions : tuple of ndarray (m, dim)
         The k tangents.
+    work : ndarray (2, m), optional
+        Of friction in the step, and what of it constraints do while they close, where increments of the step tell [energy].
+    slid : Slid, optional
+        Where the last increment began.
+    response : callable, optional
+        Makes the `Response` of this solution, constraints staying open, stuck or sliding.
     """
 
     u: Array
@@ -115,6 +148,9 @@ class FrictionalEquilibrium:
     residual: float
     iterations: int
     directions: tuple[Array, ...] = ()
+    work: Array | None = None
+    slid: Slid | None = None
+    response: Callable[[], Response] | None = field(default=None, repr=False)
 
     def forces_along(self, directions: tuple[Array, ...], m: int) -> Array | None:
         """Return normal and tangential forces (1 + k, m) along other tangents (m, dim); None for other constraints.

@@ -11,6 +11,7 @@ from scipy.linalg import block_diag
 from scipy.sparse import csr_array, diags_array, vstack
 
 from fastcontact.arrays import AnyArray, Array, Indices, Mask
+from fastcontact.contact.linearised_geometry import Geometry
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.contact.pairing import normals
 from fastcontact.linear.field_compliance import FieldCompliance
@@ -180,6 +181,8 @@ class Constraints:
         What normal forces mean at the secondary nodes.
     tied : Tied, optional
         Where the constraints are the equations of a tied pair, or of a cohesive layer.
+    geometry : Geometry, optional
+        How rows and gaps vary with the displacements; None where they do not, or nobody knows.
     """
 
     B: csr_array
@@ -204,6 +207,7 @@ class Constraints:
     branches: AnyArray | None = None
     wetted: Wetted | None = None
     coupled_directions: tuple[Array, ...] = ()
+    geometry: Geometry | None = None
 
     def __len__(self) -> int:
         return len(self.gap0)
@@ -217,6 +221,11 @@ class Constraints:
     def normal_compliance(self) -> Compliance | None:
         """All compliance along the normals: C and `softness`."""
         return self.compliance if self.softness is None else _Softened(self.compliance, self.softness)
+
+    @property
+    def coupled(self) -> bool:
+        """Whether a compliance of their own couples constraints."""
+        return self.compliance is not None or self.low_rank_compliance is not None
 
     @property
     def coefficients(self) -> Array:

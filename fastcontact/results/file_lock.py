@@ -8,10 +8,12 @@ import os
 import shutil
 import stat
 import sys
+import weakref
 from pathlib import Path
 from typing import IO, Any
 
 from fastcontact.errors import FileError
+from fastcontact.results.committed_file import uninterrupted
 
 
 def reserve(descriptor: int, folder: Path, start: int, size: int) -> None:
@@ -39,12 +41,22 @@ def left_at(path: Path) -> tuple[int, ...] | None:
 class PathLock:
     """Exclusive right to write one path, through a locked file beside it; viewers may lock the result file itself.
 
-    The operating system ends the lock with its process, however that ends, so that no lock is left over. FileError is
-    raised where another writer, in this process or in another one, holds the path.
+    The operating system ends the lock with its process, however that ends, so that no lock is left over, and its file goes
+    with the last reference at the latest. FileError is raised where another writer, in this process or in another one,
+    holds the path.
+
+    Attributes
+    ----------
+    release : callable
+        Gives the right back; a second call does nothing.
     """
 
     def __init__(self, target: Path) -> None:
         self.path = target.with_name(f".{target.name}.lock")
+        with uninterrupted():
+            self._take(target)
+
+    def _take(self, target: Path) -> None:
         while True:
             file = _own_file(self.path)
             if not _lock(file):
@@ -58,7 +70,8 @@ class PathLock:
         with contextlib.suppress(OSError):  # for others to read, if the disk has room for it
             file.truncate(0)
             file.write(str(os.getpid()).encode("ascii"))
-        self._file = file
+        # An interruption may come before the caller can release it.
+        self.release = weakref.finalize(self, _release, file, self.path, os.getpid())
 
     def _is_current(self, file: IO[Any]) -> bool:
         try:
@@ -66,13 +79,13 @@ class PathLock:
         except FileNotFoundError:
             return False
 
-    def release(self) -> None:
-        """Give the right back; a second call does nothing."""
-        if self._file.closed:
-            return
+
+def _release(file: IO[Any], path: Path, holder: int) -> None:
+    """Remove the file of a lock, and end the lock; a process that `holder` has forked leaves the file alone."""
+    if os.getpid() == holder:
         with contextlib.suppress(OSError):  # Windows keeps open files: the empty lock file stays, harmless
-            self.path.unlink()
-        self._file.close()
+            path.unlink()
+    file.close()
 
 
 def is_being_written(target: Path) -> bool:

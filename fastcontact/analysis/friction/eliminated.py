@@ -119,7 +119,7 @@ class Eliminated:
         self._nodes = np.arange(len(constraints)) if constraints.nodes is None else constraints.nodes
         k, m = len(rows) - 1, len(constraints)
         yielding = np.divide(1.0, diagonal := loaded.diagonal(), out=np.zeros(len(u)), where=diagonal > 0.0)
-        self._gives = _diagonal_compliance(constraints)
+        self._gives = diagonal_compliance(constraints)
         compliance = self._own(rows, yielding)
         self._turn = aligning(compliance, constraints.directions) if k == 2 else None
         if self._turn is not None:
@@ -240,7 +240,7 @@ class Eliminated:
         return FrictionTerms(through, across.springs, -pushed)
 
 
-def _diagonal_compliance(constraints: Constraints) -> Array:
+def diagonal_compliance(constraints: Constraints) -> Array:
     """Return the own compliance of constraints along normals and tangents (1 + k, m) [length / force]."""
     compliance = np.zeros((1 + len(constraints.tangents), len(constraints)))
     if constraints.softness is not None:

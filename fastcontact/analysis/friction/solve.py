@@ -9,28 +9,34 @@ place of the compliance.
 
 from __future__ import annotations
 
-import dataclasses
 import logging
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from scipy.linalg import lstsq
 from scipy.sparse import csr_array, vstack
 
 from fastcontact.analysis.friction import dense, eliminated
+from fastcontact.analysis.friction.path import Path, along
+from fastcontact.analysis.friction.response import response
 from fastcontact.analysis.friction.slip_directions import GIVING, aligning, idle, own_compliance
-from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium
+from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium, Response, Slid
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.pairing import normals
+from fastcontact.errors import ConvergenceError
 from fastcontact.linear.delassus import MOST_ROWS_WITH_FRICTION, check_rows
 from fastcontact.linear.protocol import Loaded, LoadedNonsymmetric
 
 log = logging.getLogger("fastcontact")
+# Of increments of a step where constraints are eliminated: the last one is solved again as accurately as the step is.
+ROUGH = Accuracy(0.0, residual=1e-3)
 
 
 def solve(
     loaded: Loaded, constraints: Constraints, closed: Mask, accuracy: Accuracy, u: Array,
-    guess: FrictionalEquilibrium | None = None,
+    guess: FrictionalEquilibrium | None = None, path: Path | None = None,
 ) -> FrictionalEquilibrium:  # fmt: skip
     """Find displacement and contact forces under contact and friction.
 
@@ -51,52 +57,90 @@ def solve(
         Unknowns that stay where no constraint acts, see `Loaded.involved_solution`; iterative solvers start there [length].
     guess : FrictionalEquilibrium, optional
         A solution with nearly the same forces; one of other constraints is passed over.
+    path : Path, optional
+        To solve along, in increments.
     """
     forces = None if guess is None else guess.forces_along(constraints.directions, len(constraints))
-    together = constraints.compliance is not None or constraints.low_rank_compliance is not None
+    together = constraints.coupled
     if isinstance(loaded, LoadedNonsymmetric) and not together:
-        equilibrium = _eliminated(loaded, constraints, closed, accuracy, u, forces)
+        equilibrium = _eliminated(loaded, constraints, closed, accuracy, u, forces, path)
         if equilibrium is not None:
             return equilibrium
         log.info("friction: the iteration on eliminated constraints did not settle, their compliance is formed")
     usable = constraints.usable
     begun = closed if constraints.equality is None else closed | constraints.equality
+    begun = begun if path is None else begun | path.loaded
     chosen = usable if together else usable & begun
     iterations = 0
     while True:
-        equilibrium = _among(chosen, loaded, constraints, closed, u, forces)
+        equilibrium = _among(chosen, loaded, constraints, closed, u, forces, path)
         equilibrium.gap[~usable], equilibrium.slip[~usable] = np.inf, 0.0
         iterations += equilibrium.iterations
         missing = usable & ~chosen & (equilibrium.gap < 0.0)
         if not missing.any():
-            return dataclasses.replace(equilibrium, iterations=iterations)
+            responding = partial(_response, loaded, constraints, equilibrium)
+            return replace(equilibrium, iterations=iterations, response=responding)
         chosen = chosen | missing
 
 
+def _response(loaded: Loaded, constraints: Constraints, equilibrium: FrictionalEquilibrium) -> Response:
+    """Return the `response` of an equilibrium."""
+    rows, k = np.flatnonzero(equilibrium.active), len(constraints.tangents)
+    compliance = np.zeros(((1 + k) * len(rows),) * 2)
+    _add_compliance(compliance, constraints, rows)
+    if constraints.tangential_softness is not None:
+        slips = np.arange(len(rows), len(compliance))
+        compliance[slips, slips] += np.tile(constraints.tangential_softness[rows], k)
+    return response(loaded, constraints, equilibrium, compliance)
+
+
 def _eliminated(
-    loaded: LoadedNonsymmetric,
-    constraints: Constraints,
-    closed: Mask,
-    accuracy: Accuracy,
-    u: Array,
-    forces: Array | None,
-) -> FrictionalEquilibrium | None:
+    loaded: LoadedNonsymmetric, constraints: Constraints, closed: Mask, accuracy: Accuracy, u: Array, forces: Array | None,
+    path: Path | None,
+) -> FrictionalEquilibrium | None:  # fmt: skip
     """Solve without the Delassus operator of the constraints, see `eliminated`; None where that fails."""
-    usable = constraints.usable
-    solved = eliminated.solve(loaded, constraints, closed & usable, accuracy, u, forces)
-    if solved is None:
+    usable, before = constraints.usable, None
+
+    def solved(constraints: Constraints, closed: Mask, accuracy: Accuracy, forces: Array | None) -> dense.Forces:
+        nonlocal u
+        solution = eliminated.solve(loaded, constraints, closed & usable, accuracy, u, forces)
+        if solution is None:
+            raise ConvergenceError("friction: the iteration on eliminated constraints did not settle")
+        u, cone = solution
+        cone.gaps[0, ~usable], cone.gaps[1:, ~usable] = np.inf, 0.0
+        return cone
+
+    def beside(offset: Array, closed: Mask, forces: Array | None) -> dense.Forces:
+        at = constraints.gaps_at_rest() + offset
+        return solved(replace(constraints, gap0=at[0], slip0=at[1:], elastic_slip=None), closed, ROUGH, forces)
+
+    try:
+        if path is None:
+            cone = solved(constraints, closed, accuracy, forces)
+        else:
+            y = path.forces(constraints.directions, np.arange(len(constraints)))
+            cone, before = along(_lag(loaded, constraints, path, y), y, path.parts, beside)
+    except ConvergenceError:
         return None
-    u, cone = solved
-    cone.gaps[0, ~usable], cone.gaps[1:, ~usable] = np.inf, 0.0
     return FrictionalEquilibrium(
         u, cone.y[0], cone.gaps[0], cone.y[1:].T, cone.gaps[1:].T, cone.closed & usable, cone.sticking, cone.settled,
         cone.residual, cone.iterations, constraints.directions,
+        slid=None if before is None else _slid(before, None, np.arange(len(constraints)), constraints),
     )  # fmt: skip
 
 
+def _lag(loaded: Loaded, constraints: Constraints, path: Path, y: Array) -> Array:
+    """Return the lag (1 + k, m) of `path.along` for forces y (1 + k, m) at the beginning."""
+    end = loaded.full_solution(constraints.force(y[0], y[1:].T))
+    lag = -constraints.gaps_at_rest() - np.stack([R @ end for R in (constraints.B, *constraints.tangents)])
+    lag -= eliminated.diagonal_compliance(constraints) * y
+    lag[0] += path.gap
+    return np.where(constraints.usable, lag, 0.0)
+
+
 def _among(
-    chosen: Mask, loaded: Loaded, constraints: Constraints, closed: Mask, u: Array, forces: Array | None
-) -> FrictionalEquilibrium:
+    chosen: Mask, loaded: Loaded, constraints: Constraints, closed: Mask, u: Array, forces: Array | None, path: Path | None
+) -> FrictionalEquilibrium:  # fmt: skip
     """Solve with the `chosen` constraints (m,) alone; gaps and slips of the others follow from the displacement."""
     rows = np.flatnonzero(chosen)
     k, m = len(constraints.tangents), len(constraints)
@@ -114,16 +158,27 @@ def _among(
     _add_compliance(F, constraints, rows)
     free = free.reshape(1 + k, -1) + at_rest[:, rows]
     start = None if forces is None else forces[:, rows]
+    begin = np.zeros_like(free) if path is None else path.forces(constraints.directions, rows)
     if Q is not None:
-        F, free = np.asarray(Q @ (Q @ F).T), (Q @ free.ravel()).reshape(free.shape)
+        F, free, begin = np.asarray(Q @ (Q @ F).T), *((Q @ own.ravel()).reshape(free.shape) for own in (free, begin))
         start = None if start is None else (Q @ start.ravel()).reshape(free.shape)
     if len(still):
         moved = idle_slips & constraints.moved_past[rows]
         F[still], F[:, still] = 0.0, 0.0
         F[still, still] = np.where(moved, GIVING * own[0, 0], np.diag(F).max())[idle_slips]
         free[1:][idle_slips & ~moved] = 0.0
+        begin[1:][idle_slips] = 0.0
     equations = np.zeros(len(rows), bool) if constraints.equality is None else constraints.equality[rows]
-    result = _on_delassus_operator(F, free, constraints.coefficients[rows], closed[rows], equations, start)
+
+    def solved(beside: Array, closed: Mask, start: Array | None) -> dense.Forces:
+        return _on_delassus_operator(F, free + beside, constraints.coefficients[rows], closed, equations, start)
+
+    if path is None:
+        result, before = solved(np.zeros_like(free), closed[rows], start), None
+    else:
+        lag = -free - (F @ begin.ravel()).reshape(free.shape)
+        lag[0] += path.gap[rows]
+        result, before = along(lag, begin, path.parts, solved)
     y, relative = result.y, result.gaps
     if Q is not None:
         y, relative = (Q.T @ y.ravel()).reshape(y.shape), (Q.T @ relative.ravel()).reshape(y.shape)
@@ -134,15 +189,29 @@ def _among(
     active[rows], sticking[rows] = result.closed, result.sticking
     return FrictionalEquilibrium(
         u, full[0], gaps[0], full[1:].T, gaps[1:].T, active, sticking, result.settled, result.residual, result.iterations,
-        constraints.directions,
+        constraints.directions, slid=None if before is None else _slid(before, Q, rows, constraints),
     )  # fmt: skip
+
+
+def _slid(before: tuple[Array, Array, Array], Q: csr_array | None, rows: Indices, constraints: Constraints) -> Slid:
+    """Return slips (k, r), works (2, r) and normal forces (r,) of `path.along` at all constraints, Q turned back."""
+    slip, work, normal = before
+    if Q is not None:
+        slip = (Q.T @ np.vstack([np.zeros(len(rows)), slip]).ravel()).reshape(-1, len(rows))[1:]
+    m, dim = constraints.positions.shape
+    slid = Slid(np.zeros((m, dim)), np.zeros((2, m)), np.zeros(m))
+    slid.slip[rows] = sum(
+        along[:, None] * tangent[rows] for along, tangent in zip(slip, constraints.directions, strict=True)
+    )
+    slid.work[:, rows], slid.normal[rows] = work, normal
+    return slid
 
 
 def _add_compliance(F: Array, constraints: Constraints, rows: Indices) -> None:
     """Add, in place, the own compliance of constraints `rows` to the Delassus operator F ((1 + k) m, (1 + k) m)."""
     if constraints.compliance is not None and len(rows):
-        along = np.stack([direction[rows] for direction in constraints.coupled_directions or constraints.directions])
-        F += _turned(constraints.compliance.block(rows), along)
+        frame = np.stack([direction[rows] for direction in constraints.coupled_directions or constraints.directions])
+        F += _turned(constraints.compliance.block(rows), frame)
     if constraints.low_rank_compliance is not None and len(rows):
         Z = constraints.low_rank_compliance[:, rows].reshape(len(F), -1)
         F += Z @ Z.T
@@ -168,7 +237,7 @@ def _on_delassus_operator(
     y[0, equality] = -(give[:, -1] + give[:, :-1] @ forces.y.ravel())
     now, sticking = equality.copy(), equality.copy()
     now[~equality], sticking[~equality] = forces.closed, forces.sticking
-    return dataclasses.replace(forces, y=y, gaps=gaps, closed=now, sticking=sticking)
+    return replace(forces, y=y, gaps=gaps, closed=now, sticking=sticking)
 
 
 def _turned(C: Array, along: Array) -> Array:

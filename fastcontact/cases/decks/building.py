@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import Assembled, Element, assembled
-from fastcontact.cases.decks.blocks import Location, folded
+from fastcontact.cases.decks.blocks import folded
 from fastcontact.cases.decks.cohesive import cohesion_of
 from fastcontact.cases.decks.conditions import Acting, Component, Conditions, Distributed
 from fastcontact.cases.decks.content import Content, Interaction, Material, Pair, Section, Step
@@ -292,38 +293,30 @@ class Building:
                 self.model.add_pressure(group, 1.0, ramp=table)
 
     def _body_forces(self, conditions: Conditions) -> None:
-        forces: dict[str, tuple[Table, dict[str, Any]]] = {}
-        for number, name in enumerate(conditions.loads.tracks, start=1):
-            if name.face is not None:
-                continue
-            track = conditions.loads.tracks[name]
-            by_density: dict[float, list[Any]] = {}
-            for element in name.elements:
-                if element.type is not None:
-                    by_density.setdefault(self._density(element, name, track.location), []).append(element)
-            for density, members in by_density.items():
-                group = self.found.add_solids(f"load {number} of density {density:g}", members)
-                forces[group] = conditions.loads.table(name), _body_force(name, density, self.found.dim)
-        self._name_solids(forces)
-        for group, (table, values) in forces.items():
-            self.model.add_body_force(group, ramp=table, **values)
+        alike = ByShape[tuple[str, tuple[float, ...], str]]()
+        for table, names in conditions.loads.alike():
+            for name in (name for name in names if name.face is None):
+                by_density: dict[tuple[str, float], list[int]] = {}
+                for element in name.elements:
+                    if element.type is not None:
+                        cell, density = element.type.element, self._density(element, name, conditions)
+                        by_density.setdefault((cell, density), []).append(self.model.mesh.offsets[cell] + element.row)
+                for (cell, density), cells in by_density.items():
+                    scaled = tuple((time, density * value) for time, value in table)
+                    alike.add((name.kind, name.vector, cell), scaled, cells)
+        loads = [(f"load {number}", *load) for number, load in enumerate(alike, start=1)]
+        self.model.mesh = self.model.mesh.with_groups(cells={group: cells for group, _, cells, _, _ in loads})
+        for group, (kind, vector, _), _, value, table in loads:
+            self.model.add_body_force(group, ramp=table, **_body_force(kind, vector, value, self.found.dim))
 
-    def _density(self, element: Element, name: Distributed, location: Location) -> float:
+    def _density(self, element: Element, name: Distributed, conditions: Conditions) -> float:
         if name.kind[0] == "B":
             return 1.0
         material = self._material(element.given_section)
         if material.density is None:
+            location = conditions.loads.tracks[name].location
             raise location.refuse(f"material '{material.name}' has no *DENSITY, so {name.kind} is no force")
         return material.density
-
-    def _name_solids(self, groups: Iterable[str]) -> None:
-        """Add groups of solids to the mesh that is made already; elements begin the numbers of cells."""
-        offsets = self.model.mesh.offsets
-        numbers = {
-            group: [offsets[name] + row for name, rows in self.found.groups[group].items() for row in rows]
-            for group in groups
-        }
-        self.model.mesh = self.model.mesh.with_groups(cells=numbers)
 
     def _springs(self) -> None:
         for name, (location, stiffness) in self.content.springs.items():
@@ -522,24 +515,27 @@ def _parts(step: Step) -> list[float]:
     return [k / count for k in range(1, count)]
 
 
-def _body_force(name: Distributed, density: float, dim: int) -> dict[str, Any]:
-    """Return the components of a body force at the value 1 of its history."""
-    if name.kind[0] == "B":
-        return {name.kind[1].lower(): density}
-    if name.kind == "GRAV":
-        direction = np.array(name.vector) / np.linalg.norm(name.vector)
-        return {"xyz"[k]: density * float(direction[k]) for k in range(dim) if direction[k]}
-    origin, axis = np.array(name.vector[:3]), np.array(name.vector[3:])
+def _body_force(kind: str, vector: tuple[float, ...], value: Any, dim: int) -> dict[str, Any]:
+    """Return the components of a body force at the value 1 of its history, of cells with the factor `value`."""
+
+    def times(component: Any) -> Any:
+        if not callable(value):
+            return component
+        return lambda points: value(points) * (component(points) if callable(component) else component)
+
+    if kind[0] == "B":
+        return {kind[1].lower(): times(1.0)}
+    if kind == "GRAV":
+        direction = np.array(vector) / np.linalg.norm(vector)
+        return {"xyz"[k]: times(float(direction[k])) for k in range(dim) if direction[k]}
+    origin, axis = np.array(vector[:3]), np.array(vector[3:])
     axis = axis / np.linalg.norm(axis)
 
-    def component(k: int) -> Any:
-        def outward(points: Array) -> Array:
-            relative = np.pad(points, ((0, 0), (0, 3 - points.shape[1]))) - origin
-            return np.asarray(density * (relative - np.outer(relative @ axis, axis))[:, k])
+    def outward(k: int, points: Array) -> Array:
+        relative = np.pad(points, ((0, 0), (0, 3 - points.shape[1]))) - origin
+        return np.asarray((relative - np.outer(relative @ axis, axis))[:, k])
 
-        return outward
-
-    return {"xyz"[k]: component(k) for k in range(dim) if abs(axis[k]) < 1.0}
+    return {"xyz"[k]: times(partial(outward, k)) for k in range(dim) if abs(axis[k]) < 1.0}
 
 
 def nodal_gaps(model: Model, secondary: str, primary: str, without: Sequence[int]) -> tuple[Array, Array]:

@@ -15,7 +15,7 @@ from fastcontact.cases.decks.assembled import Assembled, Element, Face
 from fastcontact.cases.decks.blocks import Block, Location, Row
 from fastcontact.cases.decks.content import Content, Given, Interaction, Material, Step
 from fastcontact.cases.decks.histories import ByShape, Histories, Name
-from fastcontact.cases.decks.meshing import DeckMesh
+from fastcontact.cases.decks.meshing import DeckMesh, rows_by_type
 from fastcontact.cases.decks.refusals import refusing
 from fastcontact.contact.conductance import Conductance
 from fastcontact.elasticity.materials import LinearElastic
@@ -309,14 +309,17 @@ class HeatConditions:
             group = found.add_points(f"heat {len(made)}", points)
             powers = tuple((time, power / thickness) for time, power in table)
             made.append(partial(Model.add_nodal_heat, group=group, value=value, ramp=powers))
+        sources = ByShape[str]()
         on_faces: dict[tuple[str, Table], list[Face]] = {}
         for table, fluxes in self.fluxes.alike():
             for flux in fluxes:
                 if flux.face is not None:
                     on_faces.setdefault((flux.keyword, table), []).append(flux.face)
-                    continue
-                group = found.add_solids(f"heat source {len(made)}", flux.elements)
-                made.append(partial(Model.add_heat_source, value=1.0, groups=group, ramp=table))
+                for cell, rows in rows_by_type(flux.elements).items():
+                    sources.add(cell, table, rows)
+        for cell, rows, value, table in sources:
+            found.groups[group := f"heat source {len(made)}"] = {cell: rows}
+            made.append(partial(Model.add_heat_source, value=value, groups=group, ramp=table))
         for (keyword, table), faces in on_faces.items():
             group = found.add_facets(f"{keyword.lower()} {len(made)}", faces)
             made.append(partial(Model.add_heat_flux, group=group, value=1.0, ramp=table))

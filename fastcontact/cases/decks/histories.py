@@ -241,43 +241,43 @@ def shape_of(table: Table) -> tuple[float, Table]:
     return size, tuple((time, round(value / size, ALIKE)) for time, value in table) if size else table
 
 
-class ByShape:
+class ByShape(Generic[Name]):
     """Histories of points along axes, grouped by axis and shape: what is given node by node becomes few loads.
 
-    Iterating yields axis, points, value and history. The value is 1, or a function that returns those of the points,
-    ascending, where they differ.
+    Body forces are cells' by their kind. Iterating yields axis, points, value and history. The value is 1, or a function
+    that returns those of the points, ascending, where they differ.
     """
 
     def __init__(self) -> None:
-        self._members: dict[tuple[int, Table], tuple[Table, array[float], array[int]]] = {}
+        self._members: dict[tuple[Name, Table], tuple[Table, array[float], array[int]]] = {}
 
-    def add(self, axis: int, table: Table, points: Sequence[int]) -> None:
+    def add(self, axis: Name, table: Table, points: Sequence[int]) -> None:
         """Add a history of points along an axis."""
         size, shape = shape_of(table)
         _, sizes, members = self._members.setdefault((axis, shape), (table, array("d"), array("q")))
         sizes.extend([size] * len(points))
         members.extend(points)
 
-    @classmethod
-    def of(cls, alike: Iterable[tuple[Table, Sequence[int]]]) -> ByShape:
+    @staticmethod
+    def of(alike: Iterable[tuple[Table, Sequence[int]]]) -> ByShape[int]:
         """Return histories of points that have no axis: 0."""
-        made = cls()
+        made = ByShape[int]()
         for table, points in alike:
             made.add(0, table, points)
         return made
 
-    def __iter__(self) -> Iterator[tuple[int, list[int], Any, Table]]:
+    def __iter__(self) -> Iterator[tuple[Name, list[int], Any, Table]]:
         for (axis, shape), (table, sizes, members) in self._members.items():
-            if min(sizes) == max(sizes):
-                yield axis, list(members), 1.0, table
-                continue
             points, which = np.unique(members, return_inverse=True)
-            yield axis, points.tolist(), partial(_given, np.bincount(which, sizes).astype(float)), shape
+            if len(points) == len(members) and min(sizes) == max(sizes):
+                yield axis, list(members), 1.0, table
+            else:  # what acts twice on a point adds up
+                yield axis, points.tolist(), partial(given_values, np.bincount(which, sizes).astype(float)), shape
 
 
-def _given(values: Array, positions: Array) -> Array:
-    """Return values (n,) that nodes have whatever their positions (n, dim)."""
-    return values
+def given_values(values: Array, positions: Array) -> Array:
+    """Return values (n,) that nodes, or cells, have whatever their positions, or those of their points, (k n, dim)."""
+    return np.repeat(values, len(positions) // len(values))
 
 
 def _shaped(value: float, shape: Amplitude, begin: float, start: float, period: float) -> list[tuple[float, float]]:

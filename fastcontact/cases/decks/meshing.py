@@ -65,11 +65,7 @@ class DeckMesh:
 
     def add_solids(self, group: str, chosen: Iterable[Element]) -> str:
         """Make a group of solids; return its name."""
-        members: dict[str, list[int]] = {}
-        for element in chosen:
-            if element.type is not None:
-                members.setdefault(element.type.element, []).append(element.row)
-        self.groups[group] = members
+        self.groups[group] = rows_by_type(chosen)
         return group
 
     def add_points(self, group: str, points: Iterable[int]) -> str:
@@ -105,6 +101,15 @@ class DeckMesh:
         if turned:
             self.made.content.notes.append(f"{turned} elements were inside out and are turned")
         return mesh
+
+
+def rows_by_type(chosen: Iterable[Element]) -> dict[str, list[int]]:
+    """Return the rows of solids by the type of their cells."""
+    rows: dict[str, list[int]] = {}
+    for element in chosen:
+        if element.type is not None:
+            rows.setdefault(element.type.element, []).append(element.row)
+    return rows
 
 
 def begun(made: Assembled) -> DeckMesh:

@@ -16,6 +16,7 @@ from fastcontact.contact.cohesive_layer import bonded
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Compliance, Constraints
 from fastcontact.contact.held_motions import TOGETHER, HeldMotions, alike, spanned, without
+from fastcontact.contact.linearised_geometry import Geometry, PointForces, faced
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.contact.pair_options import PairOptions
@@ -97,6 +98,8 @@ class Formulation(ABC):
     # Pair again after every active-set iteration (True), or after the active set has settled (False).
     geometry_in_loop: ClassVar[bool]
     against_obstacles: ClassVar[bool] = True
+    # Gaps are those to nodes of the primary side.
+    opposite_nodes: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         if self.normals is None:
@@ -271,13 +274,26 @@ class Formulation(ABC):
         """Return the constraints of paired candidates, with tangential rows where there is friction."""
         B, gap0 = gap_rows(candidates, pairing, self.primary, self.points)
         gap0 += self.added_gap(candidates, pairing, at) - self.overlap_of_smooth(candidates, pairing, at)
-        positions = candidates.positions(self.points)
+        positions, geometry = candidates.positions(self.points), self._geometry(candidates, pairing, at)
         if not self.slides:
-            return Constraints(B, gap0, positions, compliance)
+            return Constraints(B, gap0, positions, compliance, geometry=geometry)
         directions, rubbing = self.options.rubbing(tangents(pairing.normal), candidates)
         along, slip0 = self.slips(candidates, pairing, rubbing, at)
         friction = self.options.coefficients(self.friction, candidates)
-        return Constraints(B, gap0, positions, compliance, along, directions, friction, slip0)
+        return Constraints(B, gap0, positions, compliance, along, directions, friction, slip0, geometry=geometry)
+
+    def _geometry(self, candidates: Candidates, pairing: Pairing, at: Configuration) -> Geometry | None:
+        """Return how the gaps of paired candidates vary, where their normals are those of the primary side."""
+        if self.normals == "secondary" or self.opposite_nodes:
+            return None
+        coordinates = self.points + at.displacement
+
+        def linearised(multiplier: Array, friction: Array) -> PointForces:
+            rows = np.flatnonzero(pairing.paired & (multiplier != 0.0))
+            points = faced(candidates, pairing, rows, self.primary, coordinates, self.normals, at.pose)
+            return PointForces(points, rows, len(multiplier), multiplier[rows], friction[rows])
+
+        return linearised
 
     def slips(
         self, candidates: Candidates, pairing: Pairing, directions: Sequence[Array], at: Configuration

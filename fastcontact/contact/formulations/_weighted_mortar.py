@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import ClassVar
 
 import numpy as np
@@ -33,8 +33,9 @@ from fastcontact.contact.formulations._dual_basis import COVERED, dual_functions
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.formulations._overlap import LEAST, Overlap, obstacle_overlap
 from fastcontact.contact.integration import facet_measure, fine_rule, nodal_areas
+from fastcontact.contact.linearised_geometry import NodalNormals, Points, WeightedForces, faced
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
-from fastcontact.contact.pairing import Candidates, tangents
+from fastcontact.contact.pairing import Candidates, filled_up, pair, tangents
 from fastcontact.contact.prescribed_normals import Normals
 from fastcontact.contact.projection import facet_normals, nodal_normals, smooth_normals
 from fastcontact.errors import ContactError, unknown
@@ -147,7 +148,10 @@ class WeightedMortar(Formulation):
         if at.worn is not None:
             gap0 += rows @ at.worn / weight
         points, nodes = self.secondary.points, self.secondary.points.astype(np.intp)
-        constraints = Constraints(B, gap0, self.points[points], areas=weight, nodes=nodes, nodal=self._nodal(weight))
+        constraints = Constraints(
+            B, gap0, self.points[points], areas=weight, nodes=nodes, nodal=self._nodal(weight),
+            geometry=partial(self._linearised, at, overlap, covered, kept, normal, weight),
+        )  # fmt: skip
         if not self.slides:
             return constraints
         candidates = Candidates(points[:, None], np.ones((len(constraints), 1)))
@@ -167,6 +171,55 @@ class WeightedMortar(Formulation):
             friction=self.options.coefficients(self.friction, candidates),
             slip0=slip0,
         )
+
+    def _linearised(
+        self, at: Configuration, overlap: Overlap, covered: list[Array], kept: Mask, normal: Array, weight: Array,
+        multiplier: Array, friction: Array,
+    ) -> WeightedForces:  # fmt: skip
+        """Return how contact forces and mean gaps vary; see `linearised_geometry`.
+
+        Over Gauss points of whole facets: where the cut runs, what is integrated is continuous.
+        """
+        deformed, forces = self.points + at.displacement, (multiplier != 0.0) | friction.any(axis=1)
+        size, first, parts = len(multiplier), 0, []
+        functions, tests = Entries(), Entries()
+        for number, (block, mass) in enumerate(zip(self.secondary.blocks, overlap.mass, strict=True)):
+            facets, T = np.flatnonzero(forces[block.local].any(axis=1)), self._test[number]
+            xi, weights_of_points = fine_rule(block.element)
+            shape = elements.get(block.element).shape(xi)
+            whole = self._whole[number]
+            fraction = np.where(whole > 0.0, covered[number] / np.where(whole > 0.0, whole, 1.0), 0.0)
+            psi, _ = self._functions(T, mass, kept[block.local], fraction)
+            measure = facet_measure(block.facets[facets], block.element, self.points, xi, self.axisymmetric)
+            area = measure * weights_of_points
+            points = first + np.arange(area.size).reshape(area.shape)
+            functions.add(block.local[facets], points, np.einsum("fak,qk,fq->faq", psi[facets], shape, area))
+            tests.add(block.local[facets], points, np.einsum("ak,qk,fq->faq", T, shape, area))
+            parts.append((np.repeat(block.facets[facets], len(xi), axis=0), np.tile(shape, (len(facets), 1))))
+            first += area.size
+        candidates = Candidates(filled_up([nodes for nodes, _ in parts]), filled_up([shape for _, shape in parts]))
+        along = "facet" if self.normals == "secondary" else self.normals
+        reach = max(self.projection_tolerance or 0.0, 1.0)
+        pairing = pair(candidates.positions(deformed), self.primary, deformed, reach, "facet", at.pose)
+        rows = np.flatnonzero(pairing.paired)
+        points = faced(candidates, pairing, rows, self.primary, deformed, along, at.pose, pairing.normal[rows])
+        weighted = scaled(csr_array(functions.matrix((size, first))[:, rows]), 1.0 / weight)
+        nodal: NodalNormals | Points | None = None
+        if isinstance(self.primary, RigidSide):
+            nodes = self.secondary.points[:, None]
+            nodal = faced(
+                Candidates(nodes, np.ones(nodes.shape)),
+                pairing,
+                np.arange(size),
+                self.primary,
+                deformed,
+                along,
+                at.pose,
+            )
+        elif self.normals == "secondary":
+            nodal = NodalNormals(self.secondary, deformed)
+        mean = csr_array(tests.matrix((size, first))[:, rows])
+        return WeightedForces(points, weighted, mean, normal, multiplier, friction, nodal)
 
     def _slip0(self, mean: csr_array, closing: Array, directions: tuple[Array, ...], at: Configuration) -> Array:
         """Return the slip (k, m) beside that by displacements: by a rigid obstacle, or minus the part of `closing`."""

@@ -53,6 +53,7 @@ class NodeToSegment(Formulation):
             raise ContactError(unknown("what a node of node_to_segment lies opposite to", self.opposite, OPPOSITE))
         if self.opposite == "node" and not isinstance(self.primary, Surface):
             raise ContactError("a rigid obstacle has no nodes: leave out opposite = 'node'")
+        self.opposite_nodes = self.opposite == "node"
         for block in self.secondary.blocks:
             self._check_areas(block.element)
         self._candidates = Candidates.nodes_of(self.secondary)

@@ -114,7 +114,7 @@ def animate(
     figure = new_axes(None, size, projection).figure
     writer = writer_of(target, pictures_per_second)
     colours, box = _over_all(mesh, steps, field, scale, mirrored)
-    with _failure_of_ffmpeg(target), replacing(target) as temporary, writer.saving(figure, temporary, RESOLUTION):
+    with _failure_of_writer(target), replacing(target) as temporary, writer.saving(figure, temporary, RESOLUTION):
         for step in steps:
             figure.clear()
             axes = figure.add_subplot(projection=projection)
@@ -155,8 +155,8 @@ def writer_of(path: Path, pictures_per_second: int) -> Any:
 
 
 @contextlib.contextmanager
-def _failure_of_ffmpeg(path: Path) -> Iterator[None]:
-    """Tell in one line what ffmpeg said last."""
+def _failure_of_writer(path: Path) -> Iterator[None]:
+    """Tell in one line what ffmpeg said last; what ends a picture before its first frame is raised, as it is later on."""
     try:
         yield
     except subprocess.CalledProcessError as error:
@@ -165,6 +165,8 @@ def _failure_of_ffmpeg(path: Path) -> Iterator[None]:
         raise FastcontactError(
             f"'{path}' was not written, ffmpeg ended with code {reason}: write a .gif instead"
         ) from error
+    except IndexError as error:  # matplotlib cannot finish a .gif without frames
+        raise error.__context__ or error from None
 
 
 def _over_all(

@@ -511,6 +511,17 @@ def test_what_ffmpeg_says_when_it_fails_is_told_in_one_line(reads, tmp_path, mon
     assert [path.name for path in tmp_path.iterdir()] == ["bin"]
 
 
+def test_an_interruption_before_the_first_frame_is_told_as_such(tmp_path, monkeypatch):
+    def interrupted(*given, **named):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("fastcontact.results.plot.animation.deformed_shape", interrupted)
+    mesh = block((1.0, 1.0), (2, 2), "quad4")
+    with pytest.raises(KeyboardInterrupt):
+        fc.plot.animate(mesh, [step_of(mesh)], tmp_path / "a.gif")
+    assert os.listdir(tmp_path) == []
+
+
 @pytest.mark.skipif(not shutil.which("ffmpeg"), reason="needs the program ffmpeg")
 @pytest.mark.parametrize("suffix", ["mp4", "mkv", "webm"])
 def test_ffmpeg_reads_as_many_pictures_as_there_are_steps(suffix, tmp_path):

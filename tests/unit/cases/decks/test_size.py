@@ -44,6 +44,10 @@ LINES = {
     "forces": ("*Dsload\noutside, P, 1.", lambda n: "*Cload\n" + "\n".join(f"{k}, 3, {k}." for k in numbered(n))),
     "same forces": ("*Dsload\noutside, P, 1.", lambda n: "*Cload\n" + "\n".join(f"{k}, 3, 1." for k in numbered(n))),
     "displacements": ("*Dsload\noutside, P, 1.", lambda n: "*Boundary\n" + motions(n)),
+    "body forces": (
+        "*Dsload\noutside, P, 1.",
+        lambda n: "*Dload\n" + "\n".join(f"{k}, BX, {k}." for k in range(1, n**3 + 1)),
+    ),
     "members": ("*Step\n", lambda n: "*Nset, nset=singly\n" + "\n".join(map(str, numbered(n))) + "\n*Step\n"),
 }
 
@@ -123,3 +127,27 @@ def test_forces_and_displacements_of_their_own(tmp_path):
         assert step.reaction[held, 2].sum() == pytest.approx(-(k + 1.0))
     assert step.displacement[[deck.point(3), deck.point(4)], 0] == pytest.approx([0.001, 0.002], abs=1e-18)
     assert isinstance(deck, fc.Deck)
+
+
+TURNED = "*Transform, nset=seven\n1., 1., 0., -1., 1., 0.\n"
+# Loads of three cubes on each other's side, and what they add up to along x, or y.
+ADDED = {
+    "of elements and a set": ("*Dload\n1, BX, 2.\n2, BX, 3.\nall, BX, 2.\n", 0, (4.0, 5.0, 2.0)),
+    "of elements alike": ("*Dload\n1, BX, 2.\nall, BX, 2.\n", 0, (4.0, 2.0, 2.0)),
+    "gravity": ("*Dload\n1, GRAV, 2., 3., 0., 0.\n2, GRAV, 6., 1., 0., 0.\n", 0, (20.0, 60.0, 0.0)),
+    "centrifugal": ("*Dload\n" + "".join(f"{k}, CENTRIF, {k / 100}, 0., 0., 0., 0., 0., 1.\n" for k in (1, 2, 3)), 0,
+                    (0.05, 0.5, 1.35)),
+    "along local axes": ("*Cload\n7, 1, 1.\n7, 2, 1.\n", 1, (2.0**0.5, 0.0, 0.0)),
+}  # fmt: skip
+
+
+@pytest.mark.filterwarnings("ignore:hex8 cells are too stiff")
+@pytest.mark.parametrize("kind", ADDED)
+def test_loads_on_the_same_add_up(kind, tmp_path):
+    lines, axis, expected = ADDED[kind]
+    head, _, _ = many_forces(3).partition("*Cload\n")
+    head = head.replace("*Elastic", "*Density\n10.\n*Elastic").replace("*Step", f"*Nset, nset=seven\n7\n{TURNED}*Step")
+    deck = deck_of(tmp_path, f"{head}{lines}*End step\n")
+    (step,) = deck.solve()
+    held = [[deck.point(8 * k + n) for n in (1, 2, 3, 4)] for k in range(3)]
+    assert [-step.reaction[points, axis].sum() for points in held] == pytest.approx(expected, rel=1e-9, abs=1e-9)

@@ -1,0 +1,106 @@
+"""Coulomb friction along the path of a load step, in increments on one Delassus operator.
+
+A step that is solved at once counts the slip of a constraint from its beginning, although one that closes within it slides
+from where it touches only. Here the forces that the step changes are applied in equal parts, the geometry and the Delassus
+operator F being those of its end. With gaps and slips ``(g, s) = free + F y`` at the end, and gaps g0 and forces y0 at the
+beginning, where s = 0, those at a part p of the step are ``free + (1 - p) ((g0, 0) - free - F y0) + F y``.
+
+The last increment depends on the others by the slips before it alone. They stay as they are while the geometry settles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fastcontact.analysis.friction.cone_newton import Forces
+from fastcontact.analysis.solution import FrictionalEquilibrium, Slid
+from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.contact.constraints import Constraints
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """Constraints at the beginning of a load step.
+
+    Attributes
+    ----------
+    gap, normal : ndarray (m,)
+        Gaps [length], zero where forces act, and normal forces [force].
+    traction : ndarray (m, dim)
+        Tangential forces [force].
+    parts : int
+        Increments to solve in.
+    """
+
+    gap: Array
+    normal: Array
+    traction: Array
+    parts: int
+
+    @property
+    def loaded(self) -> Mask:
+        """Constraints (m,) that carry forces at the beginning."""
+        return self.normal != 0.0
+
+    def forces(self, directions: tuple[Array, ...], rows: Indices) -> Array:
+        """Return the forces (1 + k, r) of constraints `rows` (r,) along tangents (m, dim)."""
+        along = [(self.traction[rows] * tangent[rows]).sum(axis=1) for tangent in directions]
+        return np.vstack([self.normal[rows], *along])
+
+
+def along(
+    lag: Array, y: Array, parts: int, solve: Callable[[Array, Mask, Array | None], Forces]
+) -> tuple[Forces, tuple[Array, Array, Array]]:
+    """Return the forces at the end of a step, and `Slid.slip` along tangents (k, m), `work` and `normal` there.
+
+    Parameters
+    ----------
+    lag : ndarray (1 + k, m)
+        What gaps and slips at the beginning are above those at the end under the forces of the beginning [length].
+    y : ndarray (1 + k, m)
+        These forces [force].
+    parts : int
+    solve : callable
+        Returns the forces for gaps and slips beside those of the end, closed constraints and forces to start from.
+    """
+    closed, slip, work, iterations, settled = y[0] > 0.0, np.zeros_like(lag[1:]), np.zeros((2, lag.shape[1])), 0, True
+    for part in range(1, parts + 1):
+        beside = (1.0 - part / parts) * lag
+        beside[1:] -= slip
+        before = slip.copy(), work.copy(), y[0]
+        forces = solve(beside, closed, y if y.any() else None)
+        work += friction_work(y[0], forces.y[0], forces.y[1:], np.where(forces.closed, forces.gaps[1:], 0.0))
+        slip += forces.gaps[1:]
+        y, closed = forces.y, forces.closed
+        iterations += forces.iterations
+        settled &= forces.settled
+    gaps = np.vstack([forces.gaps[:1], slip])
+    return replace(forces, gaps=gaps, iterations=iterations, settled=settled), before
+
+
+def friction_work(before: Array, normal: Array, tangential: Array, slip: Array) -> Array:
+    """Return the work of friction of constraints (2, m) in an increment, and what of it those do that close in it.
+
+    Under tangential forces (k, m) times the mean of the normal forces (m,) at both ends over those at the end, `before` being
+    those at the beginning: friction that slides is at its limit. Slips are (k, m).
+    """
+    once = -0.5 * (tangential * slip).sum(axis=0)
+    ratio = np.divide(before, normal, out=np.zeros_like(normal), where=normal > 0.0)
+    return np.stack([(1.0 + ratio) * once, np.where(before == 0.0, once, 0.0)])
+
+
+def shifted(constraints: Constraints, slid: Slid) -> Constraints:
+    """Return constraints whose slips count from the last increment on."""
+    before = np.stack([(slid.slip * tangent).sum(axis=1) for tangent in constraints.directions])
+    return replace(constraints, slip0=-before if constraints.slip0 is None else constraints.slip0 - before)
+
+
+def completed(solution: FrictionalEquilibrium, slid: Slid) -> FrictionalEquilibrium:
+    """Return the solution of `shifted` constraints with the slip and the work of the whole step."""
+    last = np.where(solution.active[:, None], solution.slip, 0.0)
+    work = slid.work + friction_work(slid.normal, solution.multiplier, solution.tangential.T, last.T)
+    before = np.stack([(slid.slip * tangent).sum(axis=1) for tangent in solution.directions], axis=1)
+    return replace(solution, slip=solution.slip + before, work=work)

@@ -1,0 +1,84 @@
+"""Newton's method for the contact geometry of a load step, by directional derivatives.
+
+With the pairing of displacements u the contact problem has a solution S(u), and the load step asks for u = S(u). Newton's
+method takes the geometry's own variation into account: of the change v of the displacements in
+
+    v = S(u) - u + S'(u) v
+
+the last part is the response of the solution to the forces and gaps by which the geometry varies along v, see
+`contact.linearised_geometry`, with the active set, stick and slip as they are. It is a third of v or less, so that a few
+iterations of GMRES solve for v, each of the price of a back substitution.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.linalg import LinAlgError
+from scipy.sparse.linalg import LinearOperator, gmres
+
+from fastcontact.analysis.inequalities import StepContext
+from fastcontact.analysis.solution import Solution
+from fastcontact.arrays import Array
+from fastcontact.contact.constraints import StackedConstraints
+from fastcontact.contact.linearised_geometry import Linearised
+
+# Relative residual of the change, and iterations at most.
+ACCURACY, MOST = 1e-6, 20
+
+
+def newton_step(
+    step: StepContext, constraints: StackedConstraints, solution: Solution, before: Array, image: Array
+) -> Array | None:
+    """Return the active displacements (k,) to pair at next [length]; None where the geometry is not linearised.
+
+    Parameters
+    ----------
+    step : StepContext
+    constraints : StackedConstraints
+        Paired at displacements `before` (k,) [length].
+    solution : Solution
+        With these constraints.
+    before, image : ndarray (k,)
+        Active displacements of the pairing and of the solution [length].
+    """
+    parts = _linearised(constraints, solution)
+    if not parts or solution.response is None:
+        return None
+    try:
+        respond = solution.response()
+    except LinAlgError:
+        return None
+    dim, n_dofs = step.problem.model.mesh.dim, len(step.load.lift)
+    gaps = np.zeros((1 + len(constraints.tangents), len(constraints)))
+
+    def along(v: Array) -> Array:
+        """Return ``v - S'(u) v``."""
+        u = step.dofs.put(np.zeros(n_dofs), v)
+        force, nodal = np.zeros(n_dofs), u[: step.problem.model.n_dofs].reshape(-1, dim)
+        for rows, part in parts:
+            varied, gaps[0, rows] = part.along(nodal)
+            force[: varied.size] += varied.ravel()
+        return v - step.dofs.varied(respond(step.dofs.reduced(force), gaps))
+
+    changed = image - before
+    v, failed = gmres(
+        LinearOperator((len(changed),) * 2, matvec=along), changed, rtol=ACCURACY, atol=0.0, restart=MOST, maxiter=1
+    )
+    return before + v if np.isfinite(v).all() else None
+
+
+def _linearised(constraints: StackedConstraints, solution: Solution) -> list[tuple[slice, Linearised]]:
+    """Return the linearised geometry of pairs in contact with the rows of each; empty where that of one is not known."""
+    parts = []
+    for name, rows in constraints.rows().items():
+        part, multiplier = constraints.parts[name], solution.multiplier[rows]
+        if part.tied is not None or not multiplier.any():
+            continue
+        if part.geometry is None:
+            return []
+        friction = np.zeros_like(part.positions)
+        if solution.tangential is not None:
+            for along, direction in zip(solution.tangential[rows].T, part.directions, strict=False):
+                friction += along[:, None] * direction
+        parts.append((rows, part.geometry(multiplier, friction)))
+    return parts

@@ -1,0 +1,117 @@
+"""Load steps in which nodes slide while they close: friction is solved again, along the path of the step."""
+
+from __future__ import annotations
+
+import logging
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from fastcontact.analysis.extrapolation import Extrapolation
+from fastcontact.analysis.friction.path import Path
+from fastcontact.analysis.geometry_loop import Plan, SettledContact, settle_geometry
+from fastcontact.analysis.inequalities import StepContext, solve_inequalities
+from fastcontact.analysis.iterate import Iterate, pair_surfaces
+from fastcontact.analysis.shared_nodes import SharedNodes
+from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium
+from fastcontact.arrays import Array
+from fastcontact.contact.constraints import StackedConstraints
+from fastcontact.errors import ConvergenceError
+from fastcontact.linear.protocol import LoadedNonsymmetric
+from fastcontact.round_off import LENGTH_ROUND_OFF
+
+log = logging.getLogger("fastcontact")
+# Shear of constraints that close in an increment over what friction can carry in all, by default, and where constraints are
+# eliminated: increments cost iterations there. The most increments of a step.
+WHILE_TOUCHING, MOST = (0.01, 0.05), 128
+
+
+def along_path(step: StepContext, settled: SettledContact, expected: float) -> SettledContact:
+    """Return the contact of a step whose friction is solved in increments, where its nodes slide while they close.
+
+    Increments are solved with the geometry that has settled without them. Where they do not converge the step is left as it
+    is. `expected` is that of `settle_geometry`.
+    """
+    nodes = SharedNodes.of(settled.constraints, step.problem.model.periodic_interfaces)
+    path = _path(step, settled, nodes)
+    if path is None:
+        return settled
+    old = settled.iterate
+    begun = replace(old, active=dict(old.active), pressure=dict(old.pressure), history=list(old.history))
+    constraints, active = settled.constraints, settled.solution.active
+    once, closed = (constraints, active) if nodes is None else (nodes.once(constraints), nodes.closed(active))
+    try:
+        solution, _ = solve_inequalities(
+            replace(step, path=path), once, replace(begun), closed & once.usable, Accuracy(0.0)
+        )
+        assert isinstance(solution, FrictionalEquilibrium)
+        if not solution.settled:
+            return settled
+        along = settle_geometry(replace(step, path=solution.slid), Extrapolation(), expected, begun)
+        if not Plan.of(step.problem).until_settled:  # their number is given
+            del begun.history[: len(old.history)]
+        return along
+    except ConvergenceError as error:
+        log.info("friction in %d increments of the step does not converge: %s", path.parts, error)
+        return settled
+
+
+def _path(step: StepContext, settled: SettledContact, nodes: SharedNodes | None) -> Path | None:
+    """Return the path of a step, None where it makes no difference."""
+    constraints, solution = settled.constraints, settled.solution
+    if not isinstance(solution, FrictionalEquilibrium) or not constraints.tangents:
+        return None
+    forces = _forces(step, constraints)
+    if forces is None:
+        return None
+    normal, traction = forces
+    rubs = solution.active & (constraints.coefficients > 0.0)
+    closing = rubs & (normal == 0.0)
+    shear = np.linalg.norm(solution.tangential, axis=1)
+    eliminated = isinstance(step.loaded, LoadedNonsymmetric) and not constraints.coupled
+    allowed = step.problem.criteria.friction_while_touching or WHILE_TOUCHING[int(eliminated)]
+    if allowed >= 1.0:
+        return None
+    limit = allowed * float((constraints.coefficients * solution.multiplier)[rubs].sum())
+    if not float(shear[closing].sum()) > limit:
+        return None
+    gap = np.where(normal != 0.0, 0.0, _gaps(step, constraints, settled.iterate))
+    size = float(np.ptp(step.problem.model.mesh.points, axis=0).max())
+    closing &= gap > LENGTH_ROUND_OFF * size
+    if not (slid := float(shear[closing].sum())) > limit:
+        return None
+    if nodes is not None:
+        gap, normal, traction = nodes.gathered(constraints, gap, normal, traction)
+    return Path(gap, normal, traction, min(math.ceil(slid / limit), MOST))
+
+
+def _forces(step: StepContext, constraints: StackedConstraints) -> tuple[Array, Array] | None:
+    """Return normal (m,) and tangential (m, dim) forces at the beginning of the step [force]; None where nobody knows.
+
+    Those of equations make no difference.
+    """
+    normal, traction = np.zeros(len(constraints)), np.zeros_like(constraints.positions)
+    for name, rows in constraints.rows().items():
+        part, before = constraints.parts[name], step.state.forces.get(name)
+        if before is not None and part.areas is not None and part.wetted is None:
+            areas = np.where(np.isfinite(part.areas), part.areas, 0.0)
+            pressure, shear = before.at(part.positions)
+            normal[rows], traction[rows] = areas * pressure, areas[:, None] * shear
+        elif name in step.state.touched and not (part.equality is not None and part.equality.all()):
+            return None
+    return normal, traction
+
+
+def _gaps(step: StepContext, constraints: StackedConstraints, iterate: Iterate) -> Array:
+    """Return the gaps (m,) at the beginning of the step, where the sides stood then [length]."""
+    state = step.state
+    begin = replace(step.load, obstacles=state.obstacles, angles=state.angles)
+    there = pair_surfaces(step.problem, state, begin, Iterate.of(state))
+    gaps = []
+    for name, part in there.parts.items():
+        now = constraints.parts[name]
+        then = part if len(part) == len(now) else now
+        known = np.isfinite(then.gap0) & then.usable
+        gaps.append(np.where(known, then.gap0 + then.B @ state.u, now.gap0 + now.B @ state.u))
+    return np.maximum(np.concatenate(gaps), 0.0)
