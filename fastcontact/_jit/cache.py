@@ -111,7 +111,7 @@ class KernelFiles:
 
 
 # Those of all kernels that are kept, by their functions in Python.
-files: dict[Callable[..., Any], KernelFiles] = {}
+files: dict[Any, KernelFiles] = {}
 
 
 def keep(kernel: Any, function: Callable[..., Any], options: str) -> str:

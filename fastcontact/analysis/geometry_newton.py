@@ -61,7 +61,7 @@ def newton_step(
         return v - step.dofs.varied(respond(step.dofs.reduced(force), gaps))
 
     changed = image - before
-    v, failed = gmres(
+    v, _ = gmres(
         LinearOperator((len(changed),) * 2, matvec=along), changed, rtol=ACCURACY, atol=0.0, restart=MOST, maxiter=1
     )
     return before + v if np.isfinite(v).all() else None
