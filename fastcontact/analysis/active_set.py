@@ -21,11 +21,12 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from scipy.linalg import lu_factor, lu_solve
+from scipy.linalg import lu_solve
 
 from fastcontact.analysis.solution import Accuracy, Equilibrium, Response
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
+from fastcontact.linear.delassus import lu_factors
 from fastcontact.linear.protocol import Loaded
 
 
@@ -86,7 +87,7 @@ def _response(loaded: Loaded, constraints: Constraints, rows: Indices) -> Respon
     C = None if compliance is None else compliance.block(rows)
     if C is not None:
         F = F + (np.diag(C) if C.ndim == 1 else C)
-    factors = lu_factor(F) if len(rows) else None
+    factors = lu_factors(F) if len(rows) else None
 
     def respond(force: Array, gaps: Array) -> Array:
         u = loaded.involved_solution(force, None) - at_rest

@@ -44,11 +44,12 @@ class Criteria:
         Substeps are complete load steps, along whose path friction slides, but only the instants of the ramp yield
         results; ``iterations["substeps"]`` lists the ends of the substeps. 0: never.
     friction_while_touching : float, optional
-        Nodes that close within a load step slide from where they touch on only. Steps in which shear at such nodes is more
-        than this fraction of what friction can carry in all are solved in increments on one Delassus operator, so many that
-        in each the fraction is smaller; 0.01 by default, 0.05 where friction is solved by multigrid iterations. Where a
-        number is given, steps after which such nodes have still done more than this fraction of the frictional work so far
-        are halved, too, at most `max_halvings` times: those of nonlinear bodies, which have no increments. 1: never [-].
+        Solve friction along the path of load steps in which nodes slide while they close: with the geometry of their end, in
+        increments on one Delassus operator, so many that in each the shear at such nodes is at most this fraction of what
+        friction can carry in all; 0.01 suits most. Nodes then slide from where they touch on only, so that work of friction
+        and shear are those of many steps. Steps after which such nodes have still done more than this fraction of the
+        frictional work so far are halved, too, at most `max_halvings` times: those of nonlinear bodies, which have no
+        increments. By default slip counts from the beginning of each step [-].
 
     Examples
     --------

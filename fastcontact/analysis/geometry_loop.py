@@ -208,7 +208,8 @@ def _move(
     iterate.u = step.dofs.put(iterate.u, fraction)
     # Rigid motions of bodies that only contact holds do not count.
     size = max(step.dofs.size(solution.u), largest(step.load.lift))
-    moved = _Moved(before, largest_difference(fraction, before), size)
+    change = largest_difference(fraction, before)
+    moved = _Moved(before, change if change > step.state.gap_round_off else 0.0, size)
     iterate.remember(constraints, solution)
     iterate.history.append(
         {

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.linalg import LinAlgError
 from scipy.sparse.linalg import LinearOperator, gmres
 
+from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.analysis.inequalities import StepContext
 from fastcontact.analysis.solution import Solution
 from fastcontact.arrays import Array
@@ -24,6 +25,8 @@ from fastcontact.contact.linearised_geometry import Linearised
 
 # Relative residual of the change, and iterations at most.
 ACCURACY, MOST = 1e-6, 20
+# What the response may add to the change, in units of it: far from the solution a step beyond that leads anywhere.
+FARTHEST = 1.0
 
 
 def newton_step(
@@ -61,10 +64,11 @@ def newton_step(
         return v - step.dofs.varied(respond(step.dofs.reduced(force), gaps))
 
     changed = image - before
-    v, _ = gmres(
-        LinearOperator((len(changed),) * 2, matvec=along), changed, rtol=ACCURACY, atol=0.0, restart=MOST, maxiter=1
-    )
-    return before + v if np.isfinite(v).all() else None
+    system = LinearOperator((len(changed),) * 2, matvec=along)
+    v, failed = gmres(system, changed, rtol=ACCURACY, atol=0.0, restart=MOST, maxiter=1)
+    if failed or not largest_difference(v, changed) <= FARTHEST * largest(changed):
+        return None
+    return before + v
 
 
 def _linearised(constraints: StackedConstraints, solution: Solution) -> list[tuple[slice, Linearised]]:
@@ -74,7 +78,7 @@ def _linearised(constraints: StackedConstraints, solution: Solution) -> list[tup
         part, multiplier = constraints.parts[name], solution.multiplier[rows]
         if part.tied is not None or not multiplier.any():
             continue
-        if part.geometry is None:
+        if part.geometry is None or part.wetted is not None:  # fluid presses along the surfaces themselves
             return []
         friction = np.zeros_like(part.positions)
         if solution.tangential is not None:

@@ -40,7 +40,7 @@ PATIENCE, FALL = 12, 0.5
 # values of a pressure field, creeps with stiff ones: an O-ring takes 5, 7, 11 iterations with 5e-5, 2e-4, 1e-3.
 HELD = 5e-5, 1e-3
 # After changes of the displacement up to this, relative to its size, a tangent serves a second iteration.
-SMALL = 1e-4
+SMALL = 1e-5
 # Contact geometry of the linearised bodies settles to this part of the last relative change of the displacement.
 FORCING = 1e-3
 # Relative error of the displacement below which iterations end. Changes below SCATTER that do not fall to the part STAYS of

@@ -42,8 +42,6 @@ ACROSS = 4
 LOOSE = 1e-4
 # Part of the largest energy or work that may be missing in the balance of works.
 IMBALANCE = 0.02
-# Part of the work of friction that nodes may do while they close; and work of friction, by the largest energy, that is any.
-WHILE_CLOSING, SOME_FRICTION = 0.5, 1e-5
 
 
 def result_warnings(problem: Problem, state: State, last: StepResult) -> list[str]:
@@ -67,7 +65,7 @@ def result_warnings(problem: Problem, state: State, last: StepResult) -> list[st
         warnings += [*_deep(pair, contact, state.u), *lost]
         warnings += [sagging[name]] if name in sagging else _unresolved(name, pair, contact)
         warnings += [*wavering(pair, contact), *_too_fast(name, pair, state)]
-    return [*warnings, *_unsettled(state), *_loose(problem, last), *_unbalanced(state), *_sliding_while_closing(state)]
+    return [*warnings, *_unsettled(state), *_loose(problem, last), *_unbalanced(state)]
 
 
 def _deep(pair: Formulation, contact: ContactResult, displacement: Array) -> Iterator[str]:
@@ -109,18 +107,6 @@ def _unbalanced(state: State) -> Iterator[str]:
             f"penalties, {abs(work.imbalance) / work.largest:.1%} of the largest of them: take more load steps where works "
             "matter"
         )
-
-
-def _sliding_while_closing(state: State) -> Iterator[str]:
-    """Yield a warning where much of the work of friction is that of nodes in increments in which they close."""
-    work = state.work
-    if work is None or work.friction <= SOME_FRICTION * work.largest or work.touching <= WHILE_CLOSING * work.friction:
-        return
-    yield (
-        f"nodes do {work.touching / work.friction:.0%} of the work of friction ({work.friction:.3g}) while they come into "
-        "contact: it, and shear at these nodes, may be off by as much. Take more load steps, or "
-        "Criteria(friction_while_touching=0.03)"
-    )
 
 
 def _unsettled(state: State) -> Iterator[str]:

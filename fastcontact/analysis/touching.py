@@ -18,13 +18,11 @@ from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium
 from fastcontact.arrays import Array
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.errors import ConvergenceError
-from fastcontact.linear.protocol import LoadedNonsymmetric
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 log = logging.getLogger("fastcontact")
-# Shear of constraints that close in an increment over what friction can carry in all, by default, and where constraints are
-# eliminated: increments cost iterations there. The most increments of a step.
-WHILE_TOUCHING, MOST = (0.01, 0.05), 128
+# Increments of a step at most.
+MOST = 128
 
 
 def along_path(step: StepContext, settled: SettledContact, expected: float) -> SettledContact:
@@ -60,7 +58,8 @@ def along_path(step: StepContext, settled: SettledContact, expected: float) -> S
 def _path(step: StepContext, settled: SettledContact, nodes: SharedNodes | None) -> Path | None:
     """Return the path of a step, None where it makes no difference."""
     constraints, solution = settled.constraints, settled.solution
-    if not isinstance(solution, FrictionalEquilibrium) or not constraints.tangents:
+    allowed = step.problem.criteria.friction_while_touching
+    if allowed is None or allowed >= 1.0 or not isinstance(solution, FrictionalEquilibrium) or not constraints.tangents:
         return None
     forces = _forces(step, constraints)
     if forces is None:
@@ -69,10 +68,6 @@ def _path(step: StepContext, settled: SettledContact, nodes: SharedNodes | None)
     rubs = solution.active & (constraints.coefficients > 0.0)
     closing = rubs & (normal == 0.0)
     shear = np.linalg.norm(solution.tangential, axis=1)
-    eliminated = isinstance(step.loaded, LoadedNonsymmetric) and not constraints.coupled
-    allowed = step.problem.criteria.friction_while_touching or WHILE_TOUCHING[int(eliminated)]
-    if allowed >= 1.0:
-        return None
     limit = allowed * float((constraints.coefficients * solution.multiplier)[rubs].sum())
     if not float(shear[closing].sum()) > limit:
         return None

@@ -1,8 +1,8 @@
 r"""Linearised contact geometry: how contact forces and gaps vary as the points that constraints stand for move.
 
 The rows of constraints depend on the displacements: points slide over the facets they face, and normals turn. A point
-:math:`x` with contact force :math:`p = \lambda n + \tau` faces :math:`y(\xi) = \sum_k N_k(\xi) x_k`, along the normal n
-there. Along a variation of the displacements its nodal forces and its gap vary, beside what the rows themselves give, by
+:math:`x` with contact force :math:`p = \lambda n + \tau` faces :math:`y(\xi) = \sum_k N_k(\xi) x_k`, with the normal n.
+Along a variation of the displacements its nodal forces and its gap vary, beside what the rows themselves give, by
 
 .. math:: \delta f = N_s^T \delta p - N^T \delta p - N_{,\alpha}^T p \, \delta \xi^\alpha, \qquad
           \delta p = (\lambda I - n \tau^T) \delta n, \qquad
@@ -36,7 +36,7 @@ from fastcontact.contact.projection import (
 from fastcontact.contact.surface import Surface
 from fastcontact.mesh import elements
 
-# Part of the size of a side by which points move for differences of an obstacle's normals: central ones are off by 1e-10.
+# Part of the size of the model by which points move for differences of an obstacle's normals, which are then off by 1e-10.
 MOVED = 1e-6
 
 
@@ -53,10 +53,7 @@ Geometry = Callable[[Array, Array], Linearised]
 
 
 class NodalNormals:
-    """Variation of the `projection.nodal_normals` of a side at `coordinates` (n_points, dim) [length].
-
-    Angles of facets are held.
-    """
+    """Variation of the `nodal_normals` of a side at `coordinates` (n_points, dim) [length]; angles of facets are held."""
 
     def __init__(self, side: Surface, coordinates: Array) -> None:
         self._side, self._parts = side, []

@@ -6,12 +6,13 @@ kept, so further active sets and pairings cost a small dense solution and one so
 
 from __future__ import annotations
 
+import warnings
 import weakref
 from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import LinAlgError, cho_factor, cho_solve, lstsq
+from scipy.linalg import LinAlgError, cho_factor, cho_solve, lstsq, lu_factor
 from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Indices
@@ -136,6 +137,22 @@ class InverseColumns:
             grown[:, old + first : old + first + len(chunk)] = solve_many(unit)[self._dofs]
         grown[old:, :old] = grown[:old, old:].T
         self._values = grown
+
+
+def lu_factors(A: Array) -> tuple[Array, Array]:
+    """Return the factors of a matrix (m, m) by SciPy's `lu_factor`.
+
+    Raises
+    ------
+    LinAlgError
+        If it is singular but for round-off.
+    """
+    with warnings.catch_warnings(action="ignore"):  # of an exact zero
+        lu, pivots = lu_factor(A)
+    diagonal = np.abs(np.diag(lu))
+    if not diagonal.min(initial=np.inf) > _round_off(A) * diagonal.max(initial=0.0):
+        raise LinAlgError("singular")
+    return lu, pivots
 
 
 def symmetric(delassus: Array) -> Array:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import lu_factor, lu_solve
+from scipy.linalg import lu_solve
 from scipy.sparse import csr_array, vstack
 
 from fastcontact.analysis.friction.slip_directions import IDLE
 from fastcontact.analysis.solution import FrictionalEquilibrium, Response
 from fastcontact.arrays import Array
 from fastcontact.contact.constraints import Constraints
+from fastcontact.linear.delassus import lu_factors
 from fastcontact.linear.protocol import Loaded
 from fastcontact.round_off import TINY
 
@@ -53,7 +54,7 @@ def response(
             A[slips[a]] += weight[a, b][:, None] * F[slips[b]]
     held = np.flatnonzero(np.diag(F) <= IDLE * np.tile(unit, 1 + k))  # nothing gives there, nor counts
     A[held], A[held, held] = 0.0, 1.0
-    factors = lu_factor(A) if q else None
+    factors = lu_factors(A) if q else None
 
     def respond(force: Array, gaps: Array) -> Array:
         u = loaded.involved_solution(force, None) - at_rest

@@ -58,7 +58,6 @@ def test_small_blocks_slide_in_any_direction():
     assert not found.contact["pair"].sticking.all()
 
 
-@pytest.mark.filterwarnings("ignore:nodes do .* of the work of friction")
 @pytest.mark.parametrize(
     ("formulation", "mu"),
     [("node_to_segment", 0.1), ("mortar", 0.7), pytest.param("mortar", 0.1, marks=pytest.mark.slow)],
@@ -232,7 +231,6 @@ def test_a_matrix_too_large_for_factors_stays_an_error(monkeypatch):
         fc.solve(model, fc.linear_ramp(1), linear_solver="amg", criteria=fc.Criteria(max_halvings=0))
 
 
-@pytest.mark.filterwarnings("ignore:nodes do .* of the work of friction")
 def test_slips_that_supports_and_equations_hold_leave_no_spring():
     """Nodes in the corner of two planes of symmetry slide along neither."""
     mesh = fc.generate.sphere_on_block("hex8", R=1.0, size=0.3, contact_size=0.1, contact_radius=0.2)
