@@ -27,8 +27,6 @@ EXACT = ("float64", "int64", "int32", "uint8", "bool")
 class Interpretable:
     """A kernel that Python runs for as long as it is small and no compiled version is kept.
 
-    Attributes that it lacks are those of the compiled kernel.
-
     Parameters
     ----------
     compiled : object
@@ -39,24 +37,21 @@ class Interpretable:
 
     def __init__(self, compiled: Any, files: KernelFiles | None) -> None:
         functools.update_wrapper(self, compiled.py_func)
-        self._compiled, self._files, self._spent = compiled, files, 0.0
+        self.compiled, self.py_func, self.compile = compiled, compiled.py_func, compiled.compile
+        self._files, self._spent = files, 0.0
         self._call: Callable[..., Any] = self._choose
 
     def __call__(self, *arguments: Any) -> Any:
         """Return what the kernel returns."""
         return self._call(*arguments)
 
-    def __getattr__(self, name: str) -> Any:
-        """Return an attribute of the compiled kernel."""
-        return getattr(self._compiled, name)
-
     def _choose(self, *arguments: Any) -> Any:
         """Compute a call by Python, or this and all later ones by the compiled kernel."""
         began = time.thread_time()
         small = self._spent <= SECONDS and entries(arguments) <= ENTRIES
-        if not small or self.signatures or (self._files is not None and self._files.exist()):
-            self._call = self._compiled
-            return self._compiled(*arguments)
+        if not small or self.compiled.signatures or (self._files is not None and self._files.exist()):
+            self._call = self.compiled
+            return self.compiled(*arguments)
         if self._spent == 0.0:
             compiling.replace()
         result = interpret(self, arguments)

@@ -138,9 +138,9 @@ from fastcontact._jit import compiling, interpreting
 from fastcontact._jit.norms_kernels import largest_difference as kernel
 
 x, y = np.array([1.0, 2.0, 4.0]), np.array([1.0, 1.0, 6.0])
-answers = [kernel(x, y), len(kernel.signatures), compiling.count]
+answers = [kernel(x, y), len(kernel.compiled.signatures), compiling.count]
 interpreting.SECONDS = -1.0
-answers += [kernel(x, y), len(kernel.signatures), type(answers[0]).__name__]
+answers += [kernel(x, y), len(kernel.compiled.signatures), type(answers[0]).__name__]
 print(*answers)
 """
 
