@@ -8,18 +8,20 @@ from __future__ import annotations
 
 import argparse
 import functools
+import importlib
 import json
 import os
 import subprocess
 import sys
 import warnings
+from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 import fastcontact as fc
-from fastcontact._jit import ahead, decorators
+from fastcontact._jit import ahead, decorators, interpreting
 
 
 def spheres(element: str, formulation: str) -> fc.Model:
@@ -100,16 +102,21 @@ def entry(given: Any) -> Any:
     return None
 
 
-def noting(found: list[list[Any]]) -> Callable[..., Any]:
-    """Return what stands in for the compiler: kernels stay Python, and those that no other one calls are noted."""
+def noting(found: list[list[Any]], work: Counter[int]) -> Callable[..., Any]:
+    """Return what stands in for the compiler: kernels stay Python; those that no other one calls are noted, with their work.
+
+    The work of a kernel is how many entries the arguments of all its calls have.
+    """
     inside: list[str] = []
 
     def plain(function: Callable[..., Any], **_: Any) -> Callable[..., Any]:
         @functools.wraps(function)
         def called(*arguments: Any) -> Any:
             kernel = [function.__module__, function.__qualname__, [entry(given) for given in arguments]]
-            if not inside and None not in kernel[2] and kernel not in found:
-                found.append(kernel)
+            if not inside and None not in kernel[2]:
+                if kernel not in found:
+                    found.append(kernel)
+                work[found.index(kernel)] += int(min(interpreting.entries(arguments), 1e9))
             inside.append(function.__name__)
             try:
                 return function(*arguments)
@@ -121,17 +128,24 @@ def noting(found: list[list[Any]]) -> Callable[..., Any]:
     return plain
 
 
+def is_interpretable(module: str, name: str) -> bool:
+    """Return whether Python may run a kernel while it is not compiled."""
+    return isinstance(getattr(importlib.import_module(module), name), interpreting.Interpretable)
+
+
 def called(number: int) -> dict[str, Any]:
-    """Solve a model; return the kind of run that it stands for, and the kernels that it calls in their order."""
+    """Solve a model; return the kind of run that it stands for, the kernels that it calls in their order, and their work."""
     found: list[list[Any]] = []
-    decorators._compile = noting(found)
+    work: Counter[int] = Counter()
+    decorators._compile = noting(found, work)
     make, arguments, solver = models()[number]
     model = make(*arguments)
     model.add_material(fc.LinearElastic(E=1.0, nu=0.3))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # Python's floating-point arithmetic tells what NumPy's does not
         fc.solve(model, 1, linear_solver=solver)
-    return {"kind": f"{model.mesh.dim}d{' amg' if solver == 'amg' else ''}", "kernels": found}
+    kind = f"{model.mesh.dim}d{' amg' if solver == 'amg' else ''}"
+    return {"kind": kind, "kernels": found, "work": [work[number] for number in range(len(found))]}
 
 
 def main() -> None:
@@ -143,6 +157,7 @@ def main() -> None:
         return
     kernels: list[list[Any]] = []
     runs: dict[str, list[int]] = {}
+    work: Counter[int] = Counter()
     for number, (make, arguments, solver) in enumerate(models()):
         plain = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
         given = [sys.executable, __file__, "--one", str(number)]
@@ -150,10 +165,16 @@ def main() -> None:
         said = json.loads(done.stdout)
         kernels.extend(kernel for kernel in said["kernels"] if kernel not in kernels)
         numbers = [kernels.index(kernel) for kernel in said["kernels"]]
+        work.update(dict(zip(numbers, said["work"], strict=True)))
         runs[said["kind"]] = sorted({*runs.get(said["kind"], []), *numbers})
         print(f"{make.__name__}{arguments} {solver}: {len(numbers)} kernels, {len(kernels)} in all", flush=True)
     lines = ",\n".join(json.dumps(kernel) for kernel in kernels)
-    of_runs = ",\n".join(f"{json.dumps(name)}: {json.dumps(numbers)}" for name, numbers in sorted(runs.items()))
+    small = {number for number, (module, name, _) in enumerate(kernels) if is_interpretable(module, name)}
+    split = {
+        name: [[n for n in numbers if n not in small], sorted(small.intersection(numbers), key=lambda n: -work[n])]
+        for name, numbers in sorted(runs.items())
+    }
+    of_runs = ",\n".join(f"{json.dumps(name)}: {json.dumps(numbers)}" for name, numbers in split.items())
     ahead.TABLE.write_text(f'{{"kernels": [\n{lines}\n],\n"runs": {{\n{of_runs}\n}}}}\n', encoding="utf-8")
 
 

@@ -14,7 +14,7 @@ from hypothesis import settings
 from pairwise import mark_the_rest
 
 import fastcontact as fc
-from fastcontact._jit import ahead, cache, decorators
+from fastcontact._jit import ahead, cache, decorators, interpreting
 from fastcontact.linear import choice as linear
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -41,6 +41,7 @@ def pytest_configure(config: pytest.Config) -> None:
     if getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput"):
         prepare_workers(whole=config.args_source is pytest.Config.ArgsSource.TESTPATHS)
     ahead.MOST = 0  # processes that compile ahead of a run would do so for each worker
+    interpreting.SECONDS = -1.0  # what is tested are compiled kernels
     if config.getoption("--linear-solver"):
         config.addinivalue_line("filterwarnings", "ignore:multigrid gave up")
 

@@ -1,9 +1,10 @@
 """Kernels compiled ahead of the run that needs them, side by side in processes of their own.
 
 `kernels.json` tells which kernels the usual kinds of runs call, with the types of their arguments, in the order of the calls;
-``python bench/kernels.py`` makes it. Helpers begin at its end while the run compiles from its beginning, and finds on disk
-what they have done. Of a kernel that the table lacks, or knows otherwise than it is, comes no more than a compilation in the
-run.
+``python bench/kernels.py`` makes it. Helpers begin with those that Python does not run in their place (`interpreting`), and
+tell the run which ones they are at. The run waits for a kernel that a helper is compiling, and meanwhile compiles one that
+none has begun; it tells the helpers which. Of a kernel that the table lacks, or knows otherwise than it is, comes no more
+than a compilation in the run.
 """
 
 from __future__ import annotations
@@ -11,11 +12,13 @@ from __future__ import annotations
 import atexit
 import contextlib
 import importlib
+import itertools
 import json
 import multiprocessing
 import os
 import subprocess
 import sys
+import threading
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
@@ -33,23 +36,33 @@ TABLE = Path(__file__).with_name("kernels.json")
 ROOT = Path(__file__).resolve().parents[2]
 # Helpers of a run, each as large as Python with Numba.
 MOST = 3
-# Kernels compiled by a process before it gets help: a single new one is no reason to start others.
-ALONE = 4
+# Kernels not found compiled before a process gets help: a single new one is no reason to start others.
+ALONE = 2
 # Kinds of runs that this process has had help with: later runs of these find their kernels.
 _helped: set[str] = set()
 
 
 @cache
 def table() -> dict[str, Any]:
-    """Return ``{"kernels": [[module, name, [type, ...]], ...], "runs": {name: [number of a kernel, ...]}}``."""
+    """Return ``{"kernels": [[module, name, [type, ...]], ...], "runs": {name: [[number, ...], [number, ...]]}}``.
+
+    The second numbers are those of kernels that Python may run in their place.
+    """
     read: dict[str, Any] = json.loads(TABLE.read_text(encoding="utf-8"))
     return read
 
 
-def kernels_of(runs: Sequence[str]) -> list[int]:
-    """Return the numbers of the kernels that some kinds of runs call, of all kinds if none are named."""
+def compiled_of(runs: Sequence[str]) -> list[int]:
+    """Return the numbers of the kernels that some kinds of runs have to compile, of all kinds if none are named."""
     known = table()["runs"]
-    return sorted({number for run in runs or known for number in known.get(run, [])})
+    return list(dict.fromkeys(number for run in runs or known for number in known.get(run, [[]])[0]))
+
+
+def kernels_of(runs: Sequence[str]) -> list[int]:
+    """Return the same and, after them, those that Python may run in their place."""
+    known = table()["runs"]
+    others = [number for run in runs or known for number in known.get(run, [[], []])[1]]
+    return list(dict.fromkeys([*compiled_of(runs), *others]))
 
 
 def numba_type(given: Any) -> Any:
@@ -79,13 +92,19 @@ def compile_kernel(number: int) -> None:
     getattr(importlib.import_module(module), name).compile(tuple(map(numba_type, given)))
 
 
-def start(runs: Sequence[str], helpers: int, output: int = subprocess.DEVNULL) -> list[subprocess.Popen[bytes]]:
-    """Start processes that share the kernels of some kinds of runs; each writes a line to `output` for each kernel done."""
+def _file_name(number: int) -> str:
+    """Return how the file of a kernel of the table begins."""
+    module, name, _ = table()["kernels"][number]
+    return f"{module.rpartition('.')[2]}.{name}"
+
+
+def start(runs: Sequence[str], helpers: int, output: int = subprocess.PIPE) -> list[subprocess.Popen[str]]:
+    """Start processes that share the kernels of some kinds of runs; each writes to `output` which one it is at."""
     path = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
     command = [sys.executable, "-m", __name__, str(helpers)]
     started = [
         subprocess.Popen(
-            [*command, str(first), *runs], stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.DEVNULL,
+            [*command, str(first), *runs], stdin=subprocess.PIPE, stdout=output, stderr=subprocess.DEVNULL, text=True,
             env={**os.environ, "PYTHONPATH": path},
         )
         for first in range(helpers)
@@ -94,11 +113,79 @@ def start(runs: Sequence[str], helpers: int, output: int = subprocess.DEVNULL) -
     return started
 
 
-def _end(processes: list[subprocess.Popen[bytes]]) -> None:
+def _end(processes: list[subprocess.Popen[str]]) -> None:
     """End helpers that are still at work; what they have compiled is complete."""
     for process in processes:
         process.terminate()
         process.wait()
+
+
+class Help:
+    """Helpers of a run, seen from the run.
+
+    Parameters
+    ----------
+    runs : sequence of str
+        Kinds of runs.
+    processes : list of subprocess.Popen
+        See `start`.
+    """
+
+    def __init__(self, runs: Sequence[str], processes: list[subprocess.Popen[str]]) -> None:
+        self._processes, self._left, self._needed = processes, kernels_of(runs), compiled_of(runs)
+        self._current: dict[int, int] = {}  # kernel of each helper at work
+        self._changed = threading.Condition()
+        for number in range(len(processes)):
+            threading.Thread(target=self._listen, args=(number,), daemon=True).start()
+
+    def _listen(self, number: int) -> None:
+        """Note what a helper tells until it ends."""
+        lines = self._processes[number].stdout
+        for line in lines or ():
+            self._note(number, int(line))
+        self._note(number, None)
+
+    def _note(self, helper: int, kernel: int | None) -> None:
+        with self._changed:
+            self._current.pop(helper, None)
+            if kernel is not None:
+                self._current[helper] = kernel
+                self._left = [other for other in self._left if other != kernel]
+            self._changed.notify_all()
+
+    def wait(self, name: str) -> bool:
+        """Wait while a helper compiles a kernel of this name; return whether one did.
+
+        Meanwhile kernels are compiled here that none has begun; if it is this one that none has, helpers leave it alone.
+        """
+        with self._changed:
+            at_work = [(helper, kernel) for helper, kernel in self._current.items() if _file_name(kernel) == name]
+        for helper, kernel in at_work:
+            compiling.tell()
+            while self._current.get(helper) == kernel and self._compile_next():
+                pass
+            with self._changed:
+                while self._current.get(helper) == kernel:
+                    self._changed.wait()
+        if not at_work:
+            self._take([number for number in self._left if _file_name(number) == name])
+        return bool(at_work)
+
+    def _compile_next(self) -> bool:
+        """Compile a kernel that the run will need and no helper has begun; return whether there is one."""
+        numbers = [number for number in self._left if number in self._needed][:1]
+        self._take(numbers)
+        for number in numbers:
+            compile_kernel(number)
+        return bool(numbers)
+
+    def _take(self, numbers: list[int]) -> None:
+        """Tell helpers which kernels are compiled here."""
+        with self._changed:
+            self._left = [number for number in self._left if number not in numbers]
+        for process, number in itertools.product(self._processes, numbers):
+            with contextlib.suppress(OSError):  # it has ended
+                print(number, file=process.stdin, flush=True)
 
 
 def expect(runs: Sequence[str]) -> None:
@@ -109,7 +196,7 @@ def expect(runs: Sequence[str]) -> None:
     """
     new, helpers = [run for run in runs if run not in _helped], min(numba.get_num_threads() - 1, MOST)
     python = Path(sys.executable or "").stem.startswith("python")
-    if not new or helpers < 1 or multiprocessing.parent_process() is not None or not python or not kernel_files.kept:
+    if not new or helpers < 1 or multiprocessing.parent_process() is not None or not python or not kernel_files.files:
         return
 
     def begin() -> None:
@@ -117,20 +204,24 @@ def expect(runs: Sequence[str]) -> None:
             compiling.helpers.remove(begin)
             _helped.update(new)
             with contextlib.suppress(OSError):  # the run compiles alone
-                start(new, helpers)
+                compiling.waiters.append(Help(new, start(new, helpers)).wait)
 
     compiling.helpers[:] = [begin]
     begin()
 
 
 def main(arguments: Sequence[str]) -> None:
-    """Compile every `n`-th kernel of some kinds of runs, from the last on: what a helper does."""
+    """Compile every `n`-th kernel of some kinds of runs, except those read from standard input: what a helper does."""
     n, first, *runs = arguments
-    for number in kernels_of(runs)[::-1][int(first) :: int(n)]:
-        with contextlib.suppress(Exception):  # the run will tell, if it needs the kernel
-            compile_kernel(number)
+    taken: set[int] = set()
+    threading.Thread(target=lambda: taken.update(map(int, sys.stdin)), daemon=True).start()
+    for number in kernels_of(runs)[int(first) :: int(n)]:
         print(number, flush=True)
+        if number not in taken:
+            with contextlib.suppress(Exception):  # the run will tell, if it needs the kernel
+                compile_kernel(number)
 
 
 if __name__ == "__main__":
     main(sys.argv[1:])
+    os._exit(0)  # Python would not end beside a thread that reads its standard input

@@ -15,7 +15,7 @@ import secrets
 import stat
 import sys
 from collections.abc import Callable, Iterator
-from functools import cache, cached_property
+from functools import cache, cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ import llvmlite
 import numba
 import numpy as np
 
+from fastcontact._jit import compiling
 from fastcontact._version import __version__
 
 log = logging.getLogger("fastcontact")
@@ -30,8 +31,6 @@ log = logging.getLogger("fastcontact")
 OPTIONS = ("OPT", "BOUNDSCHECK", "DEBUGINFO_DEFAULT", "CPU_NAME", "CPU_FEATURES", "THREADING_LAYER")
 # Characters of a digest.
 DIGEST = 64
-# Whether kernels are kept at all.
-kept = False
 CONSTANTS = (bool, int, float, complex, str, tuple, np.ndarray, np.generic, type(None))
 
 
@@ -57,9 +56,17 @@ class KernelFiles:
     def __init__(self, folder: Path, name: str, function: Callable[..., Any], options: str, numbas: Any) -> None:
         self.folder, self._name, self._function, self._options, self._numbas = folder, name, function, options, numbas
 
+    def exist(self) -> bool:
+        """Return whether the kernel, as it is now, is kept for any signature."""
+        with contextlib.suppress(OSError):
+            return self._version in _versions(self.folder, os.stat(self.folder).st_mtime_ns)
+        return False
+
     def load(self, key: Any) -> Any:
-        """Return what was kept for a signature; None if there is nothing that may be used."""
+        """Return what is kept for a signature, once a helper at work on it is done; None if nothing may be used."""
         path = self._path(key)
+        while not path.exists() and compiling.wait(self._name):
+            pass
         try:
             with open(path, "rb") as file:
                 if not _is_own(os.fstat(file.fileno())):
@@ -92,14 +99,19 @@ class KernelFiles:
         """Do nothing: what is out of date has another name."""
 
     def _path(self, key: Any) -> Path:
-        return self.folder / f"{self._name}.{_digest(self._stamp + repr(key).encode())[:24]}.nbc"
+        return self.folder / f"{self._version}.{_digest(repr(key).encode())[:24]}.nbc"
 
     @cached_property
-    def _stamp(self) -> bytes:
-        """What the machine code depends on, apart from the signature and the processor."""
+    def _version(self) -> str:
+        """The name, and a digest of what the machine code depends on, apart from the signature and the processor."""
         environment = {name: getattr(numba.config, name, None) for name in OPTIONS}
         parts = [__version__, numba.__version__, llvmlite.__version__, sys.version, self._options, repr(environment)]
-        return "\n".join([*parts, *sorted(set(_sources(self._function, set())))]).encode()
+        depends = "\n".join([*parts, *sorted(set(_sources(self._function, set())))])
+        return f"{self._name}.{_digest(depends.encode())[:24]}"
+
+
+# Those of all kernels that are kept, by their functions in Python.
+files: dict[Any, KernelFiles] = {}
 
 
 def keep(kernel: Any, function: Callable[..., Any], options: str) -> str:
@@ -111,10 +123,14 @@ def keep(kernel: Any, function: Callable[..., Any], options: str) -> str:
     if not is_trusted(folder):
         return f"others may write to the folder of compiled kernels, {folder}"
     name = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}"
-    numbas._cache_file = KernelFiles(folder, name, function, options, numbas._cache_file)
-    global kept
-    kept = True
+    files[function] = numbas._cache_file = KernelFiles(folder, name, function, options, numbas._cache_file)
     return ""
+
+
+@lru_cache(maxsize=1)
+def _versions(folder: Path, changed: int) -> set[str]:
+    """Return which versions of kernels lie in a folder that was `changed` last at that time [ns]."""
+    return {name.rsplit(".", 2)[0] for name in os.listdir(folder)}
 
 
 @cache

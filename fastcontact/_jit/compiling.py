@@ -9,17 +9,37 @@ from collections.abc import Callable
 
 TEXT = "compiling kernels: once, for up to a minute; they are kept for later runs"
 log = logging.getLogger("fastcontact")
-count = 0  # of kernels that were compiled in this process
+count = 0  # of kernels that were compiled in this process, and of calls that Python computed in their place
+_told = False
 
 
 def notify() -> None:
-    """Tell all listeners, and once in a process the log at level INFO."""
+    """Tell that a kernel is compiled, and call for help."""
+    tell()
+    replace()
+
+
+def tell() -> None:
+    """Tell all listeners, and once in a process the log at level INFO, that kernels are being compiled."""
+    global _told
+    if not _told:
+        _told = True
+        log.info(TEXT)
+    for listener in list(listeners):
+        listener()
+
+
+def replace() -> None:
+    """Count a kernel that was not found compiled, and call for help."""
     global count
     count += 1
-    if count == 1:
-        log.info(TEXT)
-    for listener in (*listeners, *helpers):
-        listener()
+    for helper in list(helpers):
+        helper()
+
+
+def wait(name: str) -> bool:
+    """Wait for a helper that compiles a kernel of this name; return whether one did, so that the file may be there."""
+    return any(waiter(name) for waiter in waiters)
 
 
 def tell_who_waits() -> None:
@@ -35,7 +55,8 @@ def _somebody_waits() -> bool:
     return seen and multiprocessing.parent_process() is None
 
 
-# Called as a kernel is compiled; one that is read from the disk cache is not.
+# Called as a kernel is compiled or waited for; not where one is read from the disk cache.
 listeners: list[Callable[[], None]] = [tell_who_waits]
-# Called likewise: see `ahead`.
+# Called where a kernel is not found compiled, and where one is needed that a helper may be compiling: see `ahead`.
 helpers: list[Callable[[], None]] = []
+waiters: list[Callable[[str], bool]] = []

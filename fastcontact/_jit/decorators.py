@@ -17,7 +17,7 @@ from fastcontact._jit import environment  # isort: skip # noqa: F401 (before Num
 import numba
 from numba.core import event
 
-from fastcontact._jit import cache, compiling
+from fastcontact._jit import cache, compiling, interpreting
 from fastcontact.errors import FastcontactError
 
 log = logging.getLogger("fastcontact")
@@ -67,6 +67,16 @@ def kernel(function: Callable[..., Any]) -> Any:
     return _compile(function, parallel=False)
 
 
+def interpretable_kernel(function: Callable[..., Any]) -> Any:
+    """Like `kernel`; where it is small and not compiled yet, Python runs it, to the same bits.
+
+    For sums, products, quotients and square roots alone: powers and sums of arrays are other ones in NumPy. Only for kernels
+    that no other one calls, as it is no kernel to Numba.
+    """
+    dispatcher = kernel(function)
+    return interpreting.Interpretable(dispatcher, cache.files.get(function)) if compiled() else dispatcher
+
+
 def parallel_kernel(function: Callable[..., Any]) -> Any:
     """Like `kernel`, with `prange` loops spread over threads; iterations must write disjoint memory.
 
@@ -102,7 +112,7 @@ def _compile(function: Callable[..., Any], parallel: bool, fastmath: set[str] = 
     options |= inlining
     try:
         cached = numba.njit(cache=True, **options)(function)
-        reason = cache.keep(cached, function, repr(options))
+        reason = cache.keep(cached, function, repr(options | {"fastmath": sorted(fastmath)}))  # a set has any order
         if not reason:
             return cached
     except RuntimeError as error:  # numba: "cannot cache function ...: no locator available for file ..."
@@ -124,6 +134,7 @@ def _notice_fork() -> None:
 
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_notice_fork)
+    os.register_at_fork(after_in_child=compiling.waiters.clear)  # nothing in a child hears of its parent's helpers
 
 
 def check_threads() -> None:

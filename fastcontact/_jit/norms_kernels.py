@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from fastcontact._jit.decorators import kernel
+from fastcontact._jit.decorators import interpretable_kernel
 from fastcontact.arrays import Array
 
 
@@ -12,7 +12,7 @@ def largest(x: Array) -> float:
     return float(max(x.max(initial=0.0), -x.min(initial=0.0)))
 
 
-@kernel
+@interpretable_kernel
 def largest_difference(x: Array, y: Array) -> float:
     """Return the largest of ``|x - y|`` (n,), 0 if there is none; NaN if there is one."""
     largest = 0.0

@@ -19,14 +19,14 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Print the environment."""
-    from fastcontact._jit import decorators as _jit
+    from fastcontact._jit import cache, decorators
     from fastcontact._tools.versions import versions
     from fastcontact.elasticity import element_2d_kernels
 
     for name, version in versions().items():
         say(f"{name:<12} {version}")
-    say(f"{'threads':<12} {_jit.threads()} of {os.cpu_count()}")
-    files = getattr(getattr(element_2d_kernels.add_stiffness, "_cache", None), "_cache_file", None)
+    say(f"{'threads':<12} {decorators.threads()} of {os.cpu_count()}")
+    files = cache.files.get(getattr(element_2d_kernels.add_stiffness, "py_func", None))
     say(f"{'cache':<12} {getattr(files, 'folder', 'none: kernels compile in every process')}")
     if options.warmup:
         started = time.perf_counter()
@@ -47,8 +47,7 @@ def _warm_up(show: bool) -> int:
     with open(ours, encoding="ascii") as lines, StatusLine(len("compiling kernels: 000 of 000"), show) as status:
         for done, _ in enumerate(lines, start=1):
             status.draw(f"compiling kernels: {done} of {total}")
-    for process in processes:
-        process.wait()
-    if done < total:
+    codes = [process.wait() for process in processes]
+    if done < total or any(codes):
         raise FastcontactError(f"only {done} of {total} kernels were compiled: was a process ended by lack of memory?")
     return done

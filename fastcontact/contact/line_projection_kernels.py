@@ -1,7 +1,7 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
 """Projection of points on a curve in the plane along normals interpolated between its nodes."""
 
-from fastcontact._jit.decorators import kernel
+from fastcontact._jit.decorators import interpretable_kernel, kernel
 from fastcontact.contact.search.projection_3d_kernels import MAX_ITERATIONS, STEP
 
 MOST_FACETS = 8
@@ -49,7 +49,7 @@ def _newton(x, y, corners, normals, f, count, s, values, slopes):
     return s, abs(step) <= 1e-10
 
 
-@kernel
+@interpretable_kernel
 def along_normals(points, corners, normals, counts, neighbour, facet, xi, overhang, values, slopes):
     """Move projections (facet, xi) to where the points lie along the interpolated normals.
 

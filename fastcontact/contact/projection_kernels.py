@@ -7,7 +7,7 @@ in `search.facet_tables`; facets with fewer nodes than the widest kind have zero
 
 import numpy as np
 
-from fastcontact._jit.decorators import innermost_kernel, kernel
+from fastcontact._jit.decorators import innermost_kernel, interpretable_kernel, kernel
 from fastcontact.contact.search.projection_3d_kernels import STEP, component, vector
 from fastcontact.contact.search.straight_3d_kernels import along, cross, dot, minus, unit
 from fastcontact.round_off import ROUND_OFF
@@ -21,7 +21,7 @@ BEYOND = 1.0
 FLAT = 1e-8
 
 
-@kernel
+@interpretable_kernel
 def normals(nodes, slopes, begin, end, out):
     """Fill the unit normals (n, m, 3) of facets `begin` to ``end - 1`` with nodes (n, m, 3) at their own nodes.
 
@@ -55,7 +55,7 @@ def angles(nodes, beside, begin, end, out):
             out[f, a] = np.arctan2(np.sqrt(dot(sine, sine)), dot(p, q))
 
 
-@kernel
+@interpretable_kernel
 def coefficients(values, to_terms, first, begin, end, out):
     """Fill rows `first` + `begin` to ``first + end - 1`` of `out` (n_facets, width, 3): the terms of `values` (n, m, 3).
 
@@ -134,7 +134,7 @@ def _beside(point, terms, directions, triangular, neighbours, f, height):
     return best, best_s, best_t, least
 
 
-@kernel
+@interpretable_kernel
 def along_normals(begin, end, points, heights, terms, directions, triangular, neighbours, found):
     """Project points `begin` to ``end - 1`` along interpolated normals; see `projection.along_normals`.
 

@@ -8,7 +8,7 @@ strains (xx, yy, zz, 2xy); ``material`` (n_cells,). Axisymmetric integrals run o
 
 import numpy as np
 
-from fastcontact._jit.decorators import kernel
+from fastcontact._jit.decorators import interpretable_kernel, kernel
 
 TWO_PI = 2.0 * np.pi
 
@@ -70,7 +70,7 @@ def _cell(points, cell, N, dN, weights, D, axisymmetric, gradient, local):
     return True
 
 
-@kernel
+@interpretable_kernel
 def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, axisymmetric, slots, owner, part, data):
     """Add element stiffness blocks to `data` (n_blocks, 2, 2), in the rows of nodes with ``owner[node] == part``.
 
@@ -103,7 +103,7 @@ def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, ax
     return -1
 
 
-@kernel
+@interpretable_kernel
 def stress(points, cells, N, dN, moduli, material, axisymmetric, displacement, out):
     """Fill `out` (n_cells, n_q, 4) with the stress xx, yy, zz, xy at the points of the tables N, dN.
 
@@ -145,7 +145,7 @@ def stress(points, cells, N, dN, moduli, material, axisymmetric, displacement, o
                 out[c, q, i] = D[i, 0] * exx + D[i, 1] * eyy + D[i, 2] * ezz + D[i, 3] * gxy
 
 
-@kernel
+@interpretable_kernel
 def largest_rotation(points, cells, N, dN, displacement):
     """Return the square of the largest rotation [radian^2] of a cell at the first point of the tables N, dN, and its number.
 
@@ -166,7 +166,7 @@ def largest_rotation(points, cells, N, dN, displacement):
     return largest, number
 
 
-@kernel
+@interpretable_kernel
 def add_nodal(cells, extrapolation, at_points, low, high, total, count):
     """Extrapolate quadrature values to the nodes `low` to ``high - 1`` of each cell and add them up per node, in place.
 

@@ -9,7 +9,7 @@ have the same arguments.
 
 import numpy as np
 
-from fastcontact._jit.decorators import inlined_kernel, kernel
+from fastcontact._jit.decorators import inlined_kernel, interpretable_kernel, kernel
 from fastcontact.elasticity.constitutive_kernels import voigt
 from fastcontact.elasticity.element_2d_kernels import owned
 from fastcontact.mesh.jacobian_kernels import jacobian_3d, transposed
@@ -185,7 +185,7 @@ def _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, mine, gra
     return True
 
 
-@kernel
+@interpretable_kernel
 def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, axisymmetric, slots, owner, part, data):
     """Add element stiffness blocks to `data` (n_blocks, 3, 3), in the rows of nodes with ``owner[node] == part``.
 
@@ -221,7 +221,7 @@ def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, ax
     return -1
 
 
-@kernel
+@interpretable_kernel
 def stress(points, cells, N, dN, moduli, material, axisymmetric, displacement, out):
     """Fill `out` (n_cells, n_q, 6) with the stress xx, yy, zz, xy, yz, xz at the points of the table dN.
 
@@ -275,7 +275,7 @@ def stress(points, cells, N, dN, moduli, material, axisymmetric, displacement, o
                 out[c, q, i] = normal + D[i, 3] * gxy + D[i, 4] * gyz + D[i, 5] * gxz
 
 
-@kernel
+@interpretable_kernel
 def largest_rotation(points, cells, N, dN, displacement):
     """Return the square of the largest rotation [radian^2] of a cell at the first point of the table dN, and its number.
 

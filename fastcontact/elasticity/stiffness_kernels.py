@@ -6,10 +6,10 @@ Cells of all elements stand in one list: the nodes of cell ``c`` are ``nodes[sta
 
 import numpy as np
 
-from fastcontact._jit.decorators import kernel
+from fastcontact._jit.decorators import interpretable_kernel, kernel
 
 
-@kernel
+@interpretable_kernel
 def cells_at_nodes(start, nodes, n_points):
     """Return (first, cells): the cells at node p are ``cells[first[p]:first[p + 1]]``, ascending."""
     first = np.zeros(n_points + 1, np.int64)
@@ -27,7 +27,7 @@ def cells_at_nodes(start, nodes, n_points):
     return first, cells
 
 
-@kernel
+@interpretable_kernel
 def count_neighbours(start, nodes, first, cells, low, high, count):
     """Fill `count` (n_points,), from `low` to ``high - 1``, with the number of nodes that share a cell with each node."""
     seen = np.full(first.shape[0] - 1, -1, np.int32)
@@ -41,7 +41,7 @@ def count_neighbours(start, nodes, first, cells, low, high, count):
         count[p] = max(n_found, 1)  # a node without cells keeps its diagonal
 
 
-@kernel
+@interpretable_kernel
 def neighbours(start, nodes, first, cells, low, high, indptr, indices):
     """Fill the sorted numbers of the nodes that share a cell with each node from `low` to ``high - 1``, itself included."""
     seen = np.full(first.shape[0] - 1, -1, np.int32)
@@ -62,7 +62,7 @@ def neighbours(start, nodes, first, cells, low, high, indptr, indices):
             indices[begin] = p
 
 
-@kernel
+@interpretable_kernel
 def find_slots(cells, indptr, indices, slots):
     """Fill `slots` (n_cells, n_nodes, n_nodes): positions in `indices` of every node pair of every cell."""
     n_cells, n_nodes = cells.shape

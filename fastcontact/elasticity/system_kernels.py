@@ -1,7 +1,7 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
 """Elimination of supported unknowns from a block matrix with sorted rows."""
 
-from fastcontact._jit.decorators import kernel
+from fastcontact._jit.decorators import interpretable_kernel, kernel
 
 
 @kernel
@@ -15,7 +15,7 @@ def _near(i, indptr, indices, supported_nodes):
     return False
 
 
-@kernel
+@interpretable_kernel
 def take_out(indptr, indices, data, supported, supported_nodes, kept, low, high, start, columns, taken, moves):
     """Move rows and columns of supports from `data` to (start, columns, taken), compressed rows of single numbers.
 
@@ -52,7 +52,7 @@ def take_out(indptr, indices, data, supported, supported_nodes, kept, low, high,
                 start[row + 1] = at
 
 
-@kernel
+@interpretable_kernel
 def diagonal(indptr, indices, data, out):
     """Fill `out` (n,) with the diagonal of a matrix of square blocks (n_blocks, size, size)."""
     size = data.shape[1]

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from fastcontact._jit.decorators import kernel
+from fastcontact._jit.decorators import interpretable_kernel, kernel
 from fastcontact.mesh.jacobian_kernels import jacobian_3d, transposed
 
 
@@ -27,7 +27,7 @@ def _determinant_3d(x, slopes, q):
     return j00 * (j11 * j22 - j12 * j21) + j01 * (j12 * j20 - j10 * j22) + j02 * (j10 * j21 - j11 * j20)
 
 
-@kernel
+@interpretable_kernel
 def extremes(points, cells, dN, weights, edges, low, high, measure, longest):
     """Fill the smallest and largest det J, the area or volume, and the longest edge of each cell, all (n_cells,).
 
@@ -55,6 +55,7 @@ def extremes(points, cells, dN, weights, edges, low, high, measure, longest):
         for e in range(edges.shape[0]):
             own = 0.0
             for i in range(dim):
-                own += (x[i, edges[e, 1]] - x[i, edges[e, 0]]) ** 2
+                along = x[i, edges[e, 1]] - x[i, edges[e, 0]]
+                own += along * along
             square = max(square, own)
         longest[c] = np.sqrt(square)

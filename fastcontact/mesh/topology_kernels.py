@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from fastcontact._jit.decorators import kernel
+from fastcontact._jit.decorators import interpretable_kernel, kernel
 
 
 @kernel
@@ -39,7 +39,7 @@ def _root(parent, cell):
     return cell
 
 
-@kernel
+@interpretable_kernel
 def alone(facets, owner, n_points, found, parent):
     """Fill `found` (n_facets,) with whether no other one of the facets (n_facets, n_nodes) has the same nodes.
 

@@ -3,11 +3,11 @@
 
 import numpy as np
 
-from fastcontact._jit.decorators import kernel
+from fastcontact._jit.decorators import interpretable_kernel
 from fastcontact.contact.search.box_tree_kernels import DEPTH, square_to_box
 
 
-@kernel
+@interpretable_kernel
 def facing_facets(points, nodes, outward, facets, centre, normal, reach, tree, order, facing):
     """Fill `facing` (m, k) with the facets that each of `nodes` (m,) faces at a distance below their `reach`, -1 for none.
 

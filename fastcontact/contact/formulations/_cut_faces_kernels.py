@@ -7,7 +7,7 @@ make the polygon that is cut, in the ``axes`` (3, 3) of its plane: two tangents 
 
 import numpy as np
 
-from fastcontact._jit.decorators import inlined_kernel, innermost_kernel, kernel
+from fastcontact._jit.decorators import inlined_kernel, innermost_kernel, interpretable_kernel, kernel
 from fastcontact.contact.search.box_tree_kernels import DEPTH
 from fastcontact.contact.search.projection_3d_kernels import MAX_ITERATIONS
 from fastcontact.contact.search.straight_3d_kernels import FINAL
@@ -17,7 +17,7 @@ from fastcontact.round_off import ROUND_OFF
 MOST = 12
 
 
-@kernel
+@interpretable_kernel
 def planes(corners, n_corners, origin, axes):
     """Fill `origin` (n, 3) with the centres of polygons (n, most, 3) and `axes` (n, 3, 3); see above."""
     for i in range(corners.shape[0]):
@@ -40,14 +40,14 @@ def _plane(corners, count, origin, axes):
             e, f = (d + 1) % 3, (d + 2) % 3
             normal[d] += (corners[k, e] - origin[e]) * (corners[m, f] - origin[f])
             normal[d] -= (corners[k, f] - origin[f]) * (corners[m, e] - origin[e])
-    length = np.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
+    length = np.sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2])
     for d in range(3):
         normal[d] /= length
         axes[0, d] = corners[0, d] - origin[d]
     along = axes[0, 0] * normal[0] + axes[0, 1] * normal[1] + axes[0, 2] * normal[2]
     for d in range(3):
         axes[0, d] -= along * normal[d]
-    size = np.sqrt(axes[0, 0] ** 2 + axes[0, 1] ** 2 + axes[0, 2] ** 2)
+    size = np.sqrt(axes[0, 0] * axes[0, 0] + axes[0, 1] * axes[0, 1] + axes[0, 2] * axes[0, 2])
     for d in range(3):
         axes[0, d] /= size
     for d in range(3):
@@ -139,12 +139,12 @@ def _meets(low, high, origin, normal, radius, reach):
         apart = 0.5 * (low[d] + high[d]) - origin[d]
         along += apart * normal[d]
         far += apart * apart
-        size += 0.25 * (high[d] - low[d]) ** 2
+        size += 0.25 * ((high[d] - low[d]) * (high[d] - low[d]))
     size = np.sqrt(size)
-    return abs(along) <= reach + size and far - along * along <= (radius + size) ** 2
+    return abs(along) <= reach + size and far - along * along <= (radius + size) * (radius + size)
 
 
-@kernel
+@interpretable_kernel
 def facing_pairs(
     secondary, n_secondary, origin, axes, radius, reach, primary, n_primary, other_normal, numbers, tree, facing, pairs
 ):
@@ -270,7 +270,8 @@ def _stretch(facet, terms):
             sf += facet[k, f] * terms[k, 1]
             te += facet[k, e] * terms[k, 2]
             tf += facet[k, f] * terms[k, 2]
-        area += (se * tf - sf * te) ** 2
+        normal = se * tf - sf * te
+        area += normal * normal
     return np.sqrt(area)
 
 
@@ -314,7 +315,7 @@ def _symmetrise(mass):
                 mass[s, b, a] = mass[s, a, b]
 
 
-@kernel
+@interpretable_kernel
 def integrate(
     low, high, start, secondary, n_secondary, origin, axes, deformed, reference, to_terms, middle,
     primary, n_primary, other_deformed, other_to_terms, other_middle, pairs, points, weights, heights, other_heights,

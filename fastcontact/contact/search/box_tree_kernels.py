@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fastcontact._jit.decorators import inlined_kernel, kernel
+from fastcontact._jit.decorators import inlined_kernel, interpretable_kernel, kernel
 from fastcontact.arrays import Array
 
 # Room for the boxes that a search has still to open; a squared distance that no facet exceeds.
@@ -24,7 +24,7 @@ class Tree(NamedTuple):
     high: Array
 
 
-@kernel
+@interpretable_kernel
 def tree_order(points, together):
     """Return the permutation (n,) that sorts points (n, dim) by halving them along their longest side, and again the halves.
 
@@ -76,7 +76,7 @@ def _halve(points, order, begin, middle, end):
             return
 
 
-@kernel
+@interpretable_kernel
 def build(low, high):
     """Return the tree over the boxes of facets (n_facets, dim), sorted by `tree_order`."""
     n, dim = low.shape

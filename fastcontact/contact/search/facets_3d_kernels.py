@@ -3,13 +3,13 @@
 
 import numpy as np
 
-from fastcontact._jit.decorators import inlined_kernel, kernel
+from fastcontact._jit.decorators import inlined_kernel, interpretable_kernel, kernel
 from fastcontact.contact.search.projection_3d_kernels import vector
 from fastcontact.contact.search.straight_3d_kernels import dot, room
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
-@kernel
+@interpretable_kernel
 def prepare(facets, begin, end, to_terms, weights, low, high):
     """Fill all but the nodes and the midst of the facets `begin` to `end`, and their boxes `low`, `high` (n_facets, 3).
 
@@ -85,9 +85,10 @@ def _convex(p, q, turn, second, diagonal):
     exceeds r |X''|, with r the distance to the farthest point of the facet.
     """
     pp, pq, qq = dot(p, p), dot(p, q), dot(q, q)
-    least = np.sqrt(max(0.5 * (pp + qq) - np.sqrt(0.25 * (pp - qq) ** 2 + pq * pq), 0.0)) - turn
+    least = np.sqrt(max(0.5 * (pp + qq) - np.sqrt(0.25 * ((pp - qq) * (pp - qq)) + pq * pq), 0.0)) - turn
     if not least > 0.0:
         return 0.0
     if second == 0.0:
         return np.inf
-    return max(least * least / second - diagonal, 0.0) ** 2
+    distance = max(least * least / second - diagonal, 0.0)
+    return distance * distance

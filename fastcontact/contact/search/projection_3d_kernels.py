@@ -159,7 +159,7 @@ def _downhill(terms, f, s, t, sides, point, value, hss, hst, htt):
 
     Candidates are the direction in which the Hessian is smallest, and those along the sides.
     """
-    middle, radius = 0.5 * (hss + htt), np.sqrt(0.25 * (hss - htt) ** 2 + hst * hst)
+    middle, radius = 0.5 * (hss + htt), np.sqrt(0.25 * ((hss - htt) * (hss - htt)) + hst * hst)
     if middle - radius >= -1e-9 * (abs(middle) + radius):
         return 0.0, 0.0
     us, ut = (hst, middle - radius - hss) if abs(hst) > 0.0 else (0.0, 1.0)
@@ -232,7 +232,8 @@ def project(facets, f, domain, point, reach):
         a, b, square = _on_triangle(facets, f, nodes, triangles, k, point)
         if square < flat:
             s, t, flat = a, b, square
-    if max(np.sqrt(flat) - bend, 0.0) ** 2 > reach:
+    least = max(np.sqrt(flat) - bend, 0.0)
+    if least * least > reach:
         return s, t, np.inf, True
     tried_s, tried_t = s, t
     s, t, converged = descend(terms, f, s, t, sides, point)
@@ -241,7 +242,8 @@ def project(facets, f, domain, point, reach):
         return s, t, best, True
     for k in range(triangles.shape[0] if bend > 0.0 else 0):
         a, b, square = _on_triangle(facets, f, nodes, triangles, k, point)
-        if square > (np.sqrt(2.0 * best) + bend) ** 2 or abs(a - tried_s) + abs(b - tried_t) < 1e-3:
+        most = np.sqrt(2.0 * best) + bend
+        if square > most * most or abs(a - tried_s) + abs(b - tried_t) < 1e-3:
             continue
         a, b, good = descend(terms, f, a, b, sides, point)
         value = half_square(terms, f, a, b, point)

@@ -6,7 +6,7 @@ Facets are straight lines (2 nodes) or parabolas (3 nodes, the middle last): ``c
 
 import numpy as np
 
-from fastcontact._jit.decorators import inlined_kernel, kernel
+from fastcontact._jit.decorators import inlined_kernel, interpretable_kernel, kernel
 from fastcontact.contact.search.box_tree_kernels import DEPTH, FAR, open_box, square_to_box
 
 # Squared distances to boxes and facets are rounded.
@@ -38,7 +38,7 @@ def _project(corners, f, x, y):
         for k in range(9):
             trial = -1.0 + 0.25 * k
             px, py, _, _, _, _ = _curve(corners, f, trial)
-            d = (x - px) ** 2 + (y - py) ** 2
+            d = (x - px) * (x - px) + (y - py) * (y - py)
             if d < best:
                 best, s = d, trial
         for _ in range(50):
@@ -58,10 +58,10 @@ def _project(corners, f, x, y):
         px, py = corners[f, end, 0], corners[f, end, 1]
     else:
         px, py, _, _, _, _ = _curve(corners, f, s)
-    return s, (x - px) ** 2 + (y - py) ** 2
+    return s, (x - px) * (x - px) + (y - py) * (y - py)
 
 
-@kernel
+@interpretable_kernel
 def closest_facets(points, order, begin, end, corners, numbers, tree, result):
     """Project points (n, 2) on their closest facets; of equally close facets on the one with the lowest number.
 

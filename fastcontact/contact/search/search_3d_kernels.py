@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from fastcontact._jit.decorators import inlined_kernel, kernel
+from fastcontact._jit.decorators import inlined_kernel, interpretable_kernel
 from fastcontact.contact.search.box_tree_kernels import DEPTH, FAR, open_box, square_to_box
 from fastcontact.contact.search.projection_3d_kernels import component, frame, onto_sides, project, vector
 from fastcontact.contact.search.straight_3d_kernels import ON_SIDE, along, cross, dot, minus, on_bilinear, on_flat, unit
@@ -13,7 +13,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 ROUNDING = 1.0 + 1e-14
 
 
-@kernel
+@interpretable_kernel
 def closest_facets(points, order, begin, end, facets, domain, numbers, tree, closest_facet):
     """Project points (n, 3) on their closest facets; of facets that meet in the closest point the one with the lowest number.
 
@@ -49,7 +49,8 @@ def closest_facets(points, order, begin, end, facets, domain, numbers, tree, clo
                 same = LENGTH_ROUND_OFF * _size(tree.low, tree.high, box)
             if square < best:
                 best = square
-                reach = ROUNDING * (np.sqrt(best) + same) ** 2
+                reach = np.sqrt(best) + same
+                reach = ROUNDING * (reach * reach)
         closest_facet.facet[i], closest_facet.distance[i] = -1, np.nan
         if closest >= 0:
             closest_facet.facet[i] = numbers[closest]

@@ -10,13 +10,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact._jit.decorators import inlined_kernel, kernel
+from fastcontact._jit.decorators import inlined_kernel, interpretable_kernel
 from fastcontact.arrays import Array, Mask, Numbers
 
 Offsets = NDArray[np.int64]
 
 
-@kernel
+@interpretable_kernel
 def parents(start: Numbers, rows: Numbers, parent: Numbers) -> None:
     """Fill `parent` (n,) with the elimination tree."""
     n = len(parent)
@@ -33,7 +33,7 @@ def parents(start: Numbers, rows: Numbers, parent: Numbers) -> None:
                 i = above
 
 
-@kernel
+@interpretable_kernel
 def postordered(parent: Numbers, order: Numbers) -> None:
     """Fill `order` (n,) with the columns so that every subtree stands together, children before their parent."""
     n, count = len(parent), 0
@@ -58,7 +58,7 @@ def postordered(parent: Numbers, order: Numbers) -> None:
                 stack[top] = child
 
 
-@kernel
+@interpretable_kernel
 def counts(start: Numbers, rows: Numbers, parent: Numbers, order: Numbers, count: Numbers) -> None:
     """Fill `count` (n,) with the entries of each column of the factor, the diagonal included.
 
@@ -107,7 +107,7 @@ def _common(j: int, ancestor: Numbers) -> int:
     return root
 
 
-@kernel
+@interpretable_kernel
 def supernodes(
     parent: Numbers, count: Numbers, given: Mask, widths: Offsets, shares: Array, first: Offsets, below: Offsets
 ) -> int:
@@ -162,7 +162,7 @@ def _joined(
     return top
 
 
-@kernel
+@interpretable_kernel
 def rows_below(
     start: Numbers, rows: Numbers, order: Numbers, position: Numbers, parent: Numbers, first: Offsets, begin: Offsets,
     row_indices: Numbers,

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact._jit.decorators import inlined_kernel, kernel
+from fastcontact._jit.decorators import inlined_kernel, interpretable_kernel, kernel
 from fastcontact.arrays import Array, Numbers
 
 Offsets = NDArray[np.int64]
@@ -22,7 +22,7 @@ PANEL, ROWS = 48, 96
 SMALL = 20_000
 
 
-@kernel
+@interpretable_kernel
 def room(parent: Numbers, first: Offsets, begin: Offsets) -> tuple[int, int]:
     """Return the entries of the largest front, and those that fronts leave at most at a time."""
     count = len(first) - 1

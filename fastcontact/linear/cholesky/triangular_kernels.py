@@ -11,13 +11,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact._jit.decorators import kernel, summing_kernel
+from fastcontact._jit.decorators import interpretable_kernel, summing_kernel
 from fastcontact.arrays import Array, Mask, Numbers
 
 Offsets = NDArray[np.int64]
 
 
-@kernel
+@interpretable_kernel
 def block(
     start: Offsets, values: Array, first: Offsets, begin: Offsets, rows: Numbers, wanted: Offsets, out: Array
 ) -> None:
@@ -35,7 +35,7 @@ def block(
                     out[wanted[rows[k]], wanted[j]] = values[start[j] + high - j + k - begin[s]]
 
 
-@kernel
+@interpretable_kernel
 def forward(start: Offsets, values: Array, first: Offsets, begin: Offsets, rows: Numbers, x: Array) -> None:
     """Replace x (n,) by ``L^-1 x``."""
     moved = np.empty(len(x))

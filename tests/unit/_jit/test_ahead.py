@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import numba
 import numpy as np
@@ -30,7 +31,7 @@ def test_the_table_tells_kernels_as_they_are(run):
 
 
 def test_all_kinds_of_runs_together_are_the_whole_table():
-    assert ahead.kernels_of([]) == list(range(len(ahead.table()["kernels"])))
+    assert sorted(ahead.kernels_of([])) == list(range(len(ahead.table()["kernels"])))
     assert ahead.kernels_of(["no such kind"]) == []
 
 
@@ -66,12 +67,13 @@ def test_a_helper_leaves_kernels_on_disk_and_tells_each(tmp_path):
 def started(monkeypatch):
     """What `expect` starts, in a process that has two threads and has compiled nothing yet."""
     found = []
-    monkeypatch.setattr(ahead, "start", lambda runs, helpers: found.append((runs, helpers)))
+    monkeypatch.setattr(ahead, "start", lambda runs, helpers: found.append((runs, helpers)) or [])
     monkeypatch.setattr(ahead, "MOST", 3)
     monkeypatch.setattr(ahead.numba, "get_num_threads", lambda: 2)
-    monkeypatch.setattr(ahead.kernel_files, "kept", True)
+    monkeypatch.setattr(ahead.kernel_files, "files", {len: None})
     monkeypatch.setattr(compiling, "count", 0)
     monkeypatch.setattr(compiling, "helpers", [])
+    monkeypatch.setattr(compiling, "waiters", [])
     monkeypatch.setattr(compiling, "listeners", [])
     monkeypatch.setattr(ahead, "_helped", set())
     return found
@@ -108,13 +110,89 @@ def test_no_help(started, monkeypatch, spoilt):
     elif spoilt == "works for another":
         monkeypatch.setattr(ahead.multiprocessing, "parent_process", object)
     elif spoilt == "not kept":
-        monkeypatch.setattr(ahead.kernel_files, "kept", False)
+        monkeypatch.setattr(ahead.kernel_files, "files", {})
     else:
         monkeypatch.setattr(ahead.sys, "executable", "/opt/cad/cad")
     monkeypatch.setattr(compiling, "count", 100)
     ahead.expect(["2d"])
     assert started == []
     assert compiling.helpers == []
+
+
+class Process:
+    """A helper whose lines the test writes."""
+
+    def __init__(self):
+        self.output, self.input = os.pipe(), os.pipe()
+        self.stdout, self.stdin = os.fdopen(self.output[0]), os.fdopen(self.input[1], "w")
+        self.told = os.fdopen(self.input[0])
+
+    def say(self, *numbers):
+        os.write(self.output[1], "".join(f"{number}\n" for number in numbers).encode())
+
+    def end(self):
+        os.close(self.output[1])
+
+
+@pytest.fixture
+def helped(monkeypatch):
+    """A helper, its run, and what the run compiles itself; the file of kernel n is called "kernel n"."""
+    process, compiled = Process(), []
+    monkeypatch.setattr(ahead, "compiled_of", lambda runs: [1, 2])
+    monkeypatch.setattr(ahead, "kernels_of", lambda runs: [1, 2, 3])
+    monkeypatch.setattr(ahead, "_file_name", lambda number: f"kernel {number}")
+    monkeypatch.setattr(ahead, "compile_kernel", compiled.append)
+    monkeypatch.setattr(compiling, "listeners", [])
+    return process, ahead.Help(["2d"], [process]), compiled
+
+
+def begun(run, number):
+    """Wait until the run has heard that a helper has begun a kernel."""
+    with run._changed:
+        assert run._changed.wait_for(lambda: number in run._current.values(), timeout=60)
+
+
+def test_a_run_waits_for_the_kernel_that_a_helper_is_at_and_compiles_another_one(helped):
+    process, run, compiled = helped
+    process.say(1)
+    begun(run, 1)
+    waiting = ThreadPoolExecutor(1).submit(run.wait, "kernel 1")
+    assert process.told.readline() == "2\n"
+    process.say(3)
+    assert waiting.result(timeout=60)
+    assert compiled == [2]  # what Python may run in its place is none that it will need
+    process.end()
+
+
+def test_a_run_compiles_what_no_helper_has_begun_and_tells_them(helped):
+    process, run, compiled = helped
+    assert not run.wait("kernel 3")
+    assert process.told.readline() == "3\n"
+    assert not run.wait("another kernel")
+    assert compiled == []
+    process.end()
+
+
+def test_a_helper_that_ends_keeps_nobody_waiting(helped):
+    process, run, _ = helped
+    process.say(2)
+    begun(run, 2)
+    process.end()
+    run.wait("kernel 2")
+    assert not run.wait("kernel 2")
+
+
+@jitted
+def test_a_helper_leaves_out_what_the_run_compiles(tmp_path):
+    code = (
+        "from fastcontact._jit import ahead\n"
+        "ahead.kernels_of = lambda runs: [0, 1]\n"
+        "ahead.compile_kernel = lambda number: (time.sleep(2.0), done.append(number))\n"
+        "import time; done = []\n"
+        "ahead.main(['1', '0']); print(done)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], input="1\n", capture_output=True, text=True, check=True)
+    assert done.stdout == "0\n1\n[0]\n"
 
 
 @jitted

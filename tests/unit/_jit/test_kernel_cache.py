@@ -59,15 +59,14 @@ def forget():
 def asked(folder, kernel=CALLS):
     """Return what a kernel of a folder gives for 1, and how often it was found on disk, as in a new process."""
     forget()
-    kept = cache.kept
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(numba.config, "CACHE_DIR", str(folder / "cache"))
+        patch.setattr(cache, "files", {})
         patch.setattr(sys, "dont_write_bytecode", True)
         patch.syspath_prepend(folder)
         function = getattr(import_module(kernel[0]), kernel[1])
         found = function(1.0), sum(function.stats.cache_hits.values())
     forget()
-    cache.kept = kept
     return found
 
 

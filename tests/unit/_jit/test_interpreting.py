@@ -1,0 +1,182 @@
+"""Kernels that Python runs while they are not compiled have the bits of compiled ones."""
+
+import copy
+import dis
+import importlib
+import os
+import pkgutil
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import fastcontact as fc
+from fastcontact._jit import cache, decorators, interpreting
+
+pytestmark = pytest.mark.skipif(not decorators.compiled(), reason="kernels are not compiled")
+
+# Operations whose results IEEE 754 tells, and what makes and tells arrays. No powers, angles or sums of arrays.
+KNOWN = {
+    "abs", "min", "max", "len", "range", "np", "int64", "int32", "bool_", "inf", "nan", "sqrt", "isfinite", "shape", "empty",
+    "zeros", "full", "arange", "copy", "astype", "reshape",
+}  # fmt: skip
+
+
+def interpretable():
+    """Every kernel that Python may run, with its module and name."""
+    for module in pkgutil.walk_packages(fc.__path__, "fastcontact."):
+        if module.name.endswith("_kernels"):
+            for name, kernel in vars(importlib.import_module(module.name)).items():
+                if isinstance(kernel, interpreting.Interpretable) and kernel.__module__ == module.name:
+                    yield module.name, name, kernel
+
+
+def functions(kernel, seen):
+    """The Python of a kernel and of all that it calls, each with the names that it reads."""
+    function = getattr(kernel, "py_func", kernel)
+    if function not in seen:
+        seen.append(function)
+        for name in function.__code__.co_names:
+            if hasattr(function.__globals__.get(name), "py_func"):
+                functions(function.__globals__[name], seen)
+    return seen
+
+
+@pytest.mark.parametrize(("module", "name", "kernel"), list(interpretable()))
+def test_only_operations_with_one_result(module, name, kernel):
+    for function in functions(kernel, []):
+        names = {found for found in function.__code__.co_names if found not in KNOWN}
+        for found in names:
+            value = function.__globals__.get(found)
+            field = value is None  # of a named tuple
+            assert field or hasattr(value, "py_func") or isinstance(value, int | float | type), (module, name, found)
+        powers = [
+            step for step in dis.get_instructions(function) if step.opname == "BINARY_OP" and "**" in step.argrepr
+        ]
+        integers = function.__name__ == "room"
+        assert integers or not powers, (module, name, function.__name__)
+
+
+def test_no_kernel_calls_one_that_python_may_run():
+    """To Numba it would be no kernel."""
+    for module in pkgutil.walk_packages(fc.__path__, "fastcontact."):
+        place = importlib.import_module(module.name) if module.name.endswith("_kernels") else None
+        for kernel in [kernel for kernel in vars(place).values() if hasattr(kernel, "py_func")] if place else []:
+            known = kernel.py_func.__globals__
+            called = [name for name in kernel.py_func.__code__.co_names if name in known]
+            assert not [name for name in called if isinstance(known[name], interpreting.Interpretable)], kernel.__name__
+
+
+def same(one, other):
+    """Whether arrays, numbers and tuples of these have the same bits."""
+    if isinstance(one, tuple):
+        return len(one) == len(other) and all(map(same, one, other))
+    return type(one) is type(other) and np.asarray(one).tobytes() == np.asarray(other).tobytes()
+
+
+def both(kernel, compared):
+    """What computes a kernel twice and compares."""
+
+    def call(*arguments):
+        before = copy.deepcopy(arguments)
+        if interpreting.entries(arguments) == np.inf:
+            return kernel(*arguments)
+        result, again = kernel(*arguments), interpreting.interpret(kernel, before)
+        assert same(result, again), kernel.__name__
+        assert all(map(same, arguments, before)), kernel.__name__
+        compared.add(kernel.__name__)
+        return result
+
+    return call
+
+
+def axisymmetric(element, formulation):
+    model = fc.Model(fc.generate.half_spheres(element, size=12.0), "axisymmetric")
+    model.fix("A1A2", "x")
+    model.prescribe("A2B2", y=-0.1)
+    model.prescribe("A1B1", y=0.1)
+    model.add_contact("pair", secondary="CONT1", primary="CONT2", formulation=formulation)
+    return model
+
+
+def ball(element, formulation):
+    model = fc.Model(fc.generate.sphere_on_block(element, R=1.0, size=0.5, contact_size=0.3, contact_radius=0.2), "3d")
+    model.fix("SYMMETRY_X", "x")
+    model.fix("SYMMETRY_Z", "z")
+    model.fix("BLOCK_BOTTOM", "y")
+    model.prescribe("SPHERE_TOP", y=-0.02)
+    model.add_contact("pair", secondary="CONT_SPHERE", primary="CONT_BLOCK", formulation=formulation)
+    return model
+
+
+@pytest.mark.parametrize(
+    ("make", "element", "formulation", "least"),
+    [
+        (axisymmetric, "tri3", "node_to_segment", 24),
+        (axisymmetric, "tri6", "continuous", 24),
+        (ball, "hex8", "node_to_segment", 26),
+        (ball, "tet4", "mortar", 24),
+    ],
+)
+def test_runs_have_the_same_bits(make, element, formulation, least, monkeypatch):
+    model, compared = make(element, formulation), set()
+    model.add_material(fc.LinearElastic(E=1.0, nu=0.3))
+    fc.solve(model, 1, linear_solver="direct")  # compiles what a replaced kernel could not be compiled into
+    for module in [module for name, module in sys.modules.items() if name.startswith("fastcontact.")]:
+        for name, value in list(vars(module).items()):
+            if isinstance(value, interpreting.Interpretable):
+                monkeypatch.setattr(module, name, both(value, compared))
+    fc.solve(model, 1, linear_solver="direct")
+    assert len(compared) >= least, sorted(compared)
+
+
+ASK = """
+import numpy as np
+from fastcontact._jit import compiling, interpreting
+from fastcontact._jit.norms_kernels import largest_difference as kernel
+
+x, y = np.array([1.0, 2.0, 4.0]), np.array([1.0, 1.0, 6.0])
+answers = [kernel(x, y), len(kernel.compiled.signatures), compiling.count]
+interpreting.SECONDS = -1.0
+answers += [kernel(x, y), len(kernel.compiled.signatures), type(answers[0]).__name__]
+print(*answers)
+"""
+
+
+def test_python_runs_a_kernel_until_it_has_taken_its_time_and_never_one_that_is_kept(tmp_path):
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "NUMBA_DISABLE_JIT": "0"}
+    answers = [
+        subprocess.run([sys.executable, "-c", ASK], env=environment, capture_output=True, text=True, check=True).stdout
+        for _ in range(2)
+    ]
+    assert answers == ["2.0 0 1 2.0 1 float\n", "2.0 1 0 2.0 1 float\n"]
+
+
+class Bytes:
+    """Numba's file of a kernel, as far as it turns objects into bytes."""
+
+    _dump = bytes
+
+
+def test_only_files_of_the_kernel_as_it_is_now_count(tmp_path):
+    files, others = (cache.KernelFiles(tmp_path, "kernel", same, options, Bytes) for options in ("one", "another"))
+    assert not files.exist()
+    others.save("float64", b"machine code")
+    assert others.exist()
+    assert not files.exist()
+    shutil.rmtree(tmp_path)
+    assert not others.exist()
+
+
+def test_entries_of_small_types_are_none_that_python_may_compute():
+    assert interpreting.entries((np.zeros((2, 3)), 1.0, (np.zeros(4, np.int32), True))) == 12
+    assert interpreting.entries((np.zeros(2, np.float32),)) == np.inf
+
+
+def test_a_division_by_zero_is_as_in_compiled_code():
+    def inverse(x):
+        return 1.0 / x
+
+    assert interpreting.interpret(inverse, (0.0,)) == np.inf
