@@ -65,10 +65,9 @@ def newton_step(
 
     changed = image - before
     system = LinearOperator((len(changed),) * 2, matvec=along)
-    v, failed = gmres(system, changed, rtol=ACCURACY, atol=0.0, restart=MOST, maxiter=1)
-    if failed or not largest_difference(v, changed) <= FARTHEST * largest(changed):
-        return None
-    return before + v
+    size = largest(changed) or 1.0
+    v, _ = gmres(system, changed / size, rtol=ACCURACY, atol=0.0, restart=MOST, maxiter=1)
+    return before + size * v if largest_difference(size * v, changed) <= FARTHEST * size else None
 
 
 def _linearised(constraints: StackedConstraints, solution: Solution) -> list[tuple[slice, Linearised]]:

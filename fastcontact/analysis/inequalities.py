@@ -12,10 +12,9 @@ from fastcontact.analysis import active_set
 from fastcontact.analysis.active_dofs import ActiveDofs, constraints_on_unknowns
 from fastcontact.analysis.convergence_messages import friction_exceeded, no_contact_stops, not_balanced
 from fastcontact.analysis.floating_bodies import FloatingBodies
-from fastcontact.analysis.friction.path import Path, completed, shifted
 from fastcontact.analysis.iterate import Iterate
 from fastcontact.analysis.problem import Problem, StepLoad
-from fastcontact.analysis.solution import Accuracy, Slid, Solution
+from fastcontact.analysis.solution import Accuracy, Path, Slid, Solution
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.constraints import Constraints, StackedConstraints
@@ -107,6 +106,7 @@ def _solve(
     if not constraints.tangents:
         return active_set.solve(step.loaded, condensed, active, accuracy, u)
     from fastcontact.analysis.friction import solve as friction
+    from fastcontact.analysis.friction.path import completed, shifted
 
     condensed = replace(condensed, driven=step.driven(constraints))
     slid = step.path if isinstance(step.path, Slid) and len(step.path.slip) == len(constraints) else None

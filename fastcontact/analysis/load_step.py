@@ -32,7 +32,6 @@ from fastcontact.analysis.thermal_coupling import (
     first_rise,
     settle_heat,
 )
-from fastcontact.analysis.touching import along_path
 from fastcontact.arrays import Array
 from fastcontact.linear.protocol import Loaded
 from fastcontact.model.rigid_motions import generalised
@@ -164,7 +163,10 @@ def equilibrium(
         step = StepContext(problem, start, load, dofs.loaded(loaded), dofs)
         tried = None if previous_try is None else previous_try.settled
         settled = settle_geometry(step, start.extrapolation, expected, tried.iterate if tried else None)
-        settled = along_path(step, settled, expected)
+        if problem.criteria.friction_while_touching is not None:
+            from fastcontact.analysis.touching import along_path
+
+            settled = along_path(step, settled, expected)
     u, contact_force = solve_displacements(problem, load, loaded, settled, start.u)
     balanced = balance(problem, u, contact_force, load.force, start.largest_force)
     if settled is not None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fastcontact.arrays import Array, Mask
+from fastcontact.arrays import Array, Indices, Mask
 
 
 @dataclass(frozen=True)
@@ -83,6 +83,36 @@ class Equilibrium:
     def tangential(self) -> None:
         """Tangential forces: none without friction."""
         return None
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """Constraints at the beginning of a load step.
+
+    Attributes
+    ----------
+    gap, normal : ndarray (m,)
+        Gaps [length], zero where forces act, and normal forces [force].
+    traction : ndarray (m, dim)
+        Tangential forces [force].
+    parts : int
+        Increments to solve in.
+    """
+
+    gap: Array
+    normal: Array
+    traction: Array
+    parts: int
+
+    @property
+    def loaded(self) -> Mask:
+        """Constraints (m,) that carry forces at the beginning."""
+        return self.normal != 0.0
+
+    def forces(self, directions: tuple[Array, ...], rows: Indices) -> Array:
+        """Return the forces (1 + k, r) of constraints `rows` (r,) along tangents (m, dim)."""
+        along = [(self.traction[rows] * tangent[rows]).sum(axis=1) for tangent in directions]
+        return np.vstack([self.normal[rows], *along])
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,12 +9,11 @@ from dataclasses import replace
 import numpy as np
 
 from fastcontact.analysis.extrapolation import Extrapolation
-from fastcontact.analysis.friction.path import Path
 from fastcontact.analysis.geometry_loop import Plan, SettledContact, settle_geometry
 from fastcontact.analysis.inequalities import StepContext, solve_inequalities
 from fastcontact.analysis.iterate import Iterate, pair_surfaces
 from fastcontact.analysis.shared_nodes import SharedNodes
-from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium
+from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium, Path
 from fastcontact.arrays import Array
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.errors import ConvergenceError

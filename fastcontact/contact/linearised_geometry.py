@@ -127,7 +127,8 @@ class _SurfacePoints:
         self.slopes = [weights(at.nodes, slope, n_points) for slope in np.moveaxis(at.gradient, 2, 0)]
         self.axes = np.stack([slope @ coordinates for slope in self.slopes], axis=1)
         self.apart = self.secondary @ coordinates - self.facing @ coordinates
-        self.normal, self._projected = pairing.normal[rows], along is None
+        self.normal = pairing.normal[rows]
+        self._nodal: NodalNormals | None = None
         if normals == "facet":
             self._bend = self._facet_normals(primary, coordinates, facet, pairing.xi[rows], at)
         elif isinstance(normals, str):
@@ -148,7 +149,6 @@ class _SurfacePoints:
         self._up = np.linalg.solve(np.einsum("nid,njd->nij", self.axes, self.axes), self.axes)
         second = _second_derivatives(primary, facet, xi)
         curvature = np.einsum("nkij,nkd,nd->nij", second, coordinates[at.nodes], self.normal)
-        self._nodal = None
         return -np.einsum("njd,nij->nid", self._up, curvature)
 
     def _averaged(self, primary: Surface, coordinates: Array, facet: Indices, at: Places) -> Array:

@@ -11,44 +11,14 @@ The last increment depends on the others by the slips before it alone. They stay
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from fastcontact.analysis.friction.cone_newton import Forces
 from fastcontact.analysis.solution import FrictionalEquilibrium, Slid
-from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.arrays import Array, Mask
 from fastcontact.contact.constraints import Constraints
-
-
-@dataclass(frozen=True, eq=False)
-class Path:
-    """Constraints at the beginning of a load step.
-
-    Attributes
-    ----------
-    gap, normal : ndarray (m,)
-        Gaps [length], zero where forces act, and normal forces [force].
-    traction : ndarray (m, dim)
-        Tangential forces [force].
-    parts : int
-        Increments to solve in.
-    """
-
-    gap: Array
-    normal: Array
-    traction: Array
-    parts: int
-
-    @property
-    def loaded(self) -> Mask:
-        """Constraints (m,) that carry forces at the beginning."""
-        return self.normal != 0.0
-
-    def forces(self, directions: tuple[Array, ...], rows: Indices) -> Array:
-        """Return the forces (1 + k, r) of constraints `rows` (r,) along tangents (m, dim)."""
-        along = [(self.traction[rows] * tangent[rows]).sum(axis=1) for tangent in directions]
-        return np.vstack([self.normal[rows], *along])
 
 
 def along(

@@ -18,10 +18,10 @@ from scipy.linalg import lstsq
 from scipy.sparse import csr_array, vstack
 
 from fastcontact.analysis.friction import dense, eliminated
-from fastcontact.analysis.friction.path import Path, along
+from fastcontact.analysis.friction.path import along
 from fastcontact.analysis.friction.response import response
 from fastcontact.analysis.friction.slip_directions import GIVING, aligning, idle, own_compliance
-from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium, Response, Slid
+from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium, Path, Response, Slid
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.pairing import normals

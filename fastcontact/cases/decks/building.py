@@ -218,7 +218,7 @@ class Building:
         return name
 
     def _supports(self, conditions: Conditions) -> None:
-        mesh, alike = self.model.mesh, ByShape()
+        mesh, alike = self.model.mesh, ByShape[int]()
         temporary = conditions.temporary()
         self._temporary_supports(conditions, temporary)
         at_times = {name for name, _ in temporary}
@@ -272,7 +272,7 @@ class Building:
         return csr_array((direction, (np.zeros(dim, int), columns)), shape=(1, self.model.n_dofs))
 
     def _forces(self, conditions: Conditions) -> None:
-        alike = ByShape()
+        alike = ByShape[int]()
         for table, names in conditions.forces.alike():
             along: dict[tuple[int, float], list[int]] = {}
             for point, axis, local in names:

@@ -296,7 +296,7 @@ class HeatConditions:
         """Make the groups of all loads of heat in the mesh; return what adds each of them to a model."""
         found, made = self.found, []  # type: DeckMesh, list[Callable[[Model], None]]
         spans: list[tuple[float, float]] = []
-        risen = ByShape()
+        risen = ByShape[int]()
         for table, names in self.temperatures.alike():
             for span, points in self.fixed.of(names).items():
                 spans += [span] * (span not in spans)

@@ -98,8 +98,6 @@ class Formulation(ABC):
     # Pair again after every active-set iteration (True), or after the active set has settled (False).
     geometry_in_loop: ClassVar[bool]
     against_obstacles: ClassVar[bool] = True
-    # Gaps are those to nodes of the primary side.
-    opposite_nodes: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         if self.normals is None:
@@ -284,7 +282,7 @@ class Formulation(ABC):
 
     def _geometry(self, candidates: Candidates, pairing: Pairing, at: Configuration) -> Geometry | None:
         """Return how the gaps of paired candidates vary, where their normals are those of the primary side."""
-        if self.normals == "secondary" or self.opposite_nodes:
+        if self.normals == "secondary":
             return None
         coordinates = self.points + at.displacement
 

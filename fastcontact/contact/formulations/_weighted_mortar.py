@@ -35,7 +35,7 @@ from fastcontact.contact.formulations._overlap import LEAST, Overlap, obstacle_o
 from fastcontact.contact.integration import facet_measure, fine_rule, nodal_areas
 from fastcontact.contact.linearised_geometry import NodalNormals, Points, WeightedForces, faced
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
-from fastcontact.contact.pairing import Candidates, filled_up, pair, tangents
+from fastcontact.contact.pairing import Candidates, Pairing, filled_up, pair, tangents
 from fastcontact.contact.prescribed_normals import Normals
 from fastcontact.contact.projection import facet_normals, nodal_normals, smooth_normals
 from fastcontact.errors import ContactError, unknown
@@ -46,6 +46,8 @@ from fastcontact.round_off import SINGLE_PRECISION, TINY
 MULTIPLIERS = ("standard", "dual")
 # A tangent of which less than this part, squared, is free counts as held.
 FREE = 0.1
+# In facet lengths: points of facets in contact that stand out farther beyond the primary side than this do not face it.
+BESIDE = 1.0
 
 
 @dataclass(eq=False)
@@ -180,46 +182,44 @@ class WeightedMortar(Formulation):
 
         Over Gauss points of whole facets: where the cut runs, what is integrated is continuous.
         """
-        deformed, forces = self.points + at.displacement, (multiplier != 0.0) | friction.any(axis=1)
-        size, first, parts = len(multiplier), 0, []
-        functions, tests = Entries(), Entries()
+        deformed, acts = self.points + at.displacement, (multiplier != 0.0) | friction.any(axis=1)
+        nodes, shapes, functions, tests, first = [], [], Entries(), Entries(), 0
         for number, (block, mass) in enumerate(zip(self.secondary.blocks, overlap.mass, strict=True)):
-            facets, T = np.flatnonzero(forces[block.local].any(axis=1)), self._test[number]
-            xi, weights_of_points = fine_rule(block.element)
+            facets, T = np.flatnonzero(acts[block.local].any(axis=1)), self._test[number]
+            xi, weights = fine_rule(block.element)
             shape = elements.get(block.element).shape(xi)
-            whole = self._whole[number]
-            fraction = np.where(whole > 0.0, covered[number] / np.where(whole > 0.0, whole, 1.0), 0.0)
-            psi, _ = self._functions(T, mass, kept[block.local], fraction)
+            psi, _ = self._functions(T, mass, kept[block.local], self._fraction(number, covered))
             measure = facet_measure(block.facets[facets], block.element, self.points, xi, self.axisymmetric)
-            area = measure * weights_of_points
-            points = first + np.arange(area.size).reshape(area.shape)
-            functions.add(block.local[facets], points, np.einsum("fak,qk,fq->faq", psi[facets], shape, area))
-            tests.add(block.local[facets], points, np.einsum("ak,qk,fq->faq", T, shape, area))
-            parts.append((np.repeat(block.facets[facets], len(xi), axis=0), np.tile(shape, (len(facets), 1))))
+            area = measure * weights
+            columns = first + np.arange(area.size).reshape(area.shape)
+            functions.add(block.local[facets], columns, np.einsum("fak,qk,fq->faq", psi[facets], shape, area))
+            tests.add(block.local[facets], columns, np.einsum("ak,qk,fq->faq", T, shape, area))
+            nodes.append(np.repeat(block.facets[facets], len(xi), axis=0))
+            shapes.append(np.tile(shape, (len(facets), 1)))
             first += area.size
-        candidates = Candidates(filled_up([nodes for nodes, _ in parts]), filled_up([shape for _, shape in parts]))
+        candidates = Candidates(filled_up(nodes), filled_up(shapes))
+        pairing = pair(candidates.positions(deformed), self.primary, deformed, BESIDE, "facet", at.pose)
+        rows, size = np.flatnonzero(pairing.paired), (len(multiplier), first)
         along = "facet" if self.normals == "secondary" else self.normals
-        reach = max(self.projection_tolerance or 0.0, 1.0)
-        pairing = pair(candidates.positions(deformed), self.primary, deformed, reach, "facet", at.pose)
-        rows = np.flatnonzero(pairing.paired)
         points = faced(candidates, pairing, rows, self.primary, deformed, along, at.pose, pairing.normal[rows])
-        weighted = scaled(csr_array(functions.matrix((size, first))[:, rows]), 1.0 / weight)
-        nodal: NodalNormals | Points | None = None
+        weighted = scaled(csr_array(functions.matrix(size)[:, rows]), 1.0 / weight)
+        mean = csr_array(tests.matrix(size)[:, rows])
+        return WeightedForces(
+            points, weighted, mean, normal, multiplier, friction, self._own_normals(pairing, deformed, at.pose)
+        )
+
+    def _own_normals(self, pairing: Pairing, deformed: Array, pose: Pose) -> NodalNormals | Points | None:
+        """Return how the normals of the nodes vary, where they are no means over the primary side."""
         if isinstance(self.primary, RigidSide):
             nodes = self.secondary.points[:, None]
-            nodal = faced(
-                Candidates(nodes, np.ones(nodes.shape)),
-                pairing,
-                np.arange(size),
-                self.primary,
-                deformed,
-                along,
-                at.pose,
-            )
-        elif self.normals == "secondary":
-            nodal = NodalNormals(self.secondary, deformed)
-        mean = csr_array(tests.matrix((size, first))[:, rows])
-        return WeightedForces(points, weighted, mean, normal, multiplier, friction, nodal)
+            here, all_nodes = Candidates(nodes, np.ones(nodes.shape)), np.arange(len(nodes))
+            return faced(here, pairing, all_nodes, self.primary, deformed, self.normals, pose)
+        return NodalNormals(self.secondary, deformed) if self.normals == "secondary" else None
+
+    def _fraction(self, number: int, covered: list[Array]) -> Array:
+        """Return what part of the weights (n_facets, k) of its functions a block faces the other side with."""
+        whole = self._whole[number]
+        return np.where(whole > 0.0, covered[number] / np.where(whole > 0.0, whole, 1.0), 0.0)
 
     def _slip0(self, mean: csr_array, closing: Array, directions: tuple[Array, ...], at: Configuration) -> Array:
         """Return the slip (k, m) beside that by displacements: by a rigid obstacle, or minus the part of `closing`."""
@@ -308,9 +308,9 @@ class WeightedMortar(Formulation):
         rows, across, functions = Entries(), Entries(), {}
         closer = np.zeros((size[0], self.points.shape[1]))
         for number, (block, mass) in enumerate(zip(self.secondary.blocks, overlap.mass, strict=True)):
-            whole = self._whole[number]
-            fraction = np.where(whole > 0.0, covered[number] / np.where(whole > 0.0, whole, 1.0), 0.0)
-            psi, products = self._functions(self._test[number], mass, kept[block.local], fraction)
+            psi, products = self._functions(
+                self._test[number], mass, kept[block.local], self._fraction(number, covered)
+            )
             rows.add(block.local, block.facets, products)
             functions[block.element] = psi
             np.add.at(closer, block.local, psi @ overlap.closer[number])

@@ -53,7 +53,6 @@ class NodeToSegment(Formulation):
             raise ContactError(unknown("what a node of node_to_segment lies opposite to", self.opposite, OPPOSITE))
         if self.opposite == "node" and not isinstance(self.primary, Surface):
             raise ContactError("a rigid obstacle has no nodes: leave out opposite = 'node'")
-        self.opposite_nodes = self.opposite == "node"
         for block in self.secondary.blocks:
             self._check_areas(block.element)
         self._candidates = Candidates.nodes_of(self.secondary)
@@ -90,6 +89,8 @@ class NodeToSegment(Formulation):
         areas = self._nodal.nodal_areas
         usable = np.where(areas > ROUND_OFF * areas.max(), areas, np.inf)
         constraints = self.assembled(self._candidates, pairing, None, at)
+        if self.opposite == "node":
+            constraints = replace(constraints, geometry=None)
         return replace(constraints, areas=usable, nodes=self.secondary.points.astype(np.intp), nodal=self._nodal)
 
     @cached_property
