@@ -44,7 +44,9 @@ class Plan:
     semismooth : bool
         Pair again after every active-set iteration at first.
     extrapolate : bool
-        Begin with displacements that are extrapolated along the load, and with inexact solutions.
+        Begin with displacements that are extrapolated along the load, and, where solutions are iterative, with inexact ones.
+    newton : bool
+        Take steps of Newton's method for the geometry, see `geometry_newton`.
     """
 
     until_settled: bool
