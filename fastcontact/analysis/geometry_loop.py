@@ -44,7 +44,7 @@ class Plan:
     semismooth : bool
         Pair again after every active-set iteration at first.
     extrapolate : bool
-        Begin with displacements that are extrapolated along the load, and, where solutions are iterative, with inexact ones.
+        Begin with displacements that are extrapolated along the load, and with inexact solutions.
     newton : bool
         Take steps of Newton's method for the geometry, see `geometry_newton`.
     """
@@ -64,7 +64,7 @@ class Plan:
             until_settled=fixed is None,
             limit=criteria.max_geometry_updates if fixed is None else fixed,
             semismooth=fixed is None and iterative and any(pair.geometry_in_loop for pair in problem.pairs.values()),
-            extrapolate=fixed is None and (iterative or not any(pair.slides for pair in problem.pairs.values())),
+            extrapolate=fixed is None and iterative,
             newton=not iterative and problem.floating_bodies is None,
         )
 
@@ -131,11 +131,11 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
     problem, plan = step.problem, Plan.of(step.problem)
     if iterate.history:  # nothing to extrapolate any more
         plan = replace(plan, extrapolate=False)
-    inexact = plan.extrapolate and problem.solver.iterative
-    tolerances = Tolerances(problem.solver, problem.criteria, inexact, step.state.gap_round_off, expected)
+    tolerances = Tolerances(problem.solver, problem.criteria, plan.extrapolate, step.state.gap_round_off, expected)
     mixing, watch = _Mixing(Anderson(MIXED, step.dofs.compared, problem.solver.iterative)), Watch()
     if plan.extrapolate:
         iterate.u = extrapolation.displacement(iterate.u)
+    last_change, falls = np.inf, True
     for update in range(plan.limit + 1):
         single = plan.semismooth and update < SEMISMOOTH_UPDATES
         constraints = pair_surfaces(problem, step.state, step.load, iterate)
@@ -156,13 +156,15 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
             _log_scatter(scatter, problem.criteria.geometry)
             return replace(settled, scatter=scatter)
         mixed = None
-        if plan.newton and solution.settled:
+        # Where nodes pass from one facet to another and back, changes rise, and derivatives lead nowhere.
+        falls, last_change = falls and moved.change <= last_change, moved.change
+        if plan.newton and solution.settled and falls:
             mixed = newton_step(step, constraints, solution, moved.before, fraction)
         if mixed is None:
             mixed = mixing.next(moved.before, fraction, solution, tolerances.inexact, constraints)
         iterate.u = iterate.u if mixed is None else step.dofs.put(iterate.u, mixed)
         tolerances.tighten(moved.relative, solution.residual)
-        if inexact and update == PATIENT_UPDATES:
+        if plan.extrapolate and update == PATIENT_UPDATES:
             # Nodes that flip between facets may do so for ever from one start and not from another.
             iterate.begin_again(step.state)
             mixing.restart()
@@ -211,10 +213,7 @@ def _move(
     iterate.u = step.dofs.put(iterate.u, fraction)
     # Rigid motions of bodies that only contact holds do not count.
     size = max(step.dofs.size(solution.u), largest(step.load.lift))
-    if step.problem.floating_bodies is None:  # a step may lead back to where nothing is deformed
-        size = max(size, largest(step.state.u))
-    change = largest_difference(fraction, before)
-    moved = _Moved(before, change if change > step.state.gap_round_off else 0.0, size)
+    moved = _Moved(before, largest_difference(fraction, before), size)
     iterate.remember(constraints, solution)
     iterate.history.append(
         {

@@ -235,7 +235,7 @@ class ModelInitialStates(ModelLoads):
     def expanding_rise(self, temperature_factors: Sequence[float], temperature: Array | None) -> Array | None:
         """Return the rise of the temperature (n_points,) by which cells expand [temperature]; None where none does.
 
-        Both arguments as of `stress_offset`.
+        `temperature_factors` and `temperature` (n_points,) [temperature] are those of `stress_offset`.
         """
         if temperature is not None and self.expands:
             return np.asarray(temperature - self.reference_temperature)
