@@ -121,7 +121,7 @@ def test_wrong_options_of_run(extra, message, solved, capsys, tmp_path, monkeypa
 
 
 def test_no_convergence_is_exit_code_two_and_keeps_finished_steps(solved, tmp_path, capsys):
-    text = CASE.replace("[probes]", "[solve]\nmax_halvings = 1\nmax_geometry_updates = 2\ngeometry = 1e-3\n[probes]")
+    text = CASE.replace("[probes]", "[solve]\nmax_halvings = 1\nmax_geometry_updates = 2\ngeometry = 1e-9\n[probes]")
     case = tmp_path / "hard.toml"
     text = text.replace('primary = "CONT2"', 'primary = "CONT2"\nformulation = "node_to_segment"')
     case.write_text(text.replace("steps = 3", "instants = [0.001, 1.0]"))
