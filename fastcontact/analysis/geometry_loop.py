@@ -132,16 +132,16 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
     if iterate.history:  # nothing to extrapolate any more
         plan = replace(plan, extrapolate=False)
     tolerances = Tolerances(problem.solver, problem.criteria, plan.extrapolate, step.state.gap_round_off, expected)
-    mixing, watch = _Mixing(Anderson(MIXED, step.dofs.compared, problem.solver.iterative)), Watch()
+    mixing, watch = _Mixing(Anderson(MIXED, step.dofs.compared, problem.solver.iterative), plan.newton), Watch()
     if plan.extrapolate:
         iterate.u = extrapolation.displacement(iterate.u)
-    last_change, falls = np.inf, True
     for update in range(plan.limit + 1):
         single = plan.semismooth and update < SEMISMOOTH_UPDATES
         constraints = pair_surfaces(problem, step.state, step.load, iterate)
         active = initially_active(constraints, iterate, extrapolation if plan.extrapolate and update == 0 else None)
         accuracy = tolerances.accuracy(step.dofs.scale(iterate.u, step.load.lift), single)
-        solution, fraction = _solve_once(step, constraints, iterate, active, accuracy)
+        nodes = SharedNodes.of(constraints, problem.model.periodic_interfaces)
+        solution, fraction = _solve_once(step, constraints, nodes, iterate, active, accuracy)
         moved = _move(step, iterate, constraints, solution, fraction)
         if not (solution.settled or single or tolerances.inexact):
             _raise_cycling(problem, constraints, solution, iterate)
@@ -156,9 +156,7 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
             _log_scatter(scatter, problem.criteria.geometry)
             return replace(settled, scatter=scatter)
         mixed = None
-        # Where nodes pass from one facet to another and back, changes rise, and derivatives lead nowhere.
-        falls, last_change = falls and moved.change <= last_change, moved.change
-        if plan.newton and solution.settled and falls:
+        if mixing.newton(moved.change) and solution.settled and nodes is None:
             mixed = newton_step(step, constraints, solution, moved.before, fraction)
         if mixed is None:
             mixed = mixing.next(moved.before, fraction, solution, tolerances.inexact, constraints)
@@ -182,10 +180,10 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
 
 
 def _solve_once(
-    step: StepContext, constraints: StackedConstraints, iterate: Iterate, active: Mask, accuracy: Accuracy
-) -> tuple[Solution, Array]:
-    """Solve the inequalities of a pairing, those of nodes in several pairs or at both ends of a period once."""
-    nodes = SharedNodes.of(constraints, step.problem.model.periodic_interfaces)
+    step: StepContext, constraints: StackedConstraints, nodes: SharedNodes | None, iterate: Iterate, active: Mask,
+    accuracy: Accuracy,
+) -> tuple[Solution, Array]:  # fmt: skip
+    """Solve the inequalities of a pairing, those of `nodes` in several pairs or at both ends of a period once."""
     if nodes is None:
         return solve_inequalities(step, constraints, iterate, active & constraints.usable, accuracy)
     once = nodes.once(constraints)
@@ -241,16 +239,27 @@ def _raise_cycling(problem: Problem, constraints: StackedConstraints, solution: 
 
 
 class _Mixing:
-    """Anderson mixing of the geometries that belong to one active set.
+    """Anderson mixing of the geometries that belong to one active set, and how long Newton's method takes its place.
 
     Parameters
     ----------
     accelerated : Anderson
+    newton : bool
+        Whether Newton's method may.
     """
 
-    def __init__(self, accelerated: Anderson) -> None:
+    def __init__(self, accelerated: Anderson, newton: bool) -> None:
         self._accelerated = accelerated
         self._known: AnyArray | None = None
+        self._newton, self._change = newton, np.inf
+
+    def newton(self, change: float) -> bool:
+        """Return whether a step of Newton's method is due, after a `change` of the displacements [length].
+
+        Where nodes pass from one facet to another and back, changes rise, and derivatives lead nowhere.
+        """
+        self._newton, self._change = self._newton and change <= self._change, change
+        return self._newton
 
     def restart(self) -> None:
         """Forget the geometries so far."""

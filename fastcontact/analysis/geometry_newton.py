@@ -42,7 +42,8 @@ def newton_step(
     solution : Solution
         With these constraints.
     before, image : ndarray (k,)
-        Active displacements of the pairing and of the solution [length].
+        Active displacements of the pairing and of the solution [length]; those that contact does not depend on stay as in
+        the latter.
     """
     parts = _linearised(constraints, solution)
     if not parts or solution.response is None:
@@ -51,23 +52,29 @@ def newton_step(
         respond = solution.response()
     except LinAlgError:
         return None
-    dim, n_dofs = step.problem.model.mesh.dim, len(step.load.lift)
+    dim, n_dofs, where = step.problem.model.mesh.dim, len(step.load.lift), step.dofs.compared
     gaps = np.zeros((1 + len(constraints.tangents), len(constraints)))
 
     def along(v: Array) -> Array:
         """Return ``v - S'(u) v``."""
-        u = step.dofs.put(np.zeros(n_dofs), v)
+        active = np.zeros_like(image)
+        active[where] = v
+        u = step.dofs.put(np.zeros(n_dofs), active)
         force, nodal = np.zeros(n_dofs), u[: step.problem.model.n_dofs].reshape(-1, dim)
         for rows, part in parts:
             varied, gaps[0, rows] = part.along(nodal)
             force[: varied.size] += varied.ravel()
-        return v - step.dofs.varied(respond(step.dofs.reduced(force), gaps))
+        return v - step.dofs.varied(respond(step.dofs.reduced(force), gaps))[where]
 
-    changed = image - before
+    changed = (image - before)[where]
     system = LinearOperator((len(changed),) * 2, matvec=along)
     size = largest(changed) or 1.0
     v, _ = gmres(system, changed / size, rtol=ACCURACY, atol=0.0, restart=MOST, maxiter=1)
-    return before + size * v if largest_difference(size * v, changed) <= FARTHEST * size else None
+    if not largest_difference(size * v, changed) <= FARTHEST * size:
+        return None
+    mixed = image.copy()
+    mixed[where] = before[where] + size * v
+    return mixed
 
 
 def _linearised(constraints: StackedConstraints, solution: Solution) -> list[tuple[slice, Linearised]]:

@@ -22,7 +22,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from scipy.sparse import csr_array
 
-from fastcontact.arrays import AnyArray, Array, Indices
+from fastcontact.arrays import Array, Indices
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.pairing import Candidates, Pairing, tangents
 from fastcontact.contact.projection import (
@@ -34,6 +34,7 @@ from fastcontact.contact.projection import (
     smooth_normals,
 )
 from fastcontact.contact.surface import Surface
+from fastcontact.linear.sparse_rows import shapes_at
 from fastcontact.mesh import elements
 
 # Part of the size of the model by which points move for differences of an obstacle's normals, which are then off by 1e-10.
@@ -93,12 +94,6 @@ class Variation(NamedTuple):
     normal: Array
 
 
-def weights(nodes: AnyArray, values: Array, n_columns: int) -> csr_array:
-    """Return a matrix (n, n_columns) with `values` (n, k) in columns `nodes` (n, k)."""
-    starts = np.arange(0, values.size + 1, values.shape[1])
-    return csr_array((values.ravel(), nodes.ravel(), starts), shape=(len(values), n_columns))
-
-
 class _SurfacePoints:
     """Points that face a meshed side, and how their projections and normals vary.
 
@@ -122,9 +117,9 @@ class _SurfacePoints:
         normals: object, along: Array | None,
     ) -> None:  # fmt: skip
         at, n_points, facet = pairing.places(primary, rows), len(coordinates), pairing.facet[rows]
-        self.secondary = weights(candidates.nodes[rows], candidates.shape[rows], n_points)
-        self.facing = weights(at.nodes, at.shape, n_points)
-        self.slopes = [weights(at.nodes, slope, n_points) for slope in np.moveaxis(at.gradient, 2, 0)]
+        self.secondary = shapes_at(candidates.shape[rows], candidates.nodes[rows], n_points)
+        self.facing = shapes_at(at.shape, at.nodes, n_points)
+        self.slopes = [shapes_at(slope, at.nodes, n_points) for slope in np.moveaxis(at.gradient, 2, 0)]
         self.axes = np.stack([slope @ coordinates for slope in self.slopes], axis=1)
         self.apart = self.secondary @ coordinates - self.facing @ coordinates
         self.normal = pairing.normal[rows]
@@ -156,7 +151,7 @@ class _SurfacePoints:
         at_nodes = at_nodes_of_facets(smooth_normals(primary, coordinates))[facet]
         self._length = np.linalg.norm(np.einsum("nk,nkd->nd", at.shape, at_nodes), axis=1, keepdims=True)
         self._nodal = NodalNormals(primary, coordinates)
-        self._local = weights(at.local, at.shape, len(primary.points))
+        self._local = shapes_at(at.shape, at.local, len(primary.points))
         self.normal = np.einsum("nk,nkd->nd", at.shape, at_nodes) / self._length
         bend = np.einsum("nki,nkd->nid", at.gradient, at_nodes) / self._length[:, None]
         return np.asarray(bend - np.einsum("nid,nd->ni", bend, self.normal)[:, :, None] * self.normal[:, None])
@@ -319,7 +314,7 @@ def faced(
     if not isinstance(primary, RigidSide):
         return _SurfacePoints(candidates, pairing, rows, primary, coordinates, normals, along)
     return _ObstaclePoints(
-        weights(candidates.nodes[rows], candidates.shape[rows], len(coordinates)), primary, coordinates, pose
+        shapes_at(candidates.shape[rows], candidates.nodes[rows], len(coordinates)), primary, coordinates, pose
     )
 
 

@@ -149,8 +149,7 @@ def lu_factors(A: Array) -> tuple[Array, Array]:
     """
     with warnings.catch_warnings(action="ignore"):  # of an exact zero
         lu, pivots = lu_factor(A)
-    diagonal = np.abs(np.diag(lu))
-    if not diagonal.min(initial=np.inf) > _round_off(A) * diagonal.max(initial=0.0):
+    if not (np.abs(np.diag(lu)) > _round_off(A) * np.abs(A).max(axis=0)).all():
         raise LinAlgError("singular")
     return lu, pivots
 

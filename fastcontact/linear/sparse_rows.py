@@ -32,6 +32,12 @@ class Entries:
         return csr_array(coo_array((np.concatenate(self._values), positions), shape=size))
 
 
+def shapes_at(shape: Array, local: NDArray[np.integer], n_nodes: int) -> csr_array:
+    """Return the shape functions (m, n_nodes) of all nodes at points, from those (m, n) of the nodes `local` (m, n)."""
+    row = np.broadcast_to(np.arange(len(shape))[:, None], shape.shape)
+    return coo_array((shape.ravel(), (row.ravel(), local.ravel())), shape=(len(shape), n_nodes)).tocsr()
+
+
 def rows_of(mean: csr_array, direction: Array) -> csr_array:
     """Return rows (m, n_dofs): the relative motion (m, n_points) of nodes along their directions (m, dim)."""
     dim = direction.shape[1]

@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
-from scipy.sparse import coo_array, csr_array, diags_array
+from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import splu
 
 from fastcontact.arrays import Array, Indices, Mask
@@ -35,6 +35,7 @@ from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.multiplier_field import Projection
 from fastcontact.contact.pairing import Candidates, Pairing, normals
 from fastcontact.errors import ContactError
+from fastcontact.linear.sparse_rows import shapes_at
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
@@ -166,12 +167,6 @@ def _nearest(around: Indices, shape: Array, n_nodes: int) -> Mask:
     nearest = np.zeros(n_nodes, bool)
     nearest[around[shape >= shape.max(axis=1, keepdims=True, initial=-np.inf) - LENGTH_ROUND_OFF]] = True
     return nearest
-
-
-def shapes_at(shape: Array, local: Indices, n_nodes: int) -> csr_array:
-    """Return the shape functions (m, n_nodes) of all nodes at points, from those (m, n) of the nodes `local` (m, n)."""
-    row = np.broadcast_to(np.arange(len(shape))[:, None], shape.shape)
-    return coo_array((shape.ravel(), (row.ravel(), local.ravel())), shape=(len(shape), n_nodes)).tocsr()
 
 
 @dataclass(eq=False)

@@ -15,13 +15,14 @@ from scipy.sparse import csr_array, diags_array, eye_array
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
-from fastcontact.contact.formulations._pressure_field import PressureField, PressureFieldFormulation, shapes_at
+from fastcontact.contact.formulations._pressure_field import PressureField, PressureFieldFormulation
 from fastcontact.contact.integration import all_nodes_carry, facet_measure, fine_rule, gauss_rule
 from fastcontact.contact.pair_options import spread
 from fastcontact.contact.pairing import Candidates, filled_up
 from fastcontact.contact.prescribed_normals import Normals
 from fastcontact.contact.surface import FacetBlock
 from fastcontact.errors import ContactError, unknown
+from fastcontact.linear.sparse_rows import shapes_at
 from fastcontact.mesh import elements, quadrature
 from fastcontact.round_off import ROUND_OFF
 

@@ -124,6 +124,6 @@ def test_a_slender_bar_that_contact_holds_scatters_by_round_off_alone():
 
 
 def test_a_geometry_that_does_not_settle_names_the_criterion():
-    words = r"accept changes of that size \(Criteria\.geometry, which is 1e-11, above \de-\d\d\)"
+    words = r"accept changes of that size \(Criteria\.geometry, which is 1e-11, above \de-(09|10)\)"
     with pytest.raises(fc.ConvergenceError, match=words):
-        fc.solve(side_by_side(), fc.linear_ramp(1), criteria=fc.Criteria(max_geometry_updates=2, max_halvings=0))
+        fc.solve(side_by_side(), fc.linear_ramp(1), criteria=fc.Criteria(max_geometry_updates=3, max_halvings=0))
