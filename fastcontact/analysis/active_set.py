@@ -93,7 +93,7 @@ def _response(loaded: Loaded, constraints: Constraints, rows: Indices) -> Respon
         u = loaded.involved_solution(force, None) - at_rest
         if factors is None:
             return u
-        forces = lu_solve(factors, -(R @ u + gaps[0, rows]))
+        forces = lu_solve(factors, -(R @ u + gaps[rows]))
         return u + loaded.involved_solution(R.T @ forces, None) - at_rest
 
     return respond

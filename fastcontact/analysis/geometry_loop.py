@@ -60,12 +60,16 @@ class Plan:
         """Return the plan that the criteria, the formulations and the linear solver of a problem ask for."""
         criteria, iterative = problem.criteria, problem.solver.iterative
         fixed = 0 if criteria.keep_pairing else criteria.geometry_updates
+        pairs = problem.pairs.values()
+        # How slips vary with the geometry is not known, and fluid presses along the surfaces themselves.
+        known = not any(pair.friction or pair.options.source is not None for pair in pairs)
+        newton = known and not iterative and problem.floating_bodies is None
         return cls(
             until_settled=fixed is None,
             limit=criteria.max_geometry_updates if fixed is None else fixed,
-            semismooth=fixed is None and iterative and any(pair.geometry_in_loop for pair in problem.pairs.values()),
+            semismooth=fixed is None and not newton and any(pair.geometry_in_loop for pair in pairs),
             extrapolate=fixed is None and iterative,
-            newton=not iterative and problem.floating_bodies is None,
+            newton=newton,
         )
 
 

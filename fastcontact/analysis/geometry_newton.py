@@ -6,8 +6,8 @@ method takes the geometry's own variation into account: of the change v of the d
     v = S(u) - u + S'(u) v
 
 the last part is the response of the solution to the forces and gaps by which the geometry varies along v, see
-`contact.linearised_geometry`, with the active set, stick and slip as they are. It is a third of v or less, so that a few
-iterations of GMRES solve for v, each of the price of a back substitution.
+`contact.linearised_geometry`, with the active set as it is. It is a third of v or less, so that a few iterations of GMRES
+solve for v, each of the price of a back substitution. How slips of friction vary with the geometry is not known.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.analysis.inequalities import StepContext
-from fastcontact.analysis.solution import Solution
+from fastcontact.analysis.solution import Equilibrium, Solution
 from fastcontact.arrays import Array
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.contact.linearised_geometry import Linearised
@@ -45,15 +45,18 @@ def newton_step(
         Active displacements of the pairing and of the solution [length]; those that contact does not depend on stay as in
         the latter.
     """
-    parts = _linearised(constraints, solution)
-    if not parts or solution.response is None:
+    if (
+        not isinstance(solution, Equilibrium)
+        or solution.response is None
+        or not (parts := _linearised(constraints, solution))
+    ):
         return None
     try:
         respond = solution.response()
     except LinAlgError:
         return None
     dim, n_dofs, where = step.problem.model.mesh.dim, len(step.load.lift), step.dofs.compared
-    gaps = np.zeros((1 + len(constraints.tangents), len(constraints)))
+    gaps = np.zeros(len(constraints))
 
     def along(v: Array) -> Array:
         """Return ``v - S'(u) v``."""
@@ -62,12 +65,12 @@ def newton_step(
         u = step.dofs.put(np.zeros(n_dofs), active)
         force, nodal = np.zeros(n_dofs), u[: step.problem.model.n_dofs].reshape(-1, dim)
         for rows, part in parts:
-            varied, gaps[0, rows] = part.along(nodal)
+            varied, gaps[rows] = part.along(nodal)
             force[: varied.size] += varied.ravel()
         return v - step.dofs.varied(respond(step.dofs.reduced(force), gaps))[where]
 
     changed = (image - before)[where]
-    system = LinearOperator((len(changed),) * 2, matvec=along)
+    system = LinearOperator((len(changed),) * 2, matvec=along, dtype=float)
     size = largest(changed) or 1.0
     v, _ = gmres(system, changed / size, rtol=ACCURACY, atol=0.0, restart=MOST, maxiter=1)
     if not largest_difference(size * v, changed) <= FARTHEST * size:
@@ -84,11 +87,7 @@ def _linearised(constraints: StackedConstraints, solution: Solution) -> list[tup
         part, multiplier = constraints.parts[name], solution.multiplier[rows]
         if part.tied is not None or not multiplier.any():
             continue
-        if part.geometry is None or part.wetted is not None:  # fluid presses along the surfaces themselves
+        if part.geometry is None:
             return []
-        friction = np.zeros_like(part.positions)
-        if solution.tangential is not None:
-            for along, direction in zip(solution.tangential[rows].T, part.directions, strict=False):
-                friction += along[:, None] * direction
-        parts.append((rows, part.geometry(multiplier, friction)))
+        parts.append((rows, part.geometry(multiplier)))
     return parts

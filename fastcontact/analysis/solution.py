@@ -35,7 +35,7 @@ class Accuracy:
     max_newton_steps: int | None = None
 
 
-# How unknowns (n,) [length] change with forces (n,) [force] and with gaps and slips (1 + k, m) [length].
+# How unknowns (n,) [length] change with forces (n,) [force] and with gaps (m,) [length].
 Response = Callable[[Array, Array], Array]
 
 
@@ -163,8 +163,6 @@ class FrictionalEquilibrium:
         Of friction in the step, and what of it constraints do while they close, where increments of the step tell [energy].
     slid : Slid, optional
         Where the last increment began.
-    response : callable, optional
-        Makes the `Response` of this solution, constraints staying open, stuck or sliding.
     """
 
     u: Array
@@ -180,7 +178,6 @@ class FrictionalEquilibrium:
     directions: tuple[Array, ...] = ()
     work: Array | None = None
     slid: Slid | None = None
-    response: Callable[[], Response] | None = field(default=None, repr=False)
 
     def forces_along(self, directions: tuple[Array, ...], m: int) -> Array | None:
         """Return normal and tangential forces (1 + k, m) along other tangents (m, dim); None for other constraints.

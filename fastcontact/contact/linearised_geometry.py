@@ -1,15 +1,15 @@
 r"""Linearised contact geometry: how contact forces and gaps vary as the points that constraints stand for move.
 
 The rows of constraints depend on the displacements: points slide over the facets they face, and normals turn. A point
-:math:`x` with contact force :math:`p = \lambda n + \tau` faces :math:`y(\xi) = \sum_k N_k(\xi) x_k`, with the normal n.
+:math:`x` with contact force :math:`p = \lambda n` faces :math:`y(\xi) = \sum_k N_k(\xi) x_k`, with the normal n.
 Along a variation of the displacements its nodal forces and its gap vary, beside what the rows themselves give, by
 
 .. math:: \delta f = N_s^T \delta p - N^T \delta p - N_{,\alpha}^T p \, \delta \xi^\alpha, \qquad
-          \delta p = (\lambda I - n \tau^T) \delta n, \qquad
+          \delta p = \lambda \, \delta n, \qquad
           \delta g = - n \cdot y_{,\alpha} \delta \xi^\alpha + (x - y) \cdot \delta n
 
 (Laursen, Computational Contact and Impact Mechanics, 2002, section 5.3; Wriggers, Computational Contact Mechanics, 2006,
-chapter 9; for mortar Popp, Gee and Wall, 2009). The friction directions turn with the normal.
+chapter 9; for mortar Popp, Gee and Wall, 2009), without friction.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ class Linearised(Protocol):
         ...
 
 
-# Of normal forces (m,) and friction forces (m, dim) on the secondary side [force].
-Geometry = Callable[[Array, Array], Linearised]
+# Of multipliers (m,) [force].
+Geometry = Callable[[Array], Linearised]
 
 
 class NodalNormals:
@@ -75,7 +75,7 @@ class NodalNormals:
         """Return how the normals (m, dim) vary with displacements (n_points, dim) [length]."""
         total = np.zeros_like(self._mean)
         for block, slope, normal, up in self._parts:
-            leans = np.einsum("fqd,qka,fkd->fqa", normal, slope, du[block.facets], optimize=True)
+            leans = np.einsum("fqk,qka->fqa", normal @ np.swapaxes(du[block.facets], 1, 2), slope)
             np.add.at(total, block.local, -np.einsum("fqad,fqa->fqd", up, leans))
         self._side.add_across_ends(total)
         return across(self._mean, total) / self._length
@@ -117,11 +117,12 @@ class _SurfacePoints:
         normals: object, along: Array | None,
     ) -> None:  # fmt: skip
         at, n_points, facet = pairing.places(primary, rows), len(coordinates), pairing.facet[rows]
-        self.secondary = shapes_at(candidates.shape[rows], candidates.nodes[rows], n_points)
-        self.facing = shapes_at(at.shape, at.nodes, n_points)
-        self.slopes = [shapes_at(slope, at.nodes, n_points) for slope in np.moveaxis(at.gradient, 2, 0)]
-        self.axes = np.stack([slope @ coordinates for slope in self.slopes], axis=1)
-        self.apart = self.secondary @ coordinates - self.facing @ coordinates
+        nodes, shape = np.hstack([candidates.nodes[rows], at.nodes]), np.hstack([candidates.shape[rows], -at.shape])
+        self._motion = shapes_at(shape, nodes, n_points)  # of points relative to what they face
+        self._slopes = [shapes_at(slope, at.nodes, n_points) for slope in np.moveaxis(at.gradient, 2, 0)]
+        self._spreading = [csr_array(matrix.T) for matrix in (self._motion, *self._slopes)]
+        self.axes = np.stack([slope @ coordinates for slope in self._slopes], axis=1)
+        self.apart = self._motion @ coordinates
         self.normal = pairing.normal[rows]
         self._nodal: NodalNormals | None = None
         if normals == "facet":
@@ -162,22 +163,23 @@ class _SurfacePoints:
             return np.zeros_like(self.normal)
         if self._nodal is not None:
             return across(self.normal, self._local @ self._nodal.along(du)) / self._length
-        leans = np.stack([np.einsum("nd,nd->n", slope @ du, self.normal) for slope in self.slopes], axis=1)
+        leans = np.stack([np.einsum("nd,nd->n", slope @ du, self.normal) for slope in self._slopes], axis=1)
         return -np.einsum("nid,ni->nd", self._up, leans)
 
     def along(self, du: Array) -> Variation:
         """Return how projections and normals vary with displacements (n_points, dim) [length]."""
-        still, moved = self._turned_in_place(du), self.secondary @ du - self.facing @ du
+        still, moved = self._turned_in_place(du), self._motion @ du
         xi = np.einsum("nid,nd->ni", self._inverse, moved - self._gap * still)
         foot = np.einsum("nid,ni->nd", self.axes, xi)
         return Variation(xi, foot, still + np.einsum("nid,ni->nd", self._bend, xi))
 
     def spread(self, force: Array, varied: Array, xi: Array) -> Array:
         """Return the variation (n_points, dim) of nodal forces: points have a `force` that is `varied`, both (n, dim)."""
-        total = self.secondary.T @ varied - self.facing.T @ varied
-        for slope, step in zip(self.slopes, xi.T, strict=True):
-            total -= slope.T @ (step[:, None] * force)
-        return np.asarray(total)
+        motion, *slopes = self._spreading
+        total: Array = motion @ varied
+        for slope, step in zip(slopes, xi.T, strict=True):
+            total -= slope @ (step[:, None] * force)
+        return total
 
 
 def _second_derivatives(primary: Surface, facet: Indices, xi: Array) -> Array:
@@ -231,26 +233,25 @@ Points = _SurfacePoints | _ObstaclePoints
 
 @dataclass(frozen=True, eq=False)
 class PointForces:
-    """`Linearised` for forces (n,) and friction (n, dim) at paired points, whose constraints are the `rows` (n,) of m."""
+    """`Linearised` for forces (n,) at paired points, whose constraints are the `rows` (n,) of m."""
 
     points: Points
     rows: Indices
     m: int
     multiplier: Array
-    friction: Array
 
     def along(self, du: Array) -> tuple[Array, Array]:
         """See `Linearised`."""
         points, normal = self.points, self.points.normal
         varied, gap = points.along(du), np.zeros(self.m)
         gap[self.rows] = np.einsum("nd,nd->n", points.apart, varied.normal) - np.einsum("nd,nd->n", normal, varied.foot)
-        force = turned(self.multiplier, self.friction, normal, varied.normal)
-        return points.spread(self.multiplier[:, None] * normal + self.friction, force, varied.xi), gap
+        force = self.multiplier[:, None]
+        return points.spread(force * normal, force * varied.normal, varied.xi), gap
 
 
 @dataclass(frozen=True, eq=False)
 class WeightedForces:
-    """`Linearised` for forces (m,) and friction (m, dim) of gaps that are weighted over n points.
+    """`Linearised` for forces (m,) of gaps that are weighted over n points.
 
     Attributes
     ----------
@@ -260,7 +261,6 @@ class WeightedForces:
     normal : ndarray (m, dim)
         Normals of the constraints.
     multiplier : ndarray (m,)
-    friction : ndarray (m, dim)
     nodal : NodalNormals or Points, optional
         Of which the normals of the constraints are, where they are no means over the points.
     """
@@ -270,7 +270,6 @@ class WeightedForces:
     tests: csr_array
     normal: Array
     multiplier: Array
-    friction: Array
     nodal: NodalNormals | Points | None = None
 
     def along(self, du: Array) -> tuple[Array, Array]:
@@ -279,13 +278,13 @@ class WeightedForces:
         normal = self._normals(du, varied.normal)
         gap = np.einsum("md,md->m", self.functions @ self.points.apart, normal)
         gap -= np.einsum("md,md->m", self.normal, self.functions @ varied.foot)
-        force = self.functions.T @ turned(self.multiplier, self.friction, self.normal, normal)
+        force = self.functions.T @ (self.multiplier[:, None] * normal)
         return self.points.spread(self._force, force, varied.xi), gap
 
     @cached_property
     def _force(self) -> Array:
         """Forces at the points (n, dim) [force]."""
-        return np.asarray(self.functions.T @ (self.multiplier[:, None] * self.normal + self.friction))
+        return np.asarray(self.functions.T @ (self.multiplier[:, None] * self.normal))
 
     @cached_property
     def _length(self) -> Array:
@@ -316,9 +315,3 @@ def faced(
     return _ObstaclePoints(
         shapes_at(candidates.shape[rows], candidates.nodes[rows], len(coordinates)), primary, coordinates, pose
     )
-
-
-def turned(multiplier: Array, friction: Array, normal: Array, varied: Array) -> Array:
-    """Return how contact forces (n, dim) vary as their normals (n, dim) do by `varied`, friction (n, dim) turning along."""
-    along = np.einsum("nd,nd->n", friction, varied)
-    return np.asarray(multiplier[:, None] * varied - along[:, None] * normal)

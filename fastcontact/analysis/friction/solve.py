@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import logging
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from scipy.linalg import lstsq
@@ -19,9 +18,8 @@ from scipy.sparse import csr_array, vstack
 
 from fastcontact.analysis.friction import dense, eliminated
 from fastcontact.analysis.friction.path import along
-from fastcontact.analysis.friction.response import response
 from fastcontact.analysis.friction.slip_directions import GIVING, aligning, idle, own_compliance
-from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium, Path, Response, Slid
+from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium, Path, Slid
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.pairing import normals
@@ -78,20 +76,8 @@ def solve(
         iterations += equilibrium.iterations
         missing = usable & ~chosen & (equilibrium.gap < 0.0)
         if not missing.any():
-            responding = partial(_response, loaded, constraints, equilibrium)
-            return replace(equilibrium, iterations=iterations, response=responding)
+            return replace(equilibrium, iterations=iterations)
         chosen = chosen | missing
-
-
-def _response(loaded: Loaded, constraints: Constraints, equilibrium: FrictionalEquilibrium) -> Response:
-    """Return the `response` of an equilibrium."""
-    rows, k = np.flatnonzero(equilibrium.active), len(constraints.tangents)
-    compliance = np.zeros(((1 + k) * len(rows),) * 2)
-    _add_compliance(compliance, constraints, rows)
-    if constraints.tangential_softness is not None:
-        slips = np.arange(len(rows), len(compliance))
-        compliance[slips, slips] += np.tile(constraints.tangential_softness[rows], k)
-    return response(loaded, constraints, equilibrium, compliance)
 
 
 def _eliminated(

@@ -286,10 +286,10 @@ class Formulation(ABC):
             return None
         coordinates = self.points + at.displacement
 
-        def linearised(multiplier: Array, friction: Array) -> PointForces:
+        def linearised(multiplier: Array) -> PointForces:
             rows = np.flatnonzero(pairing.paired & (multiplier != 0.0))
             points = faced(candidates, pairing, rows, self.primary, coordinates, self.normals, at.pose)
-            return PointForces(points, rows, len(multiplier), multiplier[rows], friction[rows])
+            return PointForces(points, rows, len(multiplier), multiplier[rows])
 
         return linearised
 

@@ -176,13 +176,13 @@ class WeightedMortar(Formulation):
 
     def _linearised(
         self, at: Configuration, overlap: Overlap, covered: list[Array], kept: Mask, normal: Array, weight: Array,
-        multiplier: Array, friction: Array,
+        multiplier: Array,
     ) -> WeightedForces:  # fmt: skip
         """Return how contact forces and mean gaps vary; see `linearised_geometry`.
 
         Over Gauss points of whole facets: where the cut runs, what is integrated is continuous.
         """
-        deformed, acts = self.points + at.displacement, (multiplier != 0.0) | friction.any(axis=1)
+        deformed, acts = self.points + at.displacement, multiplier != 0.0
         nodes, shapes, functions, tests, first = [], [], Entries(), Entries(), 0
         for number, (block, mass) in enumerate(zip(self.secondary.blocks, overlap.mass, strict=True)):
             facets, T = np.flatnonzero(acts[block.local].any(axis=1)), self._test[number]
@@ -204,9 +204,7 @@ class WeightedMortar(Formulation):
         points = faced(candidates, pairing, rows, self.primary, deformed, along, at.pose, pairing.normal[rows])
         weighted = scaled(csr_array(functions.matrix(size)[:, rows]), 1.0 / weight)
         mean = csr_array(tests.matrix(size)[:, rows])
-        return WeightedForces(
-            points, weighted, mean, normal, multiplier, friction, self._own_normals(pairing, deformed, at.pose)
-        )
+        return WeightedForces(points, weighted, mean, normal, multiplier, self._own_normals(pairing, deformed, at.pose))
 
     def _own_normals(self, pairing: Pairing, deformed: Array, pose: Pose) -> NodalNormals | Points | None:
         """Return how the normals of the nodes vary, where they are no means over the primary side."""
