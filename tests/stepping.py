@@ -8,7 +8,7 @@ from unittest.mock import patch
 
 import fastcontact as fc
 from fastcontact.analysis import load_step as page
-from fastcontact.analysis import step_halving
+from fastcontact.analysis import newton, step_halving
 from fastcontact.analysis.problem import prepare
 
 
@@ -23,11 +23,11 @@ def watching() -> Iterator[Watched]:
     """Keep the settled contact of the last load step that is solved inside."""
     found = Watched()
 
-    def watched(*given, settle=page.settle_geometry):
+    def watched(*given, settle=newton.settle_geometry):
         found.settled = settle(*given)
         return found.settled
 
-    with patch.object(page, "settle_geometry", watched):
+    with patch.object(newton, "settle_geometry", watched):
         yield found
 
 

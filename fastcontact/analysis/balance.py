@@ -88,7 +88,7 @@ class Balance:
 
 def balance(
     problem: Problem, u: Array, contact_force: Array, external: Array, largest_so_far: float,
-    internal: tuple[Array, tuple[float, float]] | None = None,
+    internal: tuple[Array, tuple[float, float]],
 ) -> Balance:  # fmt: skip
     """Return the reactions, and by how much all other degrees of freedom are out of balance.
 
@@ -101,16 +101,11 @@ def balance(
         Nodal forces of contact and of loads [force].
     largest_so_far : float
         The largest force of the steps so far [force].
-    internal : (ndarray (n_dofs,), (float, float)), optional
-        Forces [force] and energies [energy] of nonlinear bodies and of springs.
+    internal : (ndarray (n_dofs,), (float, float))
+        Forces [force] and energies [energy] of the terms, see `Terms.residual`.
     """
-    criteria = problem.criteria
-    if internal is None:
-        out = problem.system.K @ u
-        energy = 0.5 * float(u @ out), 0.0
-    else:
-        out, energy = internal[0].copy(), internal[1]
-    out -= contact_force
+    criteria, (force_of_terms, energy) = problem.criteria, internal
+    out = force_of_terms - contact_force
     out -= external
     reaction, residual = problem.system.balance(out)
     forces = (reaction, contact_force, external)

@@ -9,17 +9,16 @@ stresses follow from them.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from fastcontact._jit import parallel
 from fastcontact._jit.norms_kernels import largest
-from fastcontact.analysis.balance import balance
-from fastcontact.analysis.displacements import solve_displacements, with_loads
-from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
-from fastcontact.analysis.inequalities import StepContext
-from fastcontact.analysis.newton import newton
+from fastcontact.analysis.displacements import with_loads
+from fastcontact.analysis.geometry_loop import SettledContact
+from fastcontact.analysis.newton import Beginning, newton
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
 from fastcontact.analysis.step_equilibrium import StepEquilibrium
@@ -33,7 +32,6 @@ from fastcontact.analysis.thermal_coupling import (
     settle_heat,
 )
 from fastcontact.arrays import Array
-from fastcontact.linear.protocol import Loaded
 from fastcontact.model.rigid_motions import generalised
 from fastcontact.results.step import ContactResult, StepResult
 
@@ -62,34 +60,13 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     load = expanded(problem, cold, rise)
     problem.solver.put_back(state.solver)
     solved_before = problem.solver.counters.iterations
-    pushing = expansion_as_force(problem, load)
-    loaded = with_loads(problem, pushing)
-    start, expected = prepare_start(problem, state, pushing, loaded)
-
-    def solve(under: StepLoad, before: StepEquilibrium | None) -> StepEquilibrium:
-        if problem.bodies is not None:
-            return newton(problem, start, under, expected, before)
-        right = loaded if under is load else with_loads(problem, under)
-        return _balanced(problem, start, under, right, expected, index, before)
-
-    heated, solution = None, solve(load, None)
+    begin = prepare_start(problem, state, index, load)
+    heated, solution = None, newton(problem, begin, load)
     if rise is not None:
-        heated, solution = settle_heat(problem, start, cold, instant, rise, solution, solve)
+        solve = partial(newton, problem, begin)
+        heated, solution = settle_heat(problem, begin.state, cold, instant, rise, solution, solve)
     iterations = counted(solution.settled, problem.solver.counters.iterations - solved_before)
-    return _ended(problem, start, load, solution, {**iterations, **solution.counts}, (index, instant), heated)
-
-
-def _balanced(
-    problem: Problem, start: State, load: StepLoad, loaded: Loaded, expected: float, index: int,
-    before: StepEquilibrium | None,
-) -> StepEquilibrium:  # fmt: skip
-    """Return `equilibrium`, whose balance of forces is within the criterion."""
-    solution = equilibrium(problem, start, load, loaded, expected, before)
-    # An iterative solver was too inaccurate: it is asked for more, and goes on from the same contact.
-    while solution.balance.excess > 1.0 and problem.solver.improve(solution.balance.wanting):
-        solution = equilibrium(problem, start, load, with_loads(problem, load), expected, solution)
-    solution.balance.check(index, problem, solution.history)
-    return solution
+    return _ended(problem, begin.state, load, solution, {**iterations, **solution.counts}, (index, instant), heated)
 
 
 def _ended(
@@ -97,12 +74,12 @@ def _ended(
     instant: tuple[int, float], heated: Heated | None,
 ) -> tuple[State, StepResult]:  # fmt: skip
     """Return state and result of a load step, from its equilibrium."""
-    settled, u, balanced, bodies = solution.settled, solution.u, solution.balance, solution.bodies
+    settled, u, balanced = solution.settled, solution.u, solution.balance
     end = replace(
         start, u=u, largest_force=balanced.largest, obstacles=problem.obstacles_at(load, u), angles=load.angles,
-        history=start.history if bodies is None else bodies.history, instant=instant[1],
-        rise=None if heated is None else heated.rise,
+        instant=instant[1], rise=None if heated is None else heated.rise,
     )  # fmt: skip
+    end = solution.terms.commit(u, end)
     contact: dict[str, ContactResult] = {}
     if settled is not None:
         end, contact = after_contact(problem, start, load, settled, end, balanced.energy)
@@ -115,18 +92,21 @@ def _ended(
     if problem.floating_bodies is not None and end.rigid is not None:
         iterations["regularised"] = problem.floating_bodies.report(end.rigid, end.largest_rigid_force)
     end = replace(end, solver=problem.solver.snapshot())
-    result = recover(problem, end, contact, balanced.reaction, iterations, instant, bodies)
+    result = recover(problem, end, contact, balanced.reaction, iterations, instant, solution.bodies)
     return end, result if heated is None else heated.told(problem, result)
 
 
-def prepare_start(problem: Problem, state: State, load: StepLoad, loaded: Loaded) -> tuple[State, float]:
-    """Return the state from which the step starts, and the displacement to expect [length].
+def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) -> Beginning:
+    """Return what a load step begins with.
 
-    The latter matters in the first step if forces alone act: nothing else tells how large displacements will be.
+    The displacement to expect matters in the first step if forces alone act: nothing else tells how large displacements will
+    be.
     """
+    pushing = expansion_as_force(problem, load)
+    loaded = with_loads(problem, pushing)
     round_off, rigid_force, expected = state.gap_round_off, state.largest_rigid_force, 0.0
     zero = np.zeros(len(load.lift))
-    if problem.pairs and load.force.any() and not (state.u.any() or load.lift.any()):
+    if problem.pairs and pushing.force.any() and not (state.u.any() or load.lift.any()):
         expected = largest(loaded.full_solution(zero))
     if problem.pairs and problem.model.springs:
         # Springs of the model may be weak: without contact, bodies on them move far, and gaps are differences of such
@@ -134,44 +114,19 @@ def prepare_start(problem: Problem, state: State, load: StepLoad, loaded: Loaded
         alone = largest(loaded.full_solution(zero))
         round_off = max(round_off, 16 * np.finfo(float).eps * alone)
     if problem.floating_bodies is not None:
-        forces = generalised(problem.floating_bodies.motions, load.force)
+        forces = generalised(problem.floating_bodies.motions, pushing.force)
         rigid_force = max(rigid_force, float(np.abs(forces).max()))
     start = replace(
         state, gap_round_off=round_off, largest_rigid_force=rigid_force, rigid=None, last_change=None,
-        largest_force=max(state.largest_force, largest(load.force)),
-        extrapolation=state.extrapolation.to(load.lift, load.force, *_motions(problem, load)),
+        largest_force=max(state.largest_force, largest(pushing.force)),
+        extrapolation=state.extrapolation.to(load.lift, pushing.force, *_motions(problem, load)),
     )  # fmt: skip
-    return start, expected
+    return Beginning(start, index, load, loaded, expected)
 
 
 def _motions(problem: Problem, load: StepLoad) -> list[Array]:
     """Return motions of obstacles that nonlinear bodies are extrapolated along."""
     return [] if problem.bodies is None else [*load.obstacles.values()]
-
-
-def equilibrium(
-    problem: Problem, start: State, load: StepLoad, loaded: Loaded, expected: float,
-    previous_try: StepEquilibrium | None = None,
-) -> StepEquilibrium:  # fmt: skip
-    """Return the settled contact, all displacements and the balance of forces.
-
-    It begins where a `previous_try` at the same step has settled with less accurate solutions.
-    """
-    settled = None
-    if problem.pairs:
-        dofs = problem.dofs.for_step(start.u, load.lift)
-        step = StepContext(problem, start, load, dofs.loaded(loaded), dofs)
-        tried = None if previous_try is None else previous_try.settled
-        settled = settle_geometry(step, start.extrapolation, expected, tried.iterate if tried else None)
-        if problem.criteria.friction_while_touching is not None:
-            from fastcontact.analysis.touching import along_path
-
-            settled = along_path(step, settled, expected)
-    u, contact_force = solve_displacements(problem, load, loaded, settled, start.u)
-    balanced = balance(problem, u, contact_force, load.force, start.largest_force)
-    if settled is not None:
-        settled.iterate.history[-1]["residual"] = balanced.relative
-    return StepEquilibrium(settled, u, balanced)
 
 
 def after_contact(

@@ -1,17 +1,18 @@
-"""Newton-Raphson iterations of a load step with nonlinear bodies.
+"""Newton's method for a load step: terms of the equilibrium are linearised, contact is solved with its inequalities.
 
-Bodies alone are linearised; contact, with its geometry, is solved as for linear bodies (the Newton method of Josephy, 1979,
-for generalised equations). So iterations converge quadratically, and few matrices are factorised.
+That is the Newton method of Josephy (1979) for generalised equations: each iteration solves the contact problem of the
+linearised bodies, with its geometry, so that iterations converge quadratically and few matrices are factorised. Where all
+tangents are as they were prepared, for linear bodies under small strains, the first iteration is the solution.
 """
 
 from __future__ import annotations
 
 import logging
-from dataclasses import replace
-from typing import Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-from scipy.sparse import csr_array, diags_array
+from scipy.sparse import bsr_array, csr_array, diags_array
 
 from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.analysis.balance import Balance, balance
@@ -21,13 +22,15 @@ from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
 from fastcontact.analysis.inequalities import StepContext
 from fastcontact.analysis.iterate import Iterate
+from fastcontact.analysis.linearisation import Regularisation, linearised, load_about
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
 from fastcontact.analysis.step_equilibrium import StepEquilibrium
+from fastcontact.analysis.terms import Fluid, Terms
 from fastcontact.arrays import Array
-from fastcontact.contact.constraints import Wetted
-from fastcontact.elasticity.nonlinear_bodies import WHOLE, DeformedBodies
+from fastcontact.elasticity.nonlinear_bodies import WHOLE
 from fastcontact.errors import ConvergenceError, ModelError
+from fastcontact.linear.protocol import Loaded
 
 log = logging.getLogger("fastcontact")
 # Newton iterations of a load step, and how often one is halved where it turns cells inside out.
@@ -48,81 +51,94 @@ FORCING = 1e-3
 UNCHANGED, SCATTER, STAYS = 1e-10, 1e-6, 0.3
 
 
+@dataclass(frozen=True, eq=False)
+class Beginning:
+    """What a load step begins with.
+
+    Attributes
+    ----------
+    state : State
+    index : int
+        Number of the step.
+    load : StepLoad
+    loaded : Loaded
+        The prepared matrix under it.
+    expected : float
+        Displacement to expect in the first step, if forces alone act [length].
+    """
+
+    state: State
+    index: int
+    load: StepLoad
+    loaded: Loaded
+    expected: float
+
+
 def newton(
-    problem: Problem, start: State, load: StepLoad, expected: float, before: StepEquilibrium | None = None
+    problem: Problem, begin: Beginning, load: StepLoad, before: StepEquilibrium | None = None
 ) -> StepEquilibrium:
     """Return the equilibrium of a load step.
 
     Parameters
     ----------
     problem : Problem
-        With nonlinear bodies.
-    start : State
-        At the beginning of the step.
+    begin : Beginning
     load : StepLoad
-    expected : float
-        Displacement to expect in the first step, if forces alone act [length].
+        That of the beginning, or with other temperatures.
     before : StepEquilibrium, optional
         Of the same step, under about the same load.
 
     Raises
     ------
     ConvergenceError
-        If the iterations do not end, or a cell turns inside out.
+        If the iterations do not end, a cell turns inside out, or forces stay out of balance.
     """
-    if before is not None or start.extrapolation.ratio:
+    start = begin.state
+    if problem.bodies is not None and (before is not None or start.extrapolation.ratio):
         origin = start.extrapolation.displacement(start.u) if before is None else before.u
         try:
-            return _Newton(problem, start, load, expected).iterated(origin)
+            return _Newton(problem, begin, load).iterated(origin)
         except ConvergenceError as error:
             log.info("the step starts anew, not from an expected displacement: %s", error)
-    return _Newton(problem, start, load, expected).iterated(start.u)
-
-
-class _Tangent(NamedTuple):
-    """How a tangent is made positive definite.
-
-    `geometric` is how much of the geometric stiffness it has, see `NonlinearBodies.at`; `held` the stiffness of springs along
-    closed gaps, beside the body's [-]; `stiff` tells whether those of floating bodies are.
-    """
-
-    geometric: int
-    held: float
-    stiff: bool
+            before = None
+    return _Newton(problem, begin, load, before).iterated(start.u)
 
 
 class _Newton:
     """The iterations of a load step; see `newton` for the parameters."""
 
-    def __init__(self, problem: Problem, start: State, load: StepLoad, expected: float) -> None:
-        self._problem, self._start, self._load, self._expected = problem, start, load, expected
-        self._iterate = Iterate.of(start)
+    def __init__(
+        self, problem: Problem, begin: Beginning, load: StepLoad, before: StepEquilibrium | None = None
+    ) -> None:
+        self._problem, self._begin, self._start, self._load = problem, begin, begin.state, load
+        self._terms = Terms(problem, begin.state, load)
+        settled = None if before is None else before.settled
+        self._iterate = Iterate.of(begin.state) if settled is None else settled.iterate
         self._settled: SettledContact | None = None
         self._kept: Problem | None = None  # the last tangent, where another iteration may use it
         self._held = False  # whether the last tangent needed springs along closed gaps
 
     def iterated(self, origin: Array) -> StepEquilibrium:
         """Return the equilibrium by iterations that begin at displacements `origin` (n_dofs,) [length]."""
-        problem, start = self._problem, self._start
         history: list[dict[str, Any]] = []
-        u, bodies, changes = origin, problem.deformed(origin, start, self._load.rise), [1.0]
+        u, changes = origin, [1.0]
         for _ in range(MOST):
-            before, here = u, bodies
-            target, force = self._solve(here, before, changes[-1])
-            u, bodies, fraction = self._reach(before, target)
-            balanced = self._balanced(u, bodies, force, before)
+            before = u
+            target, contact_force = self._solve(before, changes[-1])
+            u, fraction = self._reach(before, target)
+            balanced = self._balanced(u, contact_force, before)
+            if self._terms.prepared:
+                if self._is_exact(balanced):
+                    return StepEquilibrium(self._settled, u, balanced, self._terms)
+                continue
             if history and fraction == 1.0 and balanced.excess > 1.0:
-                u, bodies, fraction = self._searched((before, here), (u, bodies), force)
-                balanced = self._balanced(u, bodies, force, before) if fraction < 1.0 else balanced
-            moved, size = largest_difference(u, before), max(map(largest, (u, self._load.lift, start.u)))
+                u, fraction = self._searched(before, u, contact_force)
+                balanced = self._balanced(u, contact_force, before) if fraction < 1.0 else balanced
+            moved, size = largest_difference(u, before), max(map(largest, (u, self._load.lift, self._start.u)))
             changes.append(moved / size if size else 0.0)
             history.append(_told(self._iterate, changes[-1], balanced, fraction))
-            if (
-                fraction == 1.0
-                and balanced.excess <= 1.0
-                and (_still(problem, changes) or moved <= start.gap_round_off)
-            ):
-                return StepEquilibrium(self._settled, u, balanced, bodies, history)
+            if fraction == 1.0 and balanced.excess <= 1.0 and self._stands_still(changes, moved):
+                return StepEquilibrium(self._settled, u, balanced, self._terms, history)
             if len(changes) > PATIENCE and min(changes[-PATIENCE:]) > FALL * min(changes[:-PATIENCE]):
                 break
         raise ConvergenceError(
@@ -131,33 +147,60 @@ class _Newton:
             history,
         )
 
-    def _balanced(self, u: Array, bodies: DeformedBodies, contact_force: Array, linearised_at: Array) -> Balance:
-        """Return the balance of forces at displacements u, fluid's those of a linearisation elsewhere (n_dofs,) [length]."""
-        contact_force = contact_force + self._fluid_change(linearised_at, u)
-        internal = self._problem.internal(bodies, u, self._load)
+    def _is_exact(self, balanced: Balance) -> bool:
+        """Return whether forces balance where tangents are exact; else linear solutions are to be more accurate.
+
+        Raises
+        ------
+        ConvergenceError
+            If they cannot.
+        """
+        if self._iterate.history:
+            self._iterate.history[-1]["residual"] = balanced.relative
+        if balanced.excess > 1.0 and self._problem.solver.improve(balanced.wanting):
+            return False
+        balanced.check(self._begin.index, self._problem, self._iterate.history)
+        return True
+
+    def _stands_still(self, changes: list[float], moved: float) -> bool:
+        """Return whether relative `changes` leave an error below the criterion, or are round-off; `moved` is the last one.
+
+        That in units of length.
+        """
+        before, last = changes[-2:]
+        error = last * min(last / before, 1.0) if before else last
+        return (
+            error <= max(self._problem.criteria.geometry, UNCHANGED)
+            or (last <= SCATTER and last > STAYS * before)
+            or moved <= self._start.gap_round_off
+        )
+
+    def _balanced(self, u: Array, contact_force: Array, linearised_at: Array) -> Balance:
+        """Return the balance of forces at displacements u, of contact those of a linearisation elsewhere (n_dofs,)."""
+        internal = self._terms.residual(u, self._fluid(linearised_at))
         return balance(self._problem, u, contact_force, self._load.force, self._start.largest_force, internal)
 
-    def _solve(self, bodies: DeformedBodies, u: Array, change: float) -> tuple[Array, Array]:
-        """Return displacements (n_dofs,) [length] and contact forces (n_dofs,) [force] of the bodies linearised at u.
+    def _solve(self, u: Array, change: float) -> tuple[Array, Array]:
+        """Return displacements (n_dofs,) [length] and contact forces (n_dofs,) [force] of terms linearised at u (n_dofs,).
 
         Contact geometry settles to a part of the last relative `change` of the displacement. Where the tangent is not
         positive definite, the springs of floating bodies are stiffened, then the constraints that the last contact held, by
         soft springs first: this leaves the iterations quadratic but for what contact does not hold. Where that does not help,
         parts of the geometric stiffness are left out. Once springs have helped, they are tried first.
         """
+        if self._terms.prepared:
+            return self._prepared_contact(u)
         failed: Exception | None = None
-        for tangent in self._tangents():
-            if self._held and tangent.geometric == WHOLE and not tangent.held:
+        for by in self._regularisations():
+            if self._held and by.geometric == WHOLE and not by.held:
                 continue  # it failed an iteration ago
-            if failed or tangent.geometric < WHOLE:  # the stiffness of the bodies is taken apart by now
-                bodies = self._problem.deformed(u, self._start, self._load.rise, geometric=tangent.geometric)
             try:
-                solution = self._linear_contact(bodies, u, change, tangent)
+                solution = self._linearised_contact(u, change, by)
             except (ModelError, ConvergenceError) as error:
-                log.info("the tangent fails with %s: %s", tangent, error)
+                log.info("the tangent fails with %s: %s", by, error)
                 failed = error
             else:
-                self._held = tangent.held > 0.0
+                self._held = by.held > 0.0
                 return solution
         if isinstance(failed, ConvergenceError):
             raise failed
@@ -165,122 +208,121 @@ class _Newton:
             f"the tangent stiffness of the bodies cannot be factorised ({failed}): they buckle, or the load step is too large"
         )
 
-    def _tangents(self) -> list[_Tangent]:
-        """Return the tangents to try, one after the other."""
+    def _regularisations(self) -> list[Regularisation]:
+        """Return those to try, one after the other."""
         floats = self._problem.floating_bodies is not None
         closed = self._settled is not None and self._settled.solution.active.any()
-        whole = [_Tangent(WHOLE, 0.0, stiff) for stiff in (False, True)[: 1 + floats]]
-        held = [_Tangent(WHOLE, stiffness, floats) for stiffness in HELD] if closed else []
-        return whole + held + [_Tangent(less, 0.0, floats) for less in range(WHOLE)[::-1]]
+        whole = [Regularisation(stiff=stiff) for stiff in (False, True)[: 1 + floats]]
+        held = [Regularisation(held=stiffness, stiff=floats) for stiffness in HELD] if closed else []
+        return whole + held + [Regularisation(less, stiff=floats) for less in range(WHOLE)[::-1]]
 
-    def _linear_contact(
-        self, bodies: DeformedBodies, u: Array, change: float, tangent: _Tangent
-    ) -> tuple[Array, Array]:
-        """Return the result of `_solve` for a tangent, and keep the contact."""
-        start, iterate = self._start, self._iterate
+    def _prepared_contact(self, u: Array) -> tuple[Array, Array]:
+        """Return the result of `_solve` where all tangents are as they were prepared."""
+        begin = self._begin
+        first = self._load is begin.load and self._settled is None
+        loaded = begin.loaded if first else with_loads(self._problem, self._load)
+        return self._contact(self._problem, self._load, loaded, u, self._start.extrapolation)
+
+    def _linearised_contact(self, u: Array, change: float, by: Regularisation) -> tuple[Array, Array]:
+        """Return the result of `_solve` for a tangent."""
+        terms, iterate = self._terms, self._iterate
         problem, self._kept = (self._kept, None) if change <= SMALL else (None, None)
         if problem is None:
-            scale = tangent.held and tangent.held * float(bodies.K.diagonal().max())
-            added = self._added(scale, u) if tangent.geometric == WHOLE else None
-            problem = self._problem.linearised(bodies, u, self._load, iterate.rigid, added, tangent.stiff)
-            if tangent.geometric == WHOLE and not problem.pairs:  # where there is contact, its geometry goes on
+            K = terms.tangent(u, by.geometric)
+            contact = self._stiffness_of_contact(K, u, by) if by.geometric == WHOLE else None
+            problem = linearised(self._problem, K, u, iterate.rigid, contact, by.stiff)
+            if by.geometric == WHOLE and not problem.pairs:  # where there is contact, its geometry goes on
                 self._kept = problem
-        load = problem.about(bodies, u, self._load, iterate.rigid)
+        load = load_about(problem, terms, u, self._load, iterate.rigid)
         iterate.u, iterate.history = u.copy(), []
-        loaded, settled = with_loads(problem, load), None
+        enough = min(max(problem.criteria.geometry, FORCING * change), LOOSEST)
+        inner = replace(problem, criteria=replace(problem.criteria, geometry=enough))
+        return self._contact(inner, load, with_loads(problem, load), u, Extrapolation())
+
+    def _contact(
+        self, problem: Problem, load: StepLoad, loaded: Loaded, u: Array, extrapolation: Extrapolation
+    ) -> tuple[Array, Array]:
+        """Return displacements and contact forces of a problem whose terms are linear, and keep the contact."""
+        settled = None
         if problem.pairs:
-            enough = min(max(problem.criteria.geometry, FORCING * change), LOOSEST)
-            inner = replace(problem, criteria=replace(problem.criteria, geometry=enough))
-            dofs = problem.dofs.for_step(iterate.u, load.lift)
-            step = StepContext(inner, start, load, dofs.loaded(loaded), dofs)
-            settled = settle_geometry(step, Extrapolation(), self._expected, iterate)
+            dofs = problem.dofs.for_step(self._iterate.u, load.lift)
+            step = StepContext(problem, self._start, load, dofs.loaded(loaded), dofs)
+            settled = settle_geometry(step, extrapolation, self._begin.expected, self._iterate)
+            if problem.criteria.friction_while_touching is not None and self._terms.prepared:
+                from fastcontact.analysis.touching import along_path
+
+                settled = along_path(step, settled, self._begin.expected)
+                self._iterate = settled.iterate
         solution = solve_displacements(problem, load, loaded, settled, u)
         self._settled = settled
         return solution
 
-    def _added(self, stiffness: float, u: Array) -> csr_array | None:
+    def _stiffness_of_contact(self, K: bsr_array, u: Array, by: Regularisation) -> csr_array | None:
         """Return what the last contact adds to a tangent (n_dofs, n_dofs), at displacements u (n_dofs,) [force / length].
 
-        The symmetric part of how forces of fluid follow the surface; and springs of a `stiffness`, slack at u, along the gaps
-        that are closed. Displacements along these hardly change any more as iterations converge, so that springs change
-        iterations by terms of second order alone (as the augmented Lagrangian does: Alart and Curnier, 1991).
+        The symmetric part of how forces of fluid follow the surface; and springs, slack at u, along the gaps that are
+        closed. Displacements along these hardly change any more as iterations converge, so that springs change iterations by
+        terms of second order alone (as the augmented Lagrangian does: Alart and Curnier, 1991).
         """
-        total = csr_array((len(u), len(u)))
-        for wetted in self._wetted:
-            K = wetted.stiffness(self._problem.displacement(u))
-            K.resize(total.shape)
-            total = csr_array(total + K)
-        if stiffness and self._settled is not None:
+        parts = [fluid.tangent(u) for fluid in self._fluid(u)]
+        if by.held and self._settled is not None:
             constraints = self._settled.constraints
             dry = np.concatenate([part.contact_forces(np.ones(len(part))) for part in constraints.parts.values()])
             rows = csr_array(constraints.B[np.flatnonzero(self._settled.solution.active & (dry > 0.0))])
-            springs = stiffness / np.asarray(rows.multiply(rows).sum(axis=1)).ravel()
-            total = csr_array(total + rows.T @ diags_array(springs) @ rows)
-        return total if total.nnz else None
+            stiffness = by.held * float(K.diagonal().max()) / np.asarray(rows.multiply(rows).sum(axis=1)).ravel()
+            parts.append(csr_array(rows.T @ diags_array(stiffness) @ rows))
+        for part in parts:
+            part.resize((len(u), len(u)))
+        return sum(parts[1:], parts[0]) if parts else None
 
-    @property
-    def _wetted(self) -> list[Wetted]:
-        """Where fluid has come in the last contact, whose forces follow bodies in finite strain."""
+    def _fluid(self, at: Array) -> list[Fluid]:
+        """Return the fluid in the last contact, linearised `at` displacements (n_dofs,), that follows bodies."""
         bodies = self._problem.bodies
         if self._settled is None or bodies is None or not bodies.finite:
             return []
-        return [part.wetted for part in self._settled.constraints.parts.values() if part.wetted is not None]
+        wetted = [part.wetted for part in self._settled.constraints.parts.values()]
+        return [Fluid(self._problem, each, at) for each in wetted if each is not None]
 
-    def _fluid_change(self, before: Array, u: Array) -> Array:
-        """Return by how much forces (n_dofs,) of fluid change between displacements `before` and u (n_dofs,) [force]."""
-        change, n = np.zeros_like(u), self._problem.model.n_dofs
-        for wetted in self._wetted:
-            now, then = (wetted.force(self._problem.displacement(each)) for each in (u, before))
-            change[:n] += (now - then).ravel()
-        return change
-
-    def _reach(self, u: Array, target: Array) -> tuple[Array, DeformedBodies, float]:
-        """Return the displacements to go on from, the bodies there, and the part of the way to the `target` (n_dofs,).
+    def _reach(self, u: Array, target: Array) -> tuple[Array, float]:
+        """Return the displacements (n_dofs,) to go on from, and the part of the way from u to the `target` (n_dofs,).
 
         Half of the way, of that half, and so on, is gone where cells turn inside out farther on.
         """
-        fraction = 1.0
+        fraction, bodies = 1.0, self._terms.bodies
+        if bodies is None:
+            return target, fraction
         for _ in range(HALVINGS):
             end = target if fraction == 1.0 else u + fraction * (target - u)
             try:
-                return end, self._problem.deformed(end, self._start, self._load.rise), fraction
+                bodies.at(end)
             except ConvergenceError as error:
                 failed = error
+            else:
+                return end, fraction
             fraction *= 0.5
         raise failed
 
-    def _searched(
-        self, begin: tuple[Array, DeformedBodies], end: tuple[Array, DeformedBodies], contact_force: Array
-    ) -> tuple[Array, DeformedBodies, float]:
-        """Return the result of `_reach` after a line search between two displacements (Crisfield, 1991, section 9.2).
+    def _searched(self, u: Array, target: Array, contact_force: Array) -> tuple[Array, float]:
+        """Return the result of `_reach` after a line search (Crisfield, 1991, section 9.2).
 
         Under contact forces (n_dofs,) [force] as they are, the potential falls along the way at its beginning; where it rises
         at the end by much of that, the end lies too far.
         """
-        (u, here), (target, bodies) = begin, end
-        problem = self._problem
-        along = problem.system.unknowns(target - u)
+        system, fluid = self._problem.system, self._fluid(u)
+        change, along = target - u, system.unknowns(target - u)
 
-        def slope(at: Array, deformed: DeformedBodies) -> float:
-            out = problem.internal(deformed, at, self._load)[0] - contact_force - self._fluid_change(u, at)
-            return float(problem.system.reduced(out - self._load.force) @ along)
+        def slope(at: Array) -> float:
+            out = self._terms.residual(at, fluid)[0] - contact_force - self._load.force
+            return float(system.reduced(out) @ along)
 
-        first, last, fraction = slope(u, here), slope(target, bodies), 1.0
+        first, last, fraction = slope(u), slope(target), 1.0
         for _ in range(SEARCHES):
             if not last > OVERSHOT * abs(first):
                 break
             fraction *= max(abs(first) / (abs(first) + last), LEAST)
-            target = u + fraction * (end[0] - u)
-            bodies = problem.deformed(target, self._start, self._load.rise)
-            last = slope(target, bodies)
-        return target, bodies, fraction
-
-
-def _still(problem: Problem, changes: list[float]) -> bool:
-    """Return whether the relative `changes` of the displacement leave an error below the criterion, or are round-off."""
-    before, last = changes[-2:]
-    left = last * min(last / before, 1.0) if before else last
-    return left <= max(problem.criteria.geometry, UNCHANGED) or (last <= SCATTER and last > STAYS * before)
+            target = u + fraction * change
+            last = slope(target)
+        return target, fraction
 
 
 def _told(iterate: Iterate, change: float, balanced: Balance, fraction: float) -> dict[str, Any]:

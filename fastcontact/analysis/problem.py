@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.sparse import bsr_array, csr_array, eye_array, kron
+from scipy.sparse import csr_array, eye_array, kron
 
 from fastcontact._jit import parallel
 from fastcontact.analysis.active_dofs import ActiveDofs, SurfaceDofs
 from fastcontact.analysis.criteria import Criteria
-from fastcontact.analysis.floating_bodies import FIRM, SOFT, STIFF, FloatingBodies, RigidPosition
+from fastcontact.analysis.floating_bodies import FIRM, SOFT, FloatingBodies
 from fastcontact.analysis.heat import Heat, prepared_heat
 from fastcontact.analysis.state import State
 from fastcontact.analysis.wear import at_points
@@ -32,7 +31,7 @@ from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.elasticity.material_sides import MaterialSides, material_sides
 from fastcontact.elasticity.multipoint_constraints import stacked_rows
 from fastcontact.elasticity.nonlinear_bodies import WHOLE, DeformedBodies, NonlinearBodies
-from fastcontact.elasticity.springs import spring_force, stiffened, too_stiff
+from fastcontact.elasticity.springs import stiffened, too_stiff
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 from fastcontact.elasticity.temperature import Temperature
 from fastcontact.errors import ContactError
@@ -252,68 +251,6 @@ class Problem:
         before = start.history or self.bodies.beginning
         return self.bodies.at(self.displacement(u), before, rise=rise, geometric=geometric)
 
-    def internal(self, bodies: DeformedBodies, u: Array, load: StepLoad) -> tuple[Array, tuple[float, float]]:
-        """Return forces (n_dofs,) [force] of nonlinear bodies and springs, their elastic energy and plastic work [energy].
-
-        Less what following pressures have changed by.
-        """
-        force, springs = np.zeros_like(u), self.model.springs
-        n = self.model.n_dofs
-        force[:n] = bodies.force.ravel()
-        pull = spring_force(springs, u[:n])
-        force[:n] += pull
-        for (pressure, _), factor in zip(self.following, load.following, strict=True):
-            here, before = pressure.at(self.displacement(u))[0], pressure.at(np.zeros_like(bodies.force))[0]
-            force[:n] -= factor * (here - before).ravel()
-        return force, (bodies.energy + 0.5 * float(pull @ u[:n]), bodies.plastic_work)
-
-    def _floating(self, system: System, u: Array, rigid: RigidPosition | None, stiff: bool) -> FloatingBodies | None:
-        """Return the floating bodies of a tangent: where they turn, their free motions are those of the deformed shape."""
-        if self.floating_bodies is None or self.bodies is None or not self.bodies.finite:
-            return self.floating_bodies
-        motions = self.floating_bodies.motions
-        if self.model.kinematics != "axisymmetric":
-            turned = floating_motions(self.model, self.model.prescribed_by_ramp()[0], self.displacement(u))
-            motions = turned if len(turned) == len(motions) else motions
-        before = self.floating_bodies.dofs if rigid is None else rigid.dofs
-        relative_stiffness = STIFF if stiff else _spring_stiffness(self.solver)
-        return FloatingBodies(motions, system, system.involved(self.contact_dofs), relative_stiffness, before)
-
-    def linearised(
-        self,
-        bodies: DeformedBodies,
-        u: Array,
-        load: StepLoad,
-        rigid: RigidPosition | None,
-        added: csr_array | None = None,
-        stiff: bool = False,
-    ) -> Problem:
-        """Return the problem with the tangent of nonlinear bodies, at displacements u (n_dofs,) [length].
-
-        The tangent has the stiffness `added` (n_dofs, n_dofs), of forces that vanish or are known at u [force / length];
-        the springs of floating bodies are `stiff`.
-        """
-        K = stiffened(bodies.K, self.model.springs)
-        for (pressure, _), factor in zip(self.following, load.following, strict=True):
-            K = _sum(K, factor * pressure.at(self.displacement(u))[1])
-        K = self.force_driven.stiffness(K)
-        system = self.system.renewed(K if added is None else _sum(K, added))
-        floating = self._floating(system, u, rigid, stiff)
-        solver = copy.copy(self.solver)
-        involved = system.involved(self.contact_dofs)
-        modes = self.force_driven.near_nullspace(near_nullspace(self.model, self.displacement(u)))
-        involved = _prepare_solver(solver, system, floating, modes, involved)
-        dofs = active_dofs(system, self.contact_dofs, involved, self.pairs, floating, solver)
-        at = u if self.bodies is not None and self.bodies.finite else None
-        return replace(self, system=system, solver=solver, dofs=dofs, floating_bodies=floating, linearised_at=at)
-
-    def about(self, bodies: DeformedBodies, u: Array, load: StepLoad, rigid: RigidPosition | None) -> StepLoad:
-        """Return the loads of this tangent about the bodies at displacements u (n_dofs,) [length]."""
-        force = load.force - self.internal(bodies, u, load)[0] + self.system.K @ u
-        if self.floating_bodies is not None and rigid is not None:  # turned bodies under load are not free to turn
-            force -= self.system.K @ self.floating_bodies.rigid(u[self.floating_bodies.dofs])
-        return replace(load, force=force)
-
     def initial_state(self) -> State:
         """Return the state before the first load step."""
         # Gaps are differences of coordinates and no more accurate than those.
@@ -370,8 +307,8 @@ def prepare(
     contact_dofs = _contact_dofs(mesh, pairs, len(driven))
     involved = system.involved(contact_dofs)
     motions = floating_motions(model, supported)
-    bodies = FloatingBodies(motions, system, involved, _spring_stiffness(solver)) if len(motions) else None
-    involved = _prepare_solver(solver, system, bodies, driven.near_nullspace(near_nullspace(model)), involved)
+    bodies = FloatingBodies(motions, system, involved, floating_stiffness(solver)) if len(motions) else None
+    involved = prepare_solver(solver, system, bodies, driven.near_nullspace(near_nullspace(model)), involved)
     return Problem(
         model, ramp, criteria, solver, pairs, field, sides, system, bodies,
         active_dofs(system, contact_dofs, involved, pairs, bodies, solver),
@@ -381,14 +318,7 @@ def prepare(
     )  # fmt: skip
 
 
-def _sum(K: bsr_array, more: csr_array) -> bsr_array:
-    """Return the sum of two matrices (n, n), blocks sorted."""
-    total = bsr_array(K + more.tobsr(K.blocksize))
-    total.sort_indices()
-    return total
-
-
-def _spring_stiffness(solver: LinearSolver) -> float:
+def floating_stiffness(solver: LinearSolver) -> float:
     """Return the stiffness of springs on floating bodies beside that of the bodies [-]."""
     return SOFT if solver.iterative else FIRM
 
@@ -422,7 +352,7 @@ def _forces(model: Model) -> dict[Table | None, Array]:
     return forces
 
 
-def _prepare_solver(
+def prepare_solver(
     solver: LinearSolver, system: System, bodies: FloatingBodies | None, modes: Array, involved: Indices
 ) -> Indices:
     """Give the linear solver the matrix, with the springs of floating bodies; return the unknowns of contact."""

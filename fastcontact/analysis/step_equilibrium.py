@@ -1,4 +1,4 @@
-"""The equilibrium at the end of a load step, of linear or of nonlinear bodies."""
+"""The equilibrium at the end of a load step."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 
 from fastcontact.analysis.balance import Balance
 from fastcontact.analysis.geometry_loop import SettledContact
+from fastcontact.analysis.terms import Terms
 from fastcontact.arrays import Array
 from fastcontact.elasticity.nonlinear_bodies import DeformedBodies
 
@@ -22,17 +23,21 @@ class StepEquilibrium:
     u : ndarray (n_dofs,)
         [length]
     balance : Balance
-    bodies : DeformedBodies, optional
-        Where they are nonlinear.
+    terms : Terms
     newton : list of dict
-        An entry for each of their iterations.
+        An entry for each iteration, where tangents change.
     """
 
     settled: SettledContact | None
     u: Array
     balance: Balance
-    bodies: DeformedBodies | None = None
+    terms: Terms
     newton: list[dict[str, Any]] = field(default_factory=list)
+
+    @property
+    def bodies(self) -> DeformedBodies | None:
+        """The bodies, where they are nonlinear."""
+        return None if self.terms.bodies is None else self.terms.bodies.at(self.u)
 
     @property
     def history(self) -> list[dict[str, Any]]:
@@ -42,7 +47,7 @@ class StepEquilibrium:
     @property
     def counts(self) -> dict[str, Any]:
         """Of nonlinear bodies their history, with the pairings and active-set iterations of all iterations."""
-        if self.bodies is None:
+        if self.terms.prepared:
             return {}
         names = {"geometry_updates": "pairings", "active_set_iterations": "active_set_iterations"}
         counts = {name: sum(entry[key] for entry in self.newton) for name, key in names.items()}

@@ -131,11 +131,15 @@ def stiffened(K: bsr_array, springs: Sequence[Springs]) -> bsr_array:
     """Return the stiffness matrix `K` (n, n) [force / length] with the springs added, (n, n) [force / length]."""
     if not springs:
         return K
-    R = stacked(springs, K.shape[0])
-    k = np.concatenate([spring.stiffness for spring in springs])
-    total = bsr_array(K + csr_array(R.T @ diags_array(k) @ R).tobsr(K.blocksize))
+    total = bsr_array(K + spring_stiffness(springs, K.shape[0]).tobsr(K.blocksize))
     total.sort_indices()
     return total
+
+
+def spring_stiffness(springs: Sequence[Springs], n: int) -> csr_array:
+    """Return the stiffness (n, n) of springs [force / length]."""
+    R = stacked(springs, n)
+    return csr_array(R.T @ diags_array(np.concatenate([spring.stiffness for spring in springs])) @ R)
 
 
 def spring_force(springs: Sequence[Springs], u: Array) -> Array:

@@ -9,7 +9,8 @@ import numpy as np
 from fastcontact.analysis import restart
 from fastcontact.analysis.convergence_messages import named_nodes, nearest_nodes
 from fastcontact.analysis.criteria import Criteria
-from fastcontact.analysis.load_step import equilibrium, prepare_start, with_loads
+from fastcontact.analysis.load_step import prepare_start
+from fastcontact.analysis.newton import newton
 from fastcontact.analysis.problem import Problem, prepare
 from fastcontact.analysis.sensitivity.moving_contact import REMEDY, MovingContact
 from fastcontact.analysis.solution import Equilibrium
@@ -38,9 +39,7 @@ def settled_step(
     touched = frozenset(name for name, contact in step.contact.items() if contact.active.any())
     state, load = restart.put_back(problem, step, touched), problem.load_at(step.load_factor)
     state = replace(state, obstacles=problem.obstacles_at(load, state.u))
-    loaded = with_loads(problem, load)
-    start, expected = prepare_start(problem, state, load, loaded)
-    balanced = equilibrium(problem, start, load, loaded, expected)
+    balanced = newton(problem, prepare_start(problem, state, step.index, load), load)
     settled, u = balanced.settled, balanced.u
     if settled is None:
         none = np.empty(0)

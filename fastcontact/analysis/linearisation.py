@@ -1,0 +1,95 @@
+"""The problem of a Newton iteration: terms of the equilibrium linearised about displacements."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass, replace
+
+from scipy.sparse import bsr_array, csr_array
+
+from fastcontact.analysis.floating_bodies import STIFF, FloatingBodies, RigidPosition
+from fastcontact.analysis.problem import (
+    Problem,
+    StepLoad,
+    active_dofs,
+    floating_motions,
+    floating_stiffness,
+    near_nullspace,
+    prepare_solver,
+)  # fmt: skip
+from fastcontact.analysis.terms import Terms, added
+from fastcontact.arrays import Array
+from fastcontact.elasticity.constrained_system import System
+from fastcontact.elasticity.nonlinear_bodies import WHOLE
+
+
+@dataclass(frozen=True)
+class Regularisation:
+    """How a tangent is made positive definite.
+
+    Attributes
+    ----------
+    geometric : int
+        How much of the geometric stiffness it has, see `NonlinearBodies.at`.
+    held : float
+        Stiffness of springs along closed gaps, beside the largest of the bodies [-].
+    stiff : bool
+        Whether those of floating bodies are.
+    """
+
+    geometric: int = WHOLE
+    held: float = 0.0
+    stiff: bool = False
+
+
+def linearised(
+    problem: Problem, K: bsr_array, u: Array, rigid: RigidPosition | None, contact: csr_array | None, stiff: bool
+) -> Problem:
+    """Return the problem with the tangent of its terms at displacements u (n_dofs,) [length].
+
+    Parameters
+    ----------
+    problem : Problem
+    K : bsr_array (n, n)
+        See `Terms.tangent`; it is taken apart.
+    u : ndarray (n_dofs,)
+    rigid : RigidPosition, optional
+        The last position of floating bodies.
+    contact : csr_array (n_dofs, n_dofs), optional
+        Stiffness of forces of contact that vanish or are known at u [force / length].
+    stiff : bool
+        See `Regularisation`.
+    """
+    K = problem.force_driven.stiffness(K)
+    system = problem.system.renewed(added(K, contact))
+    floating = _floating(problem, system, u, rigid, stiff)
+    solver = copy.copy(problem.solver)
+    involved = system.involved(problem.contact_dofs)
+    modes = problem.force_driven.near_nullspace(near_nullspace(problem.model, problem.displacement(u)))
+    involved = prepare_solver(solver, system, floating, modes, involved)
+    dofs = active_dofs(system, problem.contact_dofs, involved, problem.pairs, floating, solver)
+    at = u if problem.bodies is not None and problem.bodies.finite else None
+    return replace(problem, system=system, solver=solver, dofs=dofs, floating_bodies=floating, linearised_at=at)
+
+
+def load_about(problem: Problem, terms: Terms, u: Array, load: StepLoad, rigid: RigidPosition | None) -> StepLoad:
+    """Return the load of a linearised problem, under which it moves on from displacements u (n_dofs,) [length]."""
+    force = load.force - terms.residual(u)[0] + problem.system.K @ u
+    if problem.floating_bodies is not None and rigid is not None:  # turned bodies under load are not free to turn
+        force -= problem.system.K @ problem.floating_bodies.rigid(u[problem.floating_bodies.dofs])
+    return replace(load, force=force)
+
+
+def _floating(
+    problem: Problem, system: System, u: Array, rigid: RigidPosition | None, stiff: bool
+) -> FloatingBodies | None:
+    """Return the floating bodies of a tangent: where they turn, their free motions are those of the deformed shape."""
+    if problem.floating_bodies is None or problem.bodies is None or not problem.bodies.finite:
+        return problem.floating_bodies
+    motions = problem.floating_bodies.motions
+    if problem.model.kinematics != "axisymmetric":
+        turned = floating_motions(problem.model, problem.model.prescribed_by_ramp()[0], problem.displacement(u))
+        motions = turned if len(turned) == len(motions) else motions
+    before = problem.floating_bodies.dofs if rigid is None else rigid.dofs
+    relative_stiffness = STIFF if stiff else floating_stiffness(problem.solver)
+    return FloatingBodies(motions, system, system.involved(problem.contact_dofs), relative_stiffness, before)

@@ -1,0 +1,231 @@
+r"""Terms of the equilibrium: what acts on the nodes by their displacements, each with its forces, tangent and history.
+
+With the nodal forces :math:`f_i` of the terms, external forces and contact, a load step solves
+
+.. math:: \sum_i f_i(u) = f_{ext} + B(u)^T \lambda
+
+by the iterations of `newton`, for which a tangent that stays as it was prepared costs nothing. Contact is linearised with
+its inequalities, see `geometry_loop`; what it adds to the forces of terms, where fluid follows the surface, is `Fluid`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+from scipy.sparse import bsr_array, csr_array
+
+from fastcontact.analysis.problem import Problem, StepLoad
+from fastcontact.analysis.state import State
+from fastcontact.arrays import Array
+from fastcontact.contact.constraints import Wetted
+from fastcontact.elasticity.constrained_system import Stiffness
+from fastcontact.elasticity.following_pressure import FollowingPressure
+from fastcontact.elasticity.nonlinear_bodies import WHOLE, DeformedBodies
+from fastcontact.elasticity.springs import Springs, spring_force, spring_stiffness
+
+# Elastic energy and plastic work [energy].
+Energies = tuple[float, float]
+
+
+class Term(Protocol):
+    """A part of the equilibrium of a load step; u (n_dofs,) are the displacements of all components [length]."""
+
+    def residual(self, u: Array) -> tuple[Array, Energies]:
+        """Return the nodal forces (n_dofs,) that hold the term at u [force], and its energies."""
+        ...
+
+    def tangent(self, u: Array, geometric: int = WHOLE) -> bsr_array | csr_array | None:
+        """Return the derivative of the forces (n, n), of components of the mesh [force / length]; None: as prepared.
+
+        The caller may take it apart. How much `geometric` stiffness bodies have says `NonlinearBodies.at`.
+        """
+        ...
+
+    def commit(self, u: Array, state: State) -> State:
+        """Return the state with the history of the term at the end of the load step."""
+        ...
+
+
+class _WithoutHistory:
+    """Terms without history."""
+
+    def commit(self, u: Array, state: State) -> State:
+        """See `Term`."""
+        return state
+
+
+class LinearBodies(_WithoutHistory):
+    """Linear bodies and springs, whose stiffness is that of the prepared problem."""
+
+    def __init__(self, K: Stiffness) -> None:
+        self._K = K
+
+    def residual(self, u: Array) -> tuple[Array, Energies]:
+        """See `Term`."""
+        force = self._K @ u
+        return force, (0.5 * float(u @ force), 0.0)
+
+    def tangent(self, u: Array, geometric: int = WHOLE) -> None:
+        """See `Term`."""
+
+
+class Bodies:
+    """Nonlinear bodies in a load step that begins at `start`.
+
+    Forces and tangent come from one loop over the cells: of the last two displacements these are kept.
+    """
+
+    def __init__(self, problem: Problem, start: State, load: StepLoad) -> None:
+        self._problem, self._start, self._rise = problem, start, load.rise
+        self._kept: list[tuple[Array, DeformedBodies]] = []
+        self._taken: Array | None = None
+
+    def at(self, u: Array) -> DeformedBodies:
+        """Return the bodies at u.
+
+        Raises
+        ------
+        ConvergenceError
+            If a cell turns inside out.
+        """
+        for known, bodies in self._kept:
+            if known is u:
+                return bodies
+        bodies = self._problem.deformed(u, self._start, self._rise)
+        self._kept = [*self._kept[-1:], (u, bodies)]
+        return bodies
+
+    def residual(self, u: Array) -> tuple[Array, Energies]:
+        """See `Term`."""
+        bodies, force = self.at(u), np.zeros_like(u)
+        force[: bodies.force.size] = bodies.force.ravel()
+        return force, (bodies.energy, bodies.plastic_work)
+
+    def tangent(self, u: Array, geometric: int = WHOLE) -> bsr_array:
+        """See `Term`."""
+        if geometric < WHOLE or u is self._taken:
+            return self._problem.deformed(u, self._start, self._rise, geometric=geometric).K
+        self._taken = u
+        return self.at(u).K
+
+    def commit(self, u: Array, state: State) -> State:
+        """See `Term`."""
+        return replace(state, history=self.at(u).history)
+
+
+class SpringForces(_WithoutHistory):
+    """Springs beside nonlinear bodies, of `n` components."""
+
+    def __init__(self, springs: Sequence[Springs], n: int) -> None:
+        self._springs, self._n = springs, n
+
+    def residual(self, u: Array) -> tuple[Array, Energies]:
+        """See `Term`."""
+        force, own = np.zeros_like(u), u[: self._n]
+        force[: self._n] = spring_force(self._springs, own)
+        return force, (0.5 * float(force[: self._n] @ own), 0.0)
+
+    def tangent(self, u: Array, geometric: int = WHOLE) -> csr_array:
+        """See `Term`."""
+        return spring_stiffness(self._springs, self._n)
+
+
+class FollowerLoad(_WithoutHistory):
+    """By how much a pressure that follows the surface pushes less than on the undeformed one, which external forces hold."""
+
+    def __init__(self, problem: Problem, pressure: FollowingPressure, factor: float) -> None:
+        self._problem, self._pressure, self._factor = problem, pressure, factor
+
+    def residual(self, u: Array) -> tuple[Array, Energies]:
+        """See `Term`."""
+        force, displacement = np.zeros_like(u), self._problem.displacement(u)
+        here, before = self._pressure.at(displacement)[0], self._pressure.at(np.zeros_like(displacement))[0]
+        force[: here.size] = -self._factor * (here - before).ravel()
+        return force, (0.0, 0.0)
+
+    def tangent(self, u: Array, geometric: int = WHOLE) -> csr_array:
+        """See `Term`."""
+        return self._factor * self._pressure.at(self._problem.displacement(u))[1]
+
+
+class Fluid(_WithoutHistory):
+    """By how much fluid in contact pushes less than at the displacements `at` (n_dofs,) where contact was linearised."""
+
+    def __init__(self, problem: Problem, wetted: Wetted, at: Array) -> None:
+        self._problem, self._wetted, self._at = problem, wetted, at
+
+    def residual(self, u: Array) -> tuple[Array, Energies]:
+        """See `Term`."""
+        force = np.zeros_like(u)
+        here, before = (self._wetted.force(self._problem.displacement(each)) for each in (u, self._at))
+        force[: here.size] = (before - here).ravel()
+        return force, (0.0, 0.0)
+
+    def tangent(self, u: Array, geometric: int = WHOLE) -> csr_array:
+        """See `Term`."""
+        return self._wetted.stiffness(self._problem.displacement(u))
+
+
+class Terms:
+    """The sum of the terms of a load step.
+
+    Parameters
+    ----------
+    problem : Problem
+    start : State
+        At the beginning of the step.
+    load : StepLoad
+
+    Attributes
+    ----------
+    bodies : Bodies, optional
+        Where they are nonlinear.
+    """
+
+    def __init__(self, problem: Problem, start: State, load: StepLoad) -> None:
+        self.bodies = None if problem.bodies is None else Bodies(problem, start, load)
+        self._parts: list[Term] = [LinearBodies(problem.system.K)]
+        if self.bodies is not None:
+            springs, n = problem.model.springs, problem.model.n_dofs
+            self._parts = [self.bodies, *([SpringForces(springs, n)] if springs else [])]
+            for (pressure, _), factor in zip(problem.following, load.following, strict=True):
+                self._parts.append(FollowerLoad(problem, pressure, factor))
+
+    @property
+    def prepared(self) -> bool:
+        """Whether all tangents are as they were prepared, at any displacement."""
+        return self.bodies is None
+
+    def residual(self, u: Array, more: Sequence[Term] = ()) -> tuple[Array, Energies]:
+        """See `Term`, with `more` terms."""
+        force, energy = self._parts[0].residual(u)
+        for term in (*self._parts[1:], *more):
+            added, stored = term.residual(u)
+            force, energy = force + added, (energy[0] + stored[0], energy[1] + stored[1])
+        return force, energy
+
+    def tangent(self, u: Array, geometric: int = WHOLE) -> bsr_array:
+        """See `Term`; only where tangents change."""
+        assert self.bodies is not None
+        K = self.bodies.tangent(u, geometric)
+        for term in self._parts[1:]:
+            K = added(K, term.tangent(u))
+        return K
+
+    def commit(self, u: Array, state: State) -> State:
+        """See `Term`."""
+        for term in self._parts:
+            state = term.commit(u, state)
+        return state
+
+
+def added(K: bsr_array, more: csr_array | bsr_array | None) -> bsr_array:
+    """Return the sum of two tangents, blocks sorted."""
+    if more is None:
+        return K
+    total = bsr_array(K + more.tobsr(K.blocksize))
+    total.sort_indices()
+    return total
