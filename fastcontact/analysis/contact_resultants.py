@@ -15,9 +15,12 @@ from fastcontact.arrays import Array
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.integration import lumped_areas
-from fastcontact.errors import ContactError, unknown
+from fastcontact.errors import ContactError, unknown, warn
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
+
+# Part of the work of friction, done by nodes in the step in which they close, that is worth a warning.
+WHILE_TOUCHING = 0.1
 
 
 @typed(ContactError)
@@ -218,6 +221,7 @@ def contact_history(model: Model, steps: Sequence[StepResult], name: str) -> NDA
     array([10., 20.])
     """
     answers = contact_resultants(model, steps, name)
+    _warn_of_long_steps(steps)
     axes = "xyz"[: model.mesh.dim]
     turns = "z" if model.mesh.dim == 2 else axes
     rows = [
@@ -231,6 +235,18 @@ def contact_history(model: Model, steps: Sequence[StepResult], name: str) -> NDA
         "dissipation", "friction_work",
     ]  # fmt: skip
     return np.array(rows, [("step", int), *((column, float) for column in names)])
+
+
+def _warn_of_long_steps(steps: Sequence[StepResult]) -> None:
+    """Warn where much of the work of friction is that of nodes in the step in which they close."""
+    work = steps[-1].work if len(steps) else {}
+    done, touching = work.get("friction_work", 0.0), work.get("friction_while_touching", 0.0)
+    if touching > WHILE_TOUCHING * done:
+        warn(
+            f"{touching / done:.0%} of the work of friction is that of nodes in the load step in which they close, which slide from "
+            "its beginning, not from where they touch: work is too large, and shear is off. Take more load steps, or "
+            "Criteria(friction_while_touching=0.01)"
+        )
 
 
 @typed(ContactError)

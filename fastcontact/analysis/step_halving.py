@@ -81,9 +81,9 @@ def _both(
 
 
 def _slides_while_touching(problem: Problem, state: State, after: State) -> bool:
-    """Return whether nodes that close in a step do more of the work of friction than `Criteria` allows."""
+    """Return whether nodes of nonlinear bodies that close in a step do more of the work of friction than is allowed."""
     allowed = problem.criteria.friction_while_touching
-    if allowed is None or state.work is None or after.work is None:
+    if allowed is None or problem.bodies is None or state.work is None or after.work is None:
         return False
     return after.work.touching - state.work.touching > allowed * after.work.friction
 

@@ -191,8 +191,8 @@ def test_works_that_do_not_add_up_are_told(count):
     assert abs(steps[-1].work["imbalance"]) < (0.1 if told else 0.005) * 0.5 * 300.0 * 0.5**2
 
 
-def pressed_ball(kinematics="axisymmetric", element="quad4", solver="auto", steps=5, **changes):
-    """Press a rigid ball into a block; return the steps."""
+def ball_on_block(kinematics="axisymmetric", element="quad4", **changes):
+    """Return the model of a rigid ball that is pressed into a block."""
     solid = kinematics == "3d"
     size = {"contact_radius": 2.0, "contact_size": 0.35} if solid else {"contact_radius": 1.2, "contact_size": 0.1}
     mesh = fc.generate.graded_block(element, width=10.0, depth=10.0, **size)
@@ -201,10 +201,15 @@ def pressed_ball(kinematics="axisymmetric", element="quad4", solver="auto", step
         model.fix(side, axis)
     model.fix("BOTTOM", "xyz"[: mesh.dim])
     ball = fc.obstacles.Sphere(centre=(*[0.0] * (mesh.dim - 1), 10.0), R=10.0)
-    criteria = fc.Criteria(friction_while_touching=changes.pop("friction_while_touching", 0.01))
     driven = {"motion": {"xyz"[mesh.dim - 1]: -0.2 if solid else -0.1}, "friction": 0.3} | changes
     model.add_obstacle("ball", secondary="CONTACT", obstacle=ball, **driven)
-    return fc.solve(model, steps, criteria=criteria, linear_solver=solver)
+    return model
+
+
+def pressed_ball(solver="auto", steps=5, friction_while_touching=0.01, **changes):
+    """Press the ball; return the steps."""
+    criteria = fc.Criteria(friction_while_touching=friction_while_touching)
+    return fc.solve(ball_on_block(**changes), steps, criteria=criteria, linear_solver=solver)
 
 
 @pytest.mark.parametrize(
@@ -242,9 +247,15 @@ def test_a_ball_that_a_force_drives_has_the_work_of_friction_of_many_steps():
 
 
 def test_steps_as_a_whole_have_the_work_of_slip_before_nodes_touch():
-    whole, few = (pressed_ball(friction_while_touching=fraction)[-1] for fraction in (None, 0.01))
-    assert whole.work["friction_work"] > 2.0 * few.work["friction_work"]
-    assert whole.work["friction_while_touching"] > 0.5 * whole.work["friction_work"]
+    whole, few = (pressed_ball(friction_while_touching=fraction) for fraction in (None, 0.01))
+    assert whole[-1].work["friction_work"] > 2.0 * few[-1].work["friction_work"]
+    assert whole[-1].work["friction_while_touching"] > 0.5 * whole[-1].work["friction_work"]
+    assert "substeps" not in few[-1].iterations  # increments, not halves
+    with pytest.warns(
+        fc.FastcontactWarning, match=r"of the work of friction is that of nodes in the load step in which"
+    ):
+        fc.contact_history(ball_on_block(), whole, "ball")
+    assert len(fc.contact_history(ball_on_block(), few, "ball")) == 5
 
 
 def test_fraction_while_touching_is_checked():
