@@ -243,9 +243,9 @@ def _warn_of_long_steps(steps: Sequence[StepResult]) -> None:
     done, touching = work.get("friction_work", 0.0), work.get("friction_while_touching", 0.0)
     if touching > WHILE_TOUCHING * done:
         warn(
-            f"{touching / done:.0%} of the work of friction is that of nodes in the load step in which they close, which slide from "
-            "its beginning, not from where they touch: work is too large, and shear is off. Take more load steps, or "
-            "Criteria(friction_while_touching=0.01)"
+            f"{touching / done:.0%} of the work of friction is that of nodes in the load step in which they close: they "
+            "slide from its beginning, not from where they touch. Work is too large, and shear is off: take more load steps, "
+            "or Criteria(friction_while_touching=0.01)"
         )
 
 
