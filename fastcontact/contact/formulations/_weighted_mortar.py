@@ -159,8 +159,8 @@ class WeightedMortar(Formulation):
         candidates = Candidates(points[:, None], np.ones((len(constraints), 1)))
         held = self.without_slip(at)
         projectors = np.zeros((*normal.shape, normal.shape[1]))
-        for along, nodes in held:
-            projectors[nodes] += along[nodes, :, None] * along[nodes, None, :]
+        for along, where in held:
+            projectors[where] += along[where, :, None] * along[where, None, :]
         directions, rubbing = self.options.rubbing(tangents(normal, projectors), candidates)
         slips, beside = self._slips(rubbing, held, overlap, covered, kept, mean, rows, weight)
         closing = self._closing(constraints, normal, at)
