@@ -56,9 +56,10 @@ class StepContext:
         return self.load.lift - (start - system.displacement(system.unknowns(start, zero), zero))
 
     def driven(self, constraints: Constraints) -> Array:
-        """Return the slips (k, m) that supports and obstacles make in the step, over the largest of their motions [-]."""
+        """Return the slips (k, m) that supports and obstacles make in the step, over the largest of all motions [-]."""
         slips = np.stack([T @ self.prescribed_motion for T in constraints.tangents])
-        scale = largest(self.prescribed_motion)
+        # Where nothing is prescribed, motions are what round-off leaves of those before.
+        scale = max(largest(self.prescribed_motion), largest(self.state.u))
         if constraints.slip0 is not None and isinstance(constraints, StackedConstraints):
             begin, end = self.state.obstacles, self.load.obstacles
             for name, rows in constraints.rows().items():

@@ -167,7 +167,7 @@ class Constraints:
     low_rank_compliance : ndarray (1 + len(tangents), m, h), optional
         Z of a compliance ``Z Z.T`` beside C, of normal forces and then of tangential ones; None stands for zero.
     driven : ndarray (len(tangents), m), optional
-        Slips that supports and obstacles make by themselves, over the largest of their motions [-]; None stands for none.
+        Slips that supports and obstacles make by themselves, over the largest of all motions [-]; None stands for none.
     law : OverclosureLaw, optional
         Of which `gap0` and `softness` are a line.
     branches : ndarray of int, optional

@@ -109,7 +109,7 @@ def layer(contrast):
     return model
 
 
-@pytest.mark.filterwarnings("ignore:.*element across")
+@pytest.mark.filterwarnings("ignore:.*element across", "ignore:Young.s moduli differ")
 def test_springs_of_stiff_bodies_are_as_soft_as_what_they_lie_on():
     steps = [fc.solve(layer(contrast), 1)[-1] for contrast in (1e6, 1e7)]
     assert [step.iterations["regularised"]["positions"] for step in steps] == [1, 1]
