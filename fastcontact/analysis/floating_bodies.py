@@ -28,7 +28,8 @@ from fastcontact.round_off import ROUND_OFF
 # Stiffness of the springs beside that of the body. Softer ones cost digits of factors (1e-6: a wedge off by 3e-9), stiffer
 # ones solutions: a stack with friction takes 4.1, 4.2 and 65 linear solutions with 1e-3, 1e-2 and 1, a bolt 2.8, 5.3 and 27.
 # By factors, whose solutions are cheap, the second: SSNP170 has a uniform pressure to 1.5e-10 with the first, to 1e-10 so.
-# Where turned bodies under load have a negative stiffness, springs as stiff as the body make up for it.
+# Where turned bodies under load have a negative stiffness, springs as stiff as the body make up for it. The body is the
+# softest one: what presses a stiff body against it is no stiffer (a layer 2e5 times softer crept for 100 positions).
 SOFT, FIRM, STIFF = 1e-3, 1e-2, 1.0
 # The springs carry less than this fraction of the loads and of the contact forces, which is all there is where motions drive
 # the bodies; more where round-off or the linear solver leave more.
@@ -101,7 +102,7 @@ class FloatingBodies:
         self, motions: FreeMotions, system: System, avoid: Indices, relative_stiffness: float, before: Indices = NONE
     ) -> None:
         diagonal, weightless = system.matrix.diagonal(), system.weightless
-        typical = float(np.median(diagonal[system.free & ~weightless]))
+        typical = _softest(diagonal, system.free & ~weightless, motions.displacement != 0.0)
         diagonal = np.where(weightless, typical, diagonal)
         self._dim = system.matrix.blocksize[0]
         self.names = motions.names()
@@ -199,6 +200,12 @@ class FloatingBodies:
             position, before = anchor if positions <= PLAIN else mixing.mixed(position, anchor), left
         state = dataclasses.replace(state, iterations=iterations)
         return RigidPosition(state, position, self.stiffness * elongation, positions, slack, self.dofs)
+
+
+def _softest(diagonal: Array, solid: Mask, moving: Mask) -> float:
+    """Return the least median stiffness (n,) of `solid` unknowns (n,) over those of each of `moving` (n, k), and the rest."""
+    groups = [solid & group for group in (*moving.T, ~moving.any(axis=1))]
+    return min(float(np.median(diagonal[group])) for group in groups if group.any())
 
 
 def _spring_dofs(motions: Array, weights: Array) -> Indices:

@@ -22,7 +22,7 @@ from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.protocol import Loaded
 from fastcontact.model.rigid_motions import generalised, needed_friction, resisting, stopped_at
-from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
+from fastcontact.round_off import SINGLE_PRECISION
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,16 +55,20 @@ class StepContext:
         system, start, zero = self.problem.system, self.state.u, np.zeros_like(self.state.u)
         return self.load.lift - (start - system.displacement(system.unknowns(start, zero), zero))
 
-    def driven(self, constraints: Constraints) -> Mask:
-        """Return which constraints (m,) supports and obstacles move past the other side in the step."""
+    def driven(self, constraints: Constraints) -> Array:
+        """Return the slips (k, m) that supports and obstacles make in the step, over the largest of all motions [-]."""
         slips = np.stack([T @ self.prescribed_motion for T in constraints.tangents])
-        scale = largest(self.prescribed_motion)
+        # Where nothing is prescribed, motions are what round-off leaves of those before.
+        scale = max(largest(self.prescribed_motion), largest(self.state.u))
         if constraints.slip0 is not None and isinstance(constraints, StackedConstraints):
+            begin, end = self.state.obstacles, self.load.obstacles
             for name, rows in constraints.rows().items():
                 if isinstance(self.problem.pairs[name].primary, RigidSide):
                     slips[:, rows] += constraints.slip0[:, rows]
-                    scale = max(scale, largest(constraints.slip0[:, rows]))
-        return np.asarray((np.abs(slips) > LENGTH_ROUND_OFF * scale).any(axis=0))
+                    # A motion along the normals makes no slips but those of round-off.
+                    moved = end.get(name, np.zeros(1)) - begin.get(name, 0.0)
+                    scale = max(scale, largest(constraints.slip0[:, rows]), largest(moved))
+        return np.asarray(slips / (scale or 1.0))
 
 
 def solve_inequalities(

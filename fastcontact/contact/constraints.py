@@ -15,6 +15,7 @@ from fastcontact.contact.linearised_geometry import Geometry
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.contact.pairing import normals
 from fastcontact.linear.field_compliance import FieldCompliance
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
 class Compliance(Protocol):
@@ -165,8 +166,8 @@ class Constraints:
         changed by since then makes constraints give way [length].
     low_rank_compliance : ndarray (1 + len(tangents), m, h), optional
         Z of a compliance ``Z Z.T`` beside C, of normal forces and then of tangential ones; None stands for zero.
-    driven : ndarray of bool (m,), optional
-        Constraints that supports and obstacles move past the other side by themselves; None stands for none.
+    driven : ndarray (len(tangents), m), optional
+        Slips that supports and obstacles make by themselves, over the largest of all motions [-]; None stands for none.
     law : OverclosureLaw, optional
         Of which `gap0` and `softness` are a line.
     branches : ndarray of int, optional
@@ -202,7 +203,7 @@ class Constraints:
     nodes: Indices | None = None
     nodal: NodalField | None = None
     tied: Tied | None = None
-    driven: Mask | None = None
+    driven: Array | None = None
     law: OverclosureLaw | None = None
     branches: AnyArray | None = None
     wetted: Wetted | None = None
@@ -232,10 +233,13 @@ class Constraints:
         """Coefficients of friction (m,), zero where there are none [-]."""
         return np.zeros(len(self)) if self.friction is None else self.friction
 
-    @property
-    def moved_past(self) -> Mask:
-        """Constraints (m,) that supports and obstacles move past the other side."""
-        return np.zeros(len(self), bool) if self.driven is None else self.driven
+    def moved_past(self, rows: Indices, Q: csr_array | None) -> Mask:
+        """Return the tangents (k, q) of constraints (q,), turned by Q, along which supports and obstacles move past."""
+        if self.driven is None:
+            return np.zeros((len(self.tangents), len(rows)), bool)
+        slips = np.vstack([np.zeros(len(rows)), self.driven[:, rows]])
+        turned = slips if Q is None else (Q @ slips.ravel()).reshape(slips.shape)
+        return np.asarray(np.abs(turned[1:]) > LENGTH_ROUND_OFF)
 
     def gaps(self, displacement: Array) -> Array:
         """Return the gaps (m,) [length] for displacements (n_points, dim) [length], compliance left out."""

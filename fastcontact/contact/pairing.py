@@ -247,12 +247,13 @@ def gap_rows(
     return G, gap0
 
 
-def tangents(normal: Array) -> list[Array]:
+def tangents(normal: Array, held: Array | None = None) -> list[Array]:
     """Return unit tangents (n, dim) that complete `normal` (n, dim): one in 2D, two in 3D.
 
     In 3D one pair of axes at right angles to the mean normal is turned to every point by the smallest rotation. Tangents
     then change no faster than normals, so that components of tractions along them can be taken for fields, and the choice
-    of the first axis makes no difference.
+    of the first axis makes no difference. Where motions are held, by projectors `held` (n, 3, 3), they are turned so that one
+    of them is held as far as any tangent is.
     """
     if normal.shape[1] == 2:
         return [np.column_stack([normal[:, 1], -normal[:, 0]])]
@@ -266,7 +267,15 @@ def tangents(normal: Array) -> list[Array]:
     slope = np.divide(normal @ axis, both, out=np.zeros(len(normal)), where=both > LENGTH_ROUND_OFF)
     first = axis - slope[:, None] * (mean + normal)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
-    return [first, np.cross(normal, first)]
+    second = np.cross(normal, first)
+    if held is not None:
+        ff, fs, ss = (
+            np.einsum("nd,nde,ne->n", a, held, b) for a, b in ((first, first), (first, second), (second, second))
+        )
+        angle = 0.5 * np.arctan2(2 * fs, ff - ss)[:, None]
+        first = np.cos(angle) * first + np.sin(angle) * second
+        second = np.cross(normal, first)
+    return [first, second]
 
 
 def normals(directions: Sequence[Array]) -> Array:

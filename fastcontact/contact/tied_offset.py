@@ -17,7 +17,7 @@ from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.pairing import Pairing, normals
 from fastcontact.contact.surface import Surface
 from fastcontact.linear.sparse_rows import nodal_rows
-from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
 def with_arms(constraints: Constraints, pairing: Pairing, primary: Surface, points: Array) -> Constraints:
@@ -37,18 +37,20 @@ def with_arms(constraints: Constraints, pairing: Pairing, primary: Surface, poin
     normal, facing = normals(constraints.directions), pairing.places(primary, np.arange(len(constraints)))
     axes = np.einsum("mkj,mkd->mdj", facing.gradient, points[facing.nodes])
     along = np.einsum("mkj,mjd->mkd", facing.gradient, np.linalg.pinv(axes))
-    rotations = _rotations(points)
-    rows = []
-    for tangent, direction in zip(constraints.tangents, constraints.directions, strict=True):
-        slope = np.einsum("mkd,md->mk", along, direction)
-        lever = nodal_rows(facing.nodes, slope[:, :, None] * normal[:, None, :], points.size)
-        arm, left = np.asarray(lever @ rotations), np.asarray(tangent @ rotations)
-        square = np.maximum((arm**2).sum(axis=1), TINY)
-        length = (arm * left).sum(axis=1) / square
-        moved = np.abs(np.stack([tangent @ np.tile(e, len(points)) for e in np.eye(points.shape[1])])).max(axis=0)
-        length[(np.abs(length) <= LENGTH_ROUND_OFF * size) | (moved > LENGTH_ROUND_OFF)] = 0.0
-        rows.append(csr_array(tangent - diags_array(length) @ lever) if length.any() else tangent)
-    return replace(constraints, tangents=tuple(rows))
+    slopes = [np.einsum("mkd,md->mk", along, direction) for direction in constraints.directions]
+    levers = [nodal_rows(facing.nodes, slope[:, :, None] * normal[:, None, :], points.size) for slope in slopes]
+    rotations, translations = _rotations(points), np.tile(np.eye(points.shape[1]), (len(points), 1))
+    arms = np.stack([lever @ rotations for lever in levers], axis=1)
+    left = np.stack([tangent @ rotations for tangent in constraints.tangents], axis=1)
+    moved = np.stack([np.abs(tangent @ translations).max(axis=1) for tangent in constraints.tangents], axis=1)
+    # A tensor, for one length a tangent would depend on which tangents are taken where sides do not lie along the normal.
+    lengths = left @ np.linalg.pinv(arms)
+    lengths[(np.abs(lengths) <= LENGTH_ROUND_OFF * size) | (moved > LENGTH_ROUND_OFF)[:, :, None]] = 0.0
+    tangents = [
+        csr_array(tangent - sum(diags_array(lengths[:, k, j]) @ lever for j, lever in enumerate(levers)))
+        for k, tangent in enumerate(constraints.tangents)
+    ]
+    return replace(constraints, tangents=tuple(tangents) if lengths.any() else constraints.tangents)
 
 
 def _rotations(points: Array) -> Array:

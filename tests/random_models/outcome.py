@@ -122,7 +122,7 @@ def figures(model: fc.Model, step: fc.StepResult, settled, factor: float, tolera
 
 # Checks that a result may fail where a warning tells so: the moment on curved sides that are as accurate as facets, which are
 # too few; pressures of places that are two nodes, whose areas differ by what curved facets do.
-TOLD = {"moment": "element across its radius", "carried": "where a period or sector begins and ends"}
+TOLD = {"moment": "across its radius", "carried": "where a period or sector begins and ends"}
 
 
 def told(wrong: list[str], step: fc.StepResult) -> bool:

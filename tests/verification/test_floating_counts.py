@@ -90,3 +90,28 @@ def test_ten_linear_solutions_hold_loose_bodies(model, of_linear, held, force):
     assert step.iterations["linear_iterations"] <= 10 * of_linear
     first = next(iter(step.contact.values()))
     assert abs(first.force[held]) == pytest.approx(force, rel=1e-6)
+
+
+def layer(contrast):
+    """A soft layer between two plates, the upper one pressed by a disc."""
+    plates = [numbered(fc.generate.block((4.0, 1.0), (n, 2), "quad4", (0.0, i)), i) for i, n in enumerate((6, 5, 7))]
+    model = fc.Model(fc.generate.union(*plates), "plane_strain")
+    for i, E in enumerate((contrast, 1.0, contrast)):
+        model.add_material(fc.LinearElastic(E, 0.0), groups=[f"BLOCK{i}"])
+    model.fix("BOTTOM0", "xy")
+    for i in (1, 2):
+        model.fix(f"LEFT{i}", "x")
+        model.add_contact(f"c{i}", secondary=f"BOTTOM{i}", primary=f"TOP{i - 1}")
+    disc = fc.obstacles.Sphere((1.0, 5.0), R=2.0)
+    model.add_obstacle(
+        "disc", secondary="TOP2", obstacle=disc, motion={"y": -0.1}, friction=0.5, formulation="continuous"
+    )
+    return model
+
+
+@pytest.mark.filterwarnings("ignore:.*element across", "ignore:Young.s moduli differ")
+def test_springs_of_stiff_bodies_are_as_soft_as_what_they_lie_on():
+    steps = [fc.solve(layer(contrast), 1)[-1] for contrast in (1e6, 1e7)]
+    assert [step.iterations["regularised"]["positions"] for step in steps] == [1, 1]
+    one, other = (step.contact["disc"].force for step in steps)
+    np.testing.assert_allclose(one, other, rtol=1e-3)

@@ -164,3 +164,45 @@ def test_bolted_flanges_held_at_the_same_edge_settle_and_mirror_each_other(frict
     contact = step.contact["joint"]
     assert abs(step.reaction[a, 2].sum() + step.reaction[b, 2].sum()) < 1e-6 * contact.force[2]
     assert np.allclose(contact.coordinates[contact.pressure > 0.0, 2], 8.0, atol=1e-3)
+
+
+class Turned:
+    """A rigid shape that is turned about the origin by Q."""
+
+    def __init__(self, shape, Q):
+        self.shape, self.Q = shape, Q
+
+    def distance(self, points):
+        distance, normals = self.shape.distance(points @ self.Q)
+        return distance, normals @ self.Q.T
+
+
+@pytest.mark.parametrize(
+    "options", [{"formulation": "node_to_segment"}, {"formulation": "continuous", "integration": "node"}]
+)
+@pytest.mark.parametrize("motion", [(0.0, 0.0, -0.05), (0.0, 0.03, -0.03)])
+def test_a_moving_ball_drags_no_node_across_its_plane_of_symmetry(options, motion):
+    mesh = fc.generate.box((1.0, 1.0, 0.5), (3, 3, 2), "hex8")
+    forces = []
+    for said, seed in (("fix", None), ("axes", None), ("normal", 3), ("relation", 3)):
+        Q = turn(3, seed)
+        model = elastic_model(mesh.replace(points=mesh.points @ Q.T), "3d")
+        for group, axis in (("ZMIN", 2), ("XMIN", 0), ("YMIN", 1)):
+            if said == "fix":
+                model.fix(group, "xyz"[axis])
+            elif said == "normal":
+                model.fix(group, "normal")
+            elif said == "axes":
+                model.fix(group, "x", axes=[tuple(Q[:, axis]), tuple(Q[:, (axis + 1) % 3])])
+            else:
+                for point in mesh.points_of(group):
+                    model.relate([(int(point), name, float(Q[k, axis])) for k, name in enumerate("xyz")])
+        ball = Turned(fc.obstacles.Sphere(centre=(0.0, 0.0, 2.5), R=2.0), Q)
+        along = {name: float(value) for name, value in zip("xyz", Q @ motion, strict=True)}
+        model.add_obstacle("ball", secondary="ZMAX", obstacle=ball, motion=along, friction=0.3, **options)
+        contact = fc.solve(model, 1)[-1].contact["ball"]
+        plane = np.isin(contact.points, mesh.points_of("XMIN")) & contact.active
+        assert plane.sum() > 1
+        assert np.abs((contact.shear @ Q)[plane, 0]).max() < 1e-10 * contact.pressure.max()
+        forces.append(contact.force @ Q)
+    np.testing.assert_allclose(forces, np.tile(forces[0], (4, 1)), atol=1e-9 * abs(forces[0][2]))

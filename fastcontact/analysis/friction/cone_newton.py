@@ -73,7 +73,7 @@ class Linearised(Protocol):
 
 def newton(
     problem: Linearised, y: Array, gaps: Array, exact: float = EXACT, patience: int | None = None,
-    line_search: bool = True,
+    line_search: bool = True, least: int = 0,
 ) -> Forces:  # fmt: skip
     """Go down to a zero of the residual from forces and gaps (1 + k, m).
 
@@ -87,6 +87,8 @@ def newton(
         Iterations allowed; PATIENCE by default.
     line_search : bool
         Whether steps are cut until the residual goes down; else all are whole.
+    least : int
+        Iterations to make however small the residual is.
     """
     patience = PATIENCE if patience is None else patience
     law = problem.law
@@ -100,7 +102,7 @@ def newton(
         relative = off / largest if largest else float(off > problem.round_off)
         if relative < best[2]:
             best = y, gaps, relative
-        settled = off <= exact * largest + problem.round_off
+        settled = iteration >= least and off <= exact * largest + problem.round_off
         if settled or uphill > UPHILL or iteration == patience:
             break
         trial, gaps_there = problem.step(y, gaps, *law.state(y, gaps))

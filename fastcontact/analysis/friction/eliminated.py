@@ -128,7 +128,7 @@ class Eliminated:
             free = (self._turn @ free.ravel()).reshape(free.shape)
             compliance = self._own(rows, yielding)
         still = idle(compliance)
-        moved = still & constraints.moved_past
+        moved = still & constraints.moved_past(np.arange(m), self._turn)
         self._gives[1:][moved] += np.broadcast_to(GIVING * compliance[0, 0], still.shape)[moved]
         slipping = [scaled(T, np.where(off, 0.0, 1.0)) for T, off in zip(rows[1:], still, strict=True)]
         self._rows = (rows[0], *slipping)

@@ -149,7 +149,7 @@ def _among(
         F, free, begin = np.asarray(Q @ (Q @ F).T), *((Q @ own.ravel()).reshape(free.shape) for own in (free, begin))
         start = None if start is None else (Q @ start.ravel()).reshape(free.shape)
     if len(still):
-        moved = idle_slips & constraints.moved_past[rows]
+        moved = idle_slips & constraints.moved_past(rows, Q)
         F[still], F[:, still] = 0.0, 0.0
         F[still, still] = np.where(moved, GIVING * own[0, 0], np.diag(F).max())[idle_slips]
         free[1:][idle_slips & ~moved] = 0.0

@@ -275,10 +275,18 @@ class Formulation(ABC):
         positions, geometry = candidates.positions(self.points), self._geometry(candidates, pairing, at)
         if not self.slides:
             return Constraints(B, gap0, positions, compliance, geometry=geometry)
-        directions, rubbing = self.options.rubbing(tangents(pairing.normal), candidates)
+        directions, rubbing = self.options.rubbing(tangents(pairing.normal, self._held_at(candidates)), candidates)
         along, slip0 = self.slips(candidates, pairing, rubbing, at)
         friction = self.options.coefficients(self.friction, candidates)
         return Constraints(B, gap0, positions, compliance, along, directions, friction, slip0, geometry=geometry)
+
+    def _held_at(self, candidates: Candidates) -> Array | None:
+        """Return projectors (n, dim, dim) on the directions in which all nodes of candidates are held, None without any."""
+        if self.held is None or not len(self.held.nodes) or not self.friction:
+            return None
+        return spanned(
+            np.einsum("nk,nkde->nde", candidates.shape, self.held.at(candidates.nodes)), 1.0 - LENGTH_ROUND_OFF
+        )
 
     def _geometry(self, candidates: Candidates, pairing: Pairing, at: Configuration) -> Geometry | None:
         """Return how the gaps of paired candidates vary, where their normals are those of the primary side."""

@@ -158,7 +158,10 @@ class WeightedMortar(Formulation):
             return constraints
         candidates = Candidates(points[:, None], np.ones((len(constraints), 1)))
         held = self.without_slip(at)
-        directions, rubbing = self.options.rubbing(_tangents(normal, held), candidates)
+        projectors = np.zeros((*normal.shape, normal.shape[1]))
+        for along, where in held:
+            projectors[where] += along[where, :, None] * along[where, None, :]
+        directions, rubbing = self.options.rubbing(tangents(normal, projectors), candidates)
         slips, beside = self._slips(rubbing, held, overlap, covered, kept, mean, rows, weight)
         closing = self._closing(constraints, normal, at)
         slip0 = self._slip0(mean, closing, rubbing, at)
@@ -378,20 +381,6 @@ class WeightedMortar(Formulation):
                 values[side.points] = clearance(self.points[side.points])
                 added += matrix @ values / weight
         return added
-
-
-def _tangents(normal: Array, without_slip: list[tuple[Array, Mask]]) -> list[Array]:
-    """Return `tangents`, turned where there is no slip in some direction so that one of them is along that."""
-    axes = tangents(normal)
-    if len(axes) == 1 or not without_slip:
-        return axes
-    held = sum(
-        np.where(nodes[:, None, None], along[:, :, None] * along[:, None, :], 0.0) for along, nodes in without_slip
-    )
-    first, mixed, second = (np.einsum("md,mde,me->m", axes[a], held, axes[b]) for a, b in ((0, 0), (0, 1), (1, 1)))
-    angle = 0.5 * np.arctan2(2 * mixed, first - second)[:, None]
-    turned = np.cos(angle) * axes[0] + np.sin(angle) * axes[1]
-    return [turned, np.cross(normal, turned)]
 
 
 @dataclass(frozen=True, eq=False)
