@@ -10,6 +10,8 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from contextlib import contextmanager
 from typing import Any
 
+LONGEST = 1500  # characters of a message
+
 
 def printable(text: str) -> str:
     """Return a text with all characters that control or format replaced by their escapes, but for the ends of lines."""
@@ -22,8 +24,9 @@ class FastcontactError(Exception):
     """Base class of every error that fastcontact raises on purpose; its message is one line."""
 
     def __str__(self) -> str:
-        # Names from files may hold anything: line ends, and what steers a terminal.
-        return printable(" ".join(super().__str__().splitlines()))
+        # Names and values from files may hold anything: line ends, what steers a terminal, thousands of characters.
+        text = printable(" ".join(super().__str__().splitlines()))
+        return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]} ... {text[-LONGEST // 3 :]}"
 
 
 class MeshError(FastcontactError):
@@ -74,7 +77,7 @@ class FastcontactWarning(UserWarning):
 
 @contextmanager
 def in_file(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Name a file at the beginning of the package's errors that do not."""
+    """Name a file, or a place in one, at the beginning of the package's errors that do not."""
     try:
         yield
     except FastcontactError as error:

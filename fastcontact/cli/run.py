@@ -65,7 +65,11 @@ def run(options: argparse.Namespace) -> int:
     check_outputs(files_of_case(options.case), [output, options.json, options.modes], [options.plot])
     with warnings_shown() as early:
         case = read_case(options.case)
-        _check_study(case)
+        if case.deck is None and "study" in case.text:
+            from fastcontact.studies.checks import check_study
+
+            with in_file(case_path(options.case)):
+                check_study(case)
     read = time.perf_counter()
     with in_file(case_path(options.case)):
         case.model.check(case.ramp)  # a wrong model must not replace the results of a right one
@@ -92,17 +96,6 @@ def run(options: argparse.Namespace) -> int:
         say(f"{len(failed)} of {len(numbers['checks'])} checks of the case failed: {', '.join(failed)}", error=True)
         return 3
     return 0
-
-
-def _check_study(case: Case) -> None:
-    """Raise CaseError, with the name of the case, for a wrong table ``[study]``, which only studies use."""
-    if case.deck is None and "study" in case.text:
-        from fastcontact.studies.settings import settings
-
-        try:
-            settings(case)
-        except CaseError as error:
-            raise CaseError(f"{case.name}: {error}") from error
 
 
 def _modes(options: argparse.Namespace, case: Case, last: StepResult) -> Any:

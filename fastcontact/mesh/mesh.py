@@ -20,7 +20,8 @@ from fastcontact.mesh.facet_search import added, facets_with_nodes
 
 
 def _read_only(values: ArrayLike, dtype: Any) -> AnyArray:
-    array = np.array(values, dtype=dtype, order="C")
+    of_mesh = isinstance(values, np.ndarray) and values.base is None and not values.flags.writeable
+    array = np.array(values, dtype=dtype, order="C", copy=None if of_mesh else True)
     array.setflags(write=False)
     return array
 

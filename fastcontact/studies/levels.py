@@ -117,7 +117,7 @@ def _finer(settings: Settings, element: str, given: Mapping[str, Any], level: in
     name = str(settings.generator)
     check_known("study.generator", name, generate.GENERATORS, CaseError)
     signature = inspect.signature(generate.GENERATORS[name]).parameters
-    for key in given:
+    for key in (*given, *settings.halve, *settings.double):
         check_known(f"argument of the generator {name} in [study]", key, signature, CaseError)
     rule = RULES[name](element, given) if name in RULES else Rule()
     own_rule = bool(settings.halve or settings.double)  # then the rule's ratios may not suit

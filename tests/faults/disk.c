@@ -13,7 +13,8 @@ static char folder[4096];
 static long calls, first = -1;
 static int once, number;
 
-/* Let call `start` (from 0) below `where` fail with the error `error`: that one alone, or all from there on. */
+/* Let call `start` (from 0) below `where` fail with the error `error`: that one alone, or all from there on.
+   Error 0 is none: writes take half of what they are given, as they may. */
 void disk_fails(const char *where, long start, int error, int alone) {
     strncpy(folder, where, sizeof folder - 1);
     calls = 0, first = start, number = error, once = alone;
@@ -43,15 +44,19 @@ static int fails(int fd) {
 
 #define REAL(name) static __typeof__(name) *real; if (!real) real = dlsym(RTLD_NEXT, #name)
 
-ssize_t write(int fd, const void *data, size_t size) { REAL(write); return fails(fd) ? -1 : real(fd, data, size); }
-ssize_t writev(int fd, const struct iovec *data, int count) { REAL(writev); return fails(fd) ? -1 : real(fd, data, count); }
-ssize_t pwrite(int fd, const void *data, size_t size, off_t at) { REAL(pwrite); return fails(fd) ? -1 : real(fd, data, size, at); }
-ssize_t pwrite64(int fd, const void *data, size_t size, off64_t at) { REAL(pwrite64); return fails(fd) ? -1 : real(fd, data, size, at); }
-int ftruncate(int fd, off_t size) { REAL(ftruncate); return fails(fd) ? -1 : real(fd, size); }
-int ftruncate64(int fd, off64_t size) { REAL(ftruncate64); return fails(fd) ? -1 : real(fd, size); }
-int fsync(int fd) { REAL(fsync); return fails(fd) ? -1 : real(fd); }
+#define REFUSED(fd) (fails(fd) && number)
+#define TAKEN(fd, size) (!fails(fd) ? (size) : number ? 0 : ((size) + 1) / 2)
+#define WRITTEN(fd, size, call) size_t taken = TAKEN(fd, size); return size && !taken ? -1 : call
+
+ssize_t write(int fd, const void *data, size_t size) { REAL(write); WRITTEN(fd, size, real(fd, data, taken)); }
+ssize_t writev(int fd, const struct iovec *data, int count) { REAL(writev); WRITTEN(fd, (size_t)count, real(fd, data, (int)taken)); }
+ssize_t pwrite(int fd, const void *data, size_t size, off_t at) { REAL(pwrite); WRITTEN(fd, size, real(fd, data, taken, at)); }
+ssize_t pwrite64(int fd, const void *data, size_t size, off64_t at) { REAL(pwrite64); WRITTEN(fd, size, real(fd, data, taken, at)); }
+int ftruncate(int fd, off_t size) { REAL(ftruncate); return REFUSED(fd) ? -1 : real(fd, size); }
+int ftruncate64(int fd, off64_t size) { REAL(ftruncate64); return REFUSED(fd) ? -1 : real(fd, size); }
+int fsync(int fd) { REAL(fsync); return REFUSED(fd) ? -1 : real(fd); }
 int posix_fallocate(int fd, off_t at, off_t size);
-int posix_fallocate(int fd, off_t at, off_t size) { REAL(posix_fallocate); return fails(fd) ? number : real(fd, at, size); }
+int posix_fallocate(int fd, off_t at, off_t size) { REAL(posix_fallocate); return REFUSED(fd) ? number : real(fd, at, size); }
 int posix_fallocate64(int fd, off64_t at, off64_t size);
-int posix_fallocate64(int fd, off64_t at, off64_t size) { REAL(posix_fallocate64); return fails(fd) ? number : real(fd, at, size); }
-int rename(const char *from, const char *to) { REAL(rename); return below(from) && counted() ? -1 : real(from, to); }
+int posix_fallocate64(int fd, off64_t at, off64_t size) { REAL(posix_fallocate64); return REFUSED(fd) ? number : real(fd, at, size); }
+int rename(const char *from, const char *to) { REAL(rename); return below(from) && counted() && number ? -1 : real(from, to); }

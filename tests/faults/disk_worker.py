@@ -1,8 +1,9 @@
 """Run commands on a disk that fails at one call after the other. Started with the library of `disk.c` preloaded.
 
 Arguments: folder to work in, folder of the files to start from, number of faults a command (0: at every call), commands as
-JSON. Each command runs in a child of its own, on a fresh copy of the files. Prints one JSON line a fault: command, call,
-error, whether it is the only one, exit code or minus the signal, what was printed as error, and the names of the files left.
+JSON. Then all writes are short once, which is no fault. Each command runs in a child of its own, on a fresh copy of the
+files. Prints one JSON line a fault: command, call, error, whether it is the only one, exit code or minus the signal, what
+was printed as error, and the names of the files left.
 The children come from a parent that has run no kernel, since threads do not survive a fork.
 """
 
@@ -35,6 +36,7 @@ with contextlib.suppress(ImportError):
 
 DISK = ctypes.CDLL(None)
 ERRORS = (errno.EIO, errno.ENOSPC)
+SHORT = 0
 
 
 def run(command: list[str], work: Path, source: Path, call: int, error: int, once: bool) -> dict[str, object]:
@@ -83,6 +85,9 @@ def main_loop() -> None:
             found = run(command, work, source, call, ERRORS[number % 2], bool(number % 3))
             found["intact"] = intact(work / "files", source)
             print(json.dumps(found), flush=True)
+        found = run(command, work, source, 0, SHORT, False)
+        found["intact"] = intact(work / "files", source)
+        print(json.dumps(found), flush=True)
 
 
 def intact(folder: Path, source: Path) -> list[str]:

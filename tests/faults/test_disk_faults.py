@@ -6,6 +6,7 @@ import shutil
 from pathlib import Path
 
 import disk_faults
+import feature_cases
 import pytest
 
 COMMANDS = [
@@ -19,6 +20,7 @@ COMMANDS = [
     ["mesh", "half-spheres", "--size", "10", "-o", "new.msh", "-q"],
     ["cases", "--copy", "forma04a", "-o", "copy.toml", "-q"],
 ]
+HISTORIES = ("plastic with friction", "rubber", "heat of friction", "cohesive layer", "fluid", "modes")
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +42,12 @@ def source(solved_case: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def of_histories(folder: Path) -> list[list[str]]:
+    """Write the cases of bodies and interfaces with a history, and return the commands that run them."""
+    cases = [feature_cases.written(name, folder).name for name in HISTORIES]
+    return [["run", case, "-o", "new.vtkhdf", "-q", "--json", "new.json"] for case in cases]
+
+
 def check(library: Path, source: Path, folder: Path, commands: list[list[str]], count: int) -> None:
     faults = disk_faults.found(library, folder, source, commands, count)
     assert len(faults) > 2 * len(commands)
@@ -55,3 +63,11 @@ def test_a_disk_that_fails_ends_a_command_with_one_line(library, source, tmp_pat
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda command: "-".join(command[:1] + command[-2:]))
 def test_every_call_that_fails_ends_a_command_with_one_line(command, library, source, tmp_path):
     check(library, source, tmp_path, [command], 0)
+
+
+@pytest.mark.parametrize("count", [2, pytest.param(30, marks=pytest.mark.slow)])
+def test_a_disk_that_fails_under_a_history(count, library, tmp_path):
+    """The first and the last call while a plastic body is solved; at all times the six cases."""
+    (folder := tmp_path / "source").mkdir()
+    commands = of_histories(folder)
+    check(library, folder, tmp_path / "work", commands if count > 2 else commands[:1], count)

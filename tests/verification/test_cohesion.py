@@ -158,6 +158,7 @@ def test_what_is_refused():
         ({"law": {"strength": -1.0}}, "must be positive"),
         ({"law": {"stiffness": 50.0}}, "must be above 100"),
         ({"law": {"toughness": 1.0}}, "toughness"),
+        ({"law": {"initiation": "none"}}, "unknown initiation in the cohesion of contact 'glue' 'none'"),
         ({"friction": 0.3}, "friction"),
         ({"kind": "tied"}, "kind"),
         ({"adhesion": {"work": 1.0, "strength": 1.0}}, "adhesion"),

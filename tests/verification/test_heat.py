@@ -1,5 +1,7 @@
 """Steady heat: exact solutions, rates of convergence, conductance of contacts, exchange with contact and friction."""
 
+import itertools
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -394,6 +396,12 @@ def test_what_cannot_be_is_refused_by_its_name():
     model.add_temperature(3.0)
     with refused(fc.errors.ModelError, match="both given by add_temperature and conducted"):
         model.check()
+    model = fc.Model(model.mesh, "plane_strain")
+    for group, expansion in (("UPPER", 1.0), ("LOWER", None)):
+        model.add_material(fc.LinearElastic(E=1.0, nu=0.3, conductivity=1.0, expansion=expansion), group)
+    model.fix_temperature("UPPER_TOP", 1.0)
+    with refused(fc.errors.ModelError, match="heat expands some materials, but that with"):
+        joined(model, conductance=2.0).check()
     model = bar(conductivity=1.0)
     for wrong in ("much", [(1.0, 2.0), (0.0, 3.0)], {"force": [(0.0, 1.0)]}, [(0.0, -1.0)]):
         with refused(fc.errors.ContactError, match="conductance of contact 'c' must be a number, a function"):
@@ -421,6 +429,16 @@ def test_functions_that_are_no_conductance_and_bodies_that_no_heat_reaches():
     model.fix_temperature("UPPER_TOP", 1.0)
     with pytest.raises(fc.errors.ContactError, match="must return a number from zero on"):
         fc.solve(model, 1)
+    model = joined(bar(conductivity=1.0), conductance=lambda p, g: p["force"])
+    model.fix_temperature("UPPER_TOP", 1.0)
+    with pytest.raises(fc.errors.ContactError, match="the conductance of contact 'c' fails: IndexError"):
+        fc.solve(model, 1)
+    numbers = itertools.cycle((0.1, 10.0))
+    model = joined(bar(conductivity=1.0, expansion=1e-3), conductance=lambda p, g: next(numbers))
+    model.fix_temperature("UPPER_TOP", 1.0)
+    model.fix_temperature("LOWER_BOTTOM", 0.0)
+    with pytest.raises(fc.errors.ConvergenceError, match="heat and contact do not settle: after 60 times"):
+        fc.solve(model, 1, criteria=fc.Criteria(max_halvings=0))
     model = joined(bar(conductivity=1.0), conductance=5.0, clearance=0.1)
     model.fix_temperature("UPPER_TOP", 1.0)
     with pytest.raises(fc.errors.ConvergenceError, match="no heat reaches body 'LOWER'"):

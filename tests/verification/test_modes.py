@@ -283,11 +283,21 @@ def test_a_case_file_asks_for_modes(tmp_path, capsys):
     assert "modes.m" in capsys.readouterr().err
 
 
+def pressed_column(divisions):
+    """A column under more than Euler's load, and its step."""
+    model = model_of(block((1.0, 0.1), divisions), "plane_stress")
+    model.fix("LEFT", "xy")
+    model.add_pressure("RIGHT", 0.01)
+    return model, fc.solve(model, 1)[0]
+
+
 def test_what_is_refused():
     model = model_of(block((1.0, 0.1), (10, 1)), "plane_stress")
+    column, other = pressed_column((41, 2))
     for call, said in (
         (lambda: fc.modes(model, n=0), "ask for one or more"),
         (lambda: fc.modes(model, n=44), "modes of 44 free displacements"),
+        (lambda: fc.modes(model, other), "displacements of shape .126, 2., but the mesh points of shape .22, 2."),
         (lambda: fc.modes(model, n=2, linear_solver="nothing"), "nothing"),
     ):
         with pytest.raises(fc.ModelError, match=said):
@@ -295,10 +305,7 @@ def test_what_is_refused():
     bare = elastic_model(model.mesh, "plane_stress", E=1.0, nu=0.0)
     with pytest.raises(fc.ModelError, match="10 solid cells have none: give them density"):
         fc.modes(bare)
-    # A column under more than Euler's load.
-    model.fix("LEFT", "xy")
-    model.add_pressure("RIGHT", 0.01)
-    (step,) = fc.solve(model, 1)
-    with pytest.raises(fc.ModelError, match="the settled step is not stable"):
-        fc.modes(model, step)
-    assert fc.modes(model, step, 1, stress_stiffening=False).frequencies[0] > 0.0
+    for model, step in (pressed_column((10, 1)), (column, other)):  # all modes at once, and by iterations
+        with pytest.raises(fc.ModelError, match="the settled step is not stable"):
+            fc.modes(model, step)
+        assert fc.modes(model, step, 1, stress_stiffening=False).frequencies[0] > 0.0

@@ -367,13 +367,13 @@ def assembled(content: Content) -> Assembled:
             if kind is not None:
                 counts[kind.element] += 1
             elements[number] = Element(scope, number, cell, kind, points, row)
-    made.points = np.concatenate(places)
+    made.points = np.concatenate(places) if len(places) > 1 else places[0]
     return made
 
 
 def _placed(part: Part, instance: Instance | None) -> Array:
     """Return the coordinates (n, 3) of the nodes of a part in the assembly [length]."""
-    points = np.array(part.coordinates).reshape(-1, 3)
+    points = np.asarray(part.coordinates).reshape(-1, 3)
     if instance is None:
         return points
     points = points + np.array(instance.translation)

@@ -100,7 +100,7 @@ class Building:
             self.gap_ends.update(add_gap(self.model, self.found, gap, conditions))
         self.ramp = self._ramp(conditions)
 
-    def _mechanics(self, conditions: Conditions, groups: list[tuple[str, Table]]) -> None:
+    def _mechanics(self, conditions: Conditions, groups: list[tuple[str, Any, Table]]) -> None:
         """Add supports, relations, loads, temperatures and springs to the model."""
         self._supports(conditions)
         self.links += relations_of(self.found, self.model.mesh)
@@ -197,24 +197,23 @@ class Building:
                 raise pair.location.refuse(f"the pair {pair.name} stands there twice")
             seen.add(folded(pair.name))
 
-    def _groups(self, conditions: Conditions) -> list[tuple[str, Table]]:
-        """Make groups of the facets with the same history of pressure; return them."""
-        by_table: dict[tuple[str, Table], list[Any]] = {}
+    def _groups(self, conditions: Conditions) -> list[tuple[str, Any, Table]]:
+        """Make groups of the facets whose pressures change alike; return them with their values and histories."""
+        alike = ByShape[tuple[str, str]]()
         for table, names in conditions.loads.alike():
-            for name in names:
-                if name.face is not None:
-                    by_table.setdefault((name.keyword, table), []).append(name.face)
-        return [
-            (self.found.add_facets(f"pressure {number}", faces), table)
-            for number, ((_, table), faces) in enumerate(by_table.items(), start=1)
-        ]
+            for name in (name for name in names if name.face is not None):
+                for cell, rows in self.found.facet_rows([name.face]).items():
+                    alike.add((name.keyword, cell), table, rows)
+        loads = [(f"pressure {number}", *load) for number, load in enumerate(alike, start=1)]
+        self.found.groups |= {group: {cell: rows.tolist()} for group, (_, cell), rows, _, _ in loads}
+        return [(group, value, table) for group, _, _, value, table in loads]
 
     def _point_group(self, kind: str, points: Iterable[int]) -> str:
         """Return the name of a group of points of the mesh, which is made where there is none."""
         before = len(self.found.point_groups)
         name = self.found.add_points(f"{kind} {before}", points)
         if name not in self.model.mesh.point_groups:
-            self.model.mesh = self.model.mesh.with_groups(points={name: sorted(set(points))})
+            self.model.mesh = self.model.mesh.with_groups(points={name: self.found.point_groups[name]})
         return name
 
     def _supports(self, conditions: Conditions) -> None:
@@ -287,10 +286,10 @@ class Building:
                 group = self._point_group("force", points)
                 self.model.add_force(group, distribute=False, ramp=table, **{"xyz"[axis]: value})
 
-    def _pressures(self, groups: list[tuple[str, Table]]) -> None:
-        for group, table in groups:
-            if any(value for _, value in table):
-                self.model.add_pressure(group, 1.0, ramp=table)
+    def _pressures(self, groups: list[tuple[str, Any, Table]]) -> None:
+        for group, value, table in groups:
+            if any(factor for _, factor in table):
+                self.model.add_pressure(group, value, ramp=table)
 
     def _body_forces(self, conditions: Conditions) -> None:
         alike = ByShape[tuple[str, tuple[float, ...], str]]()

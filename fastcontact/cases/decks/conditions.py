@@ -10,7 +10,7 @@ from fastcontact.cases.decks.assembled import Element, Face
 from fastcontact.cases.decks.blocks import Location, Row
 from fastcontact.cases.decks.content import Given
 from fastcontact.cases.decks.heat import OF_HEAT, HeatConditions
-from fastcontact.cases.decks.histories import Histories, Values
+from fastcontact.cases.decks.histories import Histories
 from fastcontact.cases.decks.local_axes import local_directions
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.cases.decks.pretension import Locks
@@ -44,6 +44,9 @@ class Acting:
     keeps: bool = False
 
 
+ALWAYS = Acting(None, 0.0)
+
+
 class Conditions:
     """Supports and loads of a deck with their histories."""
 
@@ -56,7 +59,7 @@ class Conditions:
         self.loads: Histories[Distributed] = Histories(content)
         initial = initial_temperatures(self.made, content.initial)
         self.temperatures: Histories[int] = Histories(content, rest=initial)
-        self.acting: dict[Component, Acting] = {}
+        self.acting: dict[Component, Acting] = {}  # where a support acts, if not from the start on
         self.over: list[tuple[Component, Acting]] = []
         self.keeping: set[Component] = set()
         self.heat = HeatConditions(mesh, initial)
@@ -70,7 +73,7 @@ class Conditions:
             self._supports(given, before=True)
         self.supports.begin()
         self.heat.temperatures.begin()
-        self._act(self.supports.first, 0.0)
+        self.acting.update((name, replace(ALWAYS, keeps=True)) for name in self.keeping)
         for number, step in enumerate(content.steps, start=1):
             self.locks.begin(number, [g for g in step.given if g.block.keyword == "BOUNDARY"], self.made)
             for given in step.given:
@@ -93,25 +96,22 @@ class Conditions:
 
     def _change(self, number: int) -> None:
         """Take note of the supports that come and go at the beginning of step `number`."""
-        changing = self.supports.changing
-        gone = [name for name in self.supports.dying if name in self.acting]
-        moved = [
-            name for name in changing if name in self.acting and self.acting[name].keeps and name not in self.keeping
-        ]
-        for name in gone + moved:
-            self.over.append((name, replace(self.acting.pop(name), ends=number - 1.0)))
-        self._act(changing, number - 1.0)
+        begin, changing = number - 1.0, self.supports.changing
+        kept = (name for name in self.acting if name in changing and name not in self.keeping)
+        moved = dict.fromkeys(name for name in kept if self._acts(name) and self.acting[name].keeps)
+        for name in (*self.supports.dying, *moved):
+            self.over.append((name, replace(self.acting.pop(name, ALWAYS), ends=begin)))
+        begun: dict[tuple[Location | None, bool], Acting] = {}
+        for name in changing:
+            if name in moved or not self._acts(name):
+                key = changing.get(name)[2] if begin else None, name in self.keeping
+                self.acting[name] = begun.setdefault(key, Acting(key[0], begin, keeps=key[1]))
         self.keeping.clear()
 
-    def _act(self, values: Values[Component], begin: float) -> None:
-        """Let supports act from the beginning of a step on, where they do not yet."""
-        begun: dict[tuple[Location | None, bool], Acting] = {}
-        for name in values:
-            if name not in self.acting:
-                key = values.get(name)[2] if begin else None, name in self.keeping
-                if key not in begun:
-                    begun[key] = Acting(key[0], begin, keeps=key[1])
-                self.acting[name] = begun[key]
+    def _acts(self, name: Component) -> bool:
+        """Whether the steps so far have left a support in place."""
+        track = self.supports.tracks.get(name)
+        return track is not None and track.alive
 
     def temporary(self) -> list[tuple[Component, Acting]]:
         """Return the supports that do not act in all steps, each with when it does."""
@@ -167,7 +167,7 @@ class Conditions:
             name, sign = self._local(point, component)
         if "FIXED" in given.block.parameters:
             self.keeping.add(name)
-            if name in self.acting:
+            if self._acts(name):
                 self.supports.hold(name, row.location)
                 return
         self.supports.give(name, sign * value, given.amplitude, row.location)

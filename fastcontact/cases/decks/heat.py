@@ -310,19 +310,19 @@ class HeatConditions:
             powers = tuple((time, power / thickness) for time, power in table)
             made.append(partial(Model.add_nodal_heat, group=group, value=value, ramp=powers))
         sources = ByShape[str]()
-        on_faces: dict[tuple[str, Table], list[Face]] = {}
+        on_faces = ByShape[tuple[str, str]]()
         for table, fluxes in self.fluxes.alike():
             for flux in fluxes:
-                if flux.face is not None:
-                    on_faces.setdefault((flux.keyword, table), []).append(flux.face)
+                for cell, rows in found.facet_rows([flux.face] if flux.face else []).items():
+                    on_faces.add((flux.keyword, cell), table, rows)
                 for cell, rows in rows_by_type(flux.elements).items():
                     sources.add(cell, table, rows)
         for cell, rows, value, table in sources:
-            found.groups[group := f"heat source {len(made)}"] = {cell: rows}
+            found.groups[group := f"heat source {len(made)}"] = {cell: rows.tolist()}
             made.append(partial(Model.add_heat_source, value=value, groups=group, ramp=table))
-        for (keyword, table), faces in on_faces.items():
-            group = found.add_facets(f"{keyword.lower()} {len(made)}", faces)
-            made.append(partial(Model.add_heat_flux, group=group, value=1.0, ramp=table))
+        for (keyword, cell), rows, value, table in on_faces:
+            found.groups[group := f"{keyword.lower()} {len(made)}"] = {cell: rows.tolist()}
+            made.append(partial(Model.add_heat_flux, group=group, value=value, ramp=table))
         blown: dict[tuple[Table, float, tuple[float, float]], list[Face]] = {}
         for table, films in self.films.alike():
             for span, members in self.blown.of(films).items():

@@ -11,7 +11,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from fastcontact.arrays import AnyArray, Array
+from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.cases.decks.blocks import Location, folded
 from fastcontact.cases.decks.content import Amplitude, Content, Step
 from fastcontact.model.ramp import Table
@@ -70,6 +70,8 @@ class Values(Generic[Name]):
     lines: array[int] = field(default_factory=lambda: array("q"))
     origins: array[int] = field(default_factory=lambda: array("q"))
     blocks: list[tuple[str, Location]] = field(default_factory=list)  # amplitude, and a line of the block
+    last: tuple[float, int, int] | None = None
+    row: int = 0
 
     def __contains__(self, name: object) -> bool:
         return name in self.rows
@@ -82,10 +84,13 @@ class Values(Generic[Name]):
         block = self.blocks[-1] if self.blocks else None
         if block is None or (amplitude, location.file, location.keyword) != (block[0], block[1].file, block[1].keyword):
             self.blocks.append((amplitude, location))
-        self.rows[name] = len(self.values)
-        self.values.append(value)
-        self.lines.append(location.line)
-        self.origins.append(len(self.blocks) - 1)
+        line = value, location.line, len(self.blocks) - 1
+        if line != self.last:  # names of one line share its row
+            self.last, self.row = line, len(self.values)
+            self.values.append(value)
+            self.lines.append(location.line)
+            self.origins.append(len(self.blocks) - 1)
+        self.rows[name] = self.row
 
     def get(self, name: Name) -> tuple[float, str, Location]:
         """Return the value for a name, its amplitude and its place."""
@@ -167,11 +172,11 @@ class Histories(Generic[Name]):
         if given is self.first:
             given.update(self.changing)
         names = [*given, *self.dying]
-        rests = np.array([self.rest.get(name, 0.0) for name in names])
+        rests = np.fromiter((self.rest.get(name, 0.0) for name in names), float, len(names))
         values, amplitudes = given.columns()
         alive = np.arange(len(names)) < len(values)
         values, amplitudes = np.append(values, rests[len(values) :]), [*amplitudes, *[""] * len(self.dying)]
-        shared = np.array([id(self.tracks.get(name)) for name in names])
+        shared = np.fromiter((id(self.tracks.get(name)) for name in names), np.intp, len(names))
         changed = set()
         for rows in _equal(shared, values, np.array(amplitudes), rests, alive):
             value, amplitude = float(values[rows[0]]), amplitudes[rows[0]]
@@ -223,7 +228,7 @@ class Histories(Generic[Name]):
             yield self.table(names[0]), names
 
 
-def _equal(*columns: AnyArray) -> Iterator[list[int]]:
+def _equal(*columns: AnyArray) -> Iterator[Indices]:
     """Yield the rows in which columns (n,) have the same entries, in the order of the first ones."""
     order = np.lexsort(columns)
     differs = np.zeros(max(len(order) - 1, 0), bool)
@@ -232,7 +237,7 @@ def _equal(*columns: AnyArray) -> Iterator[list[int]]:
         differs |= ascending[1:] != ascending[:-1]
     bounds = np.array([0, *(np.flatnonzero(differs) + 1), len(order)])[len(order) == 0 :]
     for group in np.argsort(order[bounds[:-1]]):
-        yield order[bounds[group] : bounds[group + 1]].tolist()
+        yield order[bounds[group] : bounds[group + 1]]
 
 
 def shape_of(table: Table) -> tuple[float, Table]:
@@ -266,13 +271,13 @@ class ByShape(Generic[Name]):
             made.add(0, table, points)
         return made
 
-    def __iter__(self) -> Iterator[tuple[Name, list[int], Any, Table]]:
+    def __iter__(self) -> Iterator[tuple[Name, Indices, Any, Table]]:
         for (axis, shape), (table, sizes, members) in self._members.items():
             points, which = np.unique(members, return_inverse=True)
             if len(points) == len(members) and min(sizes) == max(sizes):
-                yield axis, list(members), 1.0, table
+                yield axis, np.asarray(members), 1.0, table
             else:  # what acts twice on a point adds up
-                yield axis, points.tolist(), partial(given_values, np.bincount(which, sizes).astype(float)), shape
+                yield axis, points, partial(given_values, np.bincount(which, sizes).astype(float)), shape
 
 
 def given_values(values: Array, positions: Array) -> Array:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from fastcontact.arrays import Indices
 from fastcontact.cases.decks.assembled import Assembled, Element, Face, facet_points
 from fastcontact.cases.decks.blocks import Location, folded
 from fastcontact.cases.decks.content import SurfaceDefinition
@@ -33,7 +34,8 @@ class DeckMesh:
         Facets by element, each once.
     groups : dict of str to dict of str to list of int
         Groups of cells, as rows by element.
-    point_groups : dict of str to list of int
+    point_groups : dict of str to ndarray (n,) of int
+        Ascending.
     loose : dict of str to list of int
         By group of facets around nodes that make up no whole faces, the points that are none of these.
     """
@@ -43,25 +45,28 @@ class DeckMesh:
     dim: int
     rotations: dict[int, int] = field(default_factory=dict)
     facets: dict[str, list[tuple[int, ...]]] = field(default_factory=dict)
-    rows: dict[frozenset[int], tuple[str, int]] = field(default_factory=dict)
+    rows: dict[tuple[int, ...], int] = field(default_factory=dict)
     groups: dict[str, dict[str, list[int]]] = field(default_factory=dict)
-    point_groups: dict[str, list[int]] = field(default_factory=dict)
+    point_groups: dict[str, Indices] = field(default_factory=dict)
     loose: dict[str, list[int]] = field(default_factory=dict)
 
     def add_facets(self, group: str, faces: Iterable[Face]) -> str:
         """Make a group of facets, given by element and place among its facets; return its name."""
+        self.groups[group] = self.facet_rows(faces)
+        return group
+
+    def facet_rows(self, faces: Iterable[Face]) -> dict[str, list[int]]:
+        """Return the rows of facets by their type, those that are new made."""
         members: dict[str, list[int]] = {}
         for face in faces:
             points = facet_points(*face)
-            if frozenset(points) not in self.rows:
-                name = FACETS[self.dim][len(points)]
-                block = self.facets.setdefault(name, [])
-                self.rows[frozenset(points)] = (name, len(block))
+            name = FACETS[self.dim][len(points)]
+            block = self.facets.setdefault(name, [])
+            row = self.rows.setdefault(tuple(sorted(points)), len(block))
+            if row == len(block):
                 block.append(points)
-            name, row = self.rows[frozenset(points)]
             members.setdefault(name, []).append(row)
-        self.groups[group] = members
-        return group
+        return members
 
     def add_solids(self, group: str, chosen: Iterable[Element]) -> str:
         """Make a group of solids; return its name."""
@@ -70,9 +75,9 @@ class DeckMesh:
 
     def add_points(self, group: str, points: Iterable[int]) -> str:
         """Make a group of points, or find the group that holds the same ones; return its name."""
-        wanted = sorted(set(points))
+        wanted = ascending(points)
         for name, members in self.point_groups.items():
-            if len(members) == len(wanted) and members == wanted:
+            if np.array_equal(members, wanted):
                 return name
         self.point_groups[group] = wanted
         return group
@@ -95,12 +100,16 @@ class DeckMesh:
             for group, members in self.groups.items()
         }
         points = self.made.points[:, : self.dim]
-        points_of = {name: np.array(members) for name, members in self.point_groups.items()}
-        mesh = Mesh(points, cells, groups, points_of)
+        mesh = Mesh(points, cells, groups, self.point_groups)
         mesh, turned = topology.oriented(mesh)
         if turned:
             self.made.content.notes.append(f"{turned} elements were inside out and are turned")
         return mesh
+
+
+def ascending(points: Iterable[int]) -> Indices:
+    """Return points (n,), each once."""
+    return np.unique(points if isinstance(points, np.ndarray) else np.fromiter(points, np.intp))
 
 
 def rows_by_type(chosen: Iterable[Element]) -> dict[str, list[int]]:
@@ -147,7 +156,7 @@ def _name_sets(deck_mesh: DeckMesh) -> None:
         prefix = f"{made.content.instances[scope].name}." if scope else ""
         for name, members in part.node_sets.items():
             points = made.members_of("node", scope, name, members[0].location) if members else []
-            deck_mesh.point_groups[prefix + part.set_names[name]] = sorted(set(points))
+            deck_mesh.point_groups[prefix + part.set_names[name]] = ascending(points)
         for name, definition in part.surfaces.items():
             if definition.of_nodes and definition.faces:
                 _name_nodes(deck_mesh, prefix + definition.name, definition, scope)

@@ -6,10 +6,11 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import Assembled
 from fastcontact.cases.decks.blocks import Block, Row
 from fastcontact.cases.decks.content import Content, Given, Material
-from fastcontact.cases.decks.histories import Histories, shape_of
+from fastcontact.cases.decks.histories import ByShape, Histories
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
 
@@ -87,35 +88,29 @@ def _of_row(made: Assembled, block: Block, row: Row) -> list[tuple[int, float]]:
 
 def add_temperatures(model: Model, histories: Histories[int]) -> None:
     """Add the rises over the initial temperatures to a model, as few fields as the histories allow."""
-    rises = [
-        (tuple((time, value - table[0][1]) for time, value in table), points) for table, points in histories.alike()
-    ]
-    by_shape: dict[Table, list[tuple[int, float]]] = {}
-    for table, points in rises:
-        size, shape = shape_of(table)
-        if size:
-            by_shape.setdefault(shape, []).extend((point, size) for point in points)
-    times = sorted({time for table, _ in rises for time, _ in table})
-    if len(by_shape) <= len(times):
-        for shape, members in by_shape.items():
-            _add(model, members, shape)
+    fields = list(ByShape.of((_rise(table), points) for table, points in histories.alike()))
+    times = sorted({time for *_, table in fields for time, _ in table})
+    if len(fields) <= len(times):
+        for _, points, sizes, table in fields:
+            rises = np.zeros(model.mesh.n_points)
+            rises[points] = sizes(points) if callable(sizes) else sizes
+            _add(model, rises, table)
         return
     for k, time in enumerate(times):  # histories that differ from node to node: one field for each corner of them
         around = sorted({times[0], *times[max(k - 1, 0) : k + 2], times[-1]})
-        hat = tuple((other, float(other == time)) for other in around)
-        _add(model, [(point, value) for table, points in rises if (value := _at(table, time)) for point in points], hat)
+        rises = np.zeros(model.mesh.n_points)
+        for _, points, sizes, table in fields:
+            factor = np.interp(time, *zip(*table, strict=True))
+            rises[points] = factor * (sizes(points) if callable(sizes) else sizes)
+        _add(model, rises, tuple((other, float(other == time)) for other in around))
 
 
-def _at(table: Table, time: float) -> float:
-    times, values = zip(*table, strict=True)
-    return float(np.interp(time, times, values))
+def _rise(table: Table) -> Table:
+    return tuple((time, value - table[0][1]) for time, value in table)
 
 
-def _add(model: Model, members: list[tuple[int, float]], ramp: Table) -> None:
-    if members:
-        values = np.zeros(model.mesh.n_points)
-        points, rises = zip(*members, strict=True)
-        values[list(points)] = rises
-        for section in model.pretensions:  # whose opposite nodes the deck does not know
-            values[section.opposite] = values[section.nodes]
-        model.add_temperature(values, ramp=ramp)
+def _add(model: Model, rises: Array, ramp: Table) -> None:
+    for section in model.pretensions:  # whose opposite nodes the deck does not know
+        rises[section.opposite] = rises[section.nodes]
+    if rises.any() and any(factor for _, factor in ramp):
+        model.add_temperature(rises, ramp=ramp)

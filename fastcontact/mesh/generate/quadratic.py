@@ -65,6 +65,8 @@ class Circle:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.radius) and self.radius > 0.0):
             raise MeshError(f"radius = {self.radius} is out of range: it must be greater than 0")
+        if not np.isfinite(self.centre).all():
+            raise MeshError(f"centre = {self.centre} is out of range: it must be two finite numbers")
 
     def project(self, points: Array) -> Array:
         """Return the points (n, 2) [length] of the circle nearest to `points` (n, 2) [length]."""

@@ -138,6 +138,9 @@ def test_entries_are_right(tmp_path):
         assert read_case(path).name == kind
 
 
+BLOCKS = {"generator": "block-on-block"}
+
+
 @pytest.mark.parametrize(
     ("study", "said"),
     [
@@ -147,6 +150,19 @@ def test_entries_are_right(tmp_path):
         ({"combinations": [["quad8"]]}, "study.combinations"),
         ({"options": {"mortal": {}}}, "unknown formulation in study.options 'mortal'"),
         ({"contact": "none"}, "unknown contact pair in study.contact 'none'"),
+        ({"load_steps": 0}, "load steps must be a positive whole number, not 0"),
+        (
+            {**BLOCKS, "quadrangles": {"size_upper": [math.nan, 1.0]}},
+            r"study.quadrangles.size_upper\[0\] = nan must be",
+        ),
+        ({**BLOCKS, "quadrangles": {"size_upper": [-1.0, 1.0]}}, "quad4 mortar: .*size_upper"),
+        ({"options": {"mortar": {"normals": "none"}}}, "contact.pair: unknown kind of normals 'none'"),
+        ({"options": {"mortar": {"no_option": 1}}}, "contact.pair: unknown option of mortar 'no_option'"),
+        ({"parameters": {"p": {"support[0].y": "value+1"}}}, "study.parameters.p.'support.0..y' = 'value.1' must be"),
+        ({"parameters": {"p": {"support[7].y": "value"}}}, "asks for entry .7."),
+        ({"quantities": ["P.nothing"]}, "unknown quantity 'P.nothing'"),
+        ({"double": ["nothing"]}, "unknown argument of the generator block-on-block in .study. 'nothing'"),
+        ({"curves": [{"centre": [0.0, math.inf], "radius": 1.0}]}, "centre = .* must be two finite numbers"),
     ],
 )
 def test_a_wrong_study_stops_a_run(study, said, tmp_path, capsys):

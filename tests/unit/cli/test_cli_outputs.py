@@ -80,6 +80,26 @@ def test_two_outputs_need_two_files(name, files, monkeypatch, capsys):
     assert not Path("both.png").exists()
 
 
+def test_a_folder_that_is_mounted_twice_is_one(files):
+    """No link and no other path tells a bind mount."""
+    other, mounting = (
+        files.parent / "other",
+        ["unshare", "-rm", "sh", "-c", 'mount --bind files other && exec "$@"', "sh"],
+    )
+    other.mkdir()
+    if (
+        not shutil.which("unshare")
+        or subprocess.run([*mounting, "true"], cwd=files.parent, capture_output=True).returncode
+    ):
+        pytest.skip("needs mounts of one's own")
+    profile = [*mounting, sys.executable, "-m", "fastcontact", "profile", "files/old.vtkhdf", "--csv"]
+    for outputs in (["files/a.csv", "--agr", "other/a.csv"], ["other/old.vtkhdf"]):
+        done = subprocess.run([*profile, *outputs], cwd=files.parent, capture_output=True, text=True)
+        assert (done.returncode, done.stderr.count("\n")) == (1, 1)
+        assert "two outputs" in done.stderr or "is what this command reads" in done.stderr
+    assert not (files / "a.csv").exists()
+
+
 def test_every_option_that_names_a_file_is_tried_here() -> None:
     """A new output must come under the rule, too: this test names it until it does."""
     reads = {("bench", "--compare"), ("cases", "--output")}  # a copy replaces nothing

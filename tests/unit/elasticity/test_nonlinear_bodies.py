@@ -145,6 +145,15 @@ def test_initial_states_are_refused() -> None:
         fc.solve(model, 1)
 
 
+def test_a_body_pressed_to_nothing_says_where() -> None:
+    model = fc.Model(fc.generate.block((4.0, 1.0), (4, 1)), "plane_strain", strain="finite")
+    model.add_material(fc.NeoHookean(E=100.0, nu=0.3))
+    model.fix("BOTTOM", "xy")
+    model.prescribe("TOP", x=0.0, y=-1.2)
+    with pytest.raises(fc.ConvergenceError, match=r"cell \d of quad4 near \[.*\] turns inside out .J = -"):
+        fc.solve(model, 1, criteria=fc.Criteria(max_halvings=0))
+
+
 @pytest.mark.parametrize("law", [name for name, (_, strain) in LAWS.items() if strain == "finite"])
 @pytest.mark.parametrize(
     ("kinematics", "element"), [("plane_strain", "quad4"), ("axisymmetric", "tri6"), ("3d", "hex8")]

@@ -185,6 +185,7 @@ def test_a_static_step_before_and_heat_of_friction_by_time(tmp_path):
         ("*GAP CONDUCTANCE\n1000.\n", "*GAP CONDUCTANCE\n1000., 0., 20.\n2000., 1., 50.\n", r"depends on the temperature"),
         ("*GAP CONDUCTANCE\n1000.\n", "*GAP CONDUCTANCE\n1000., 1.\n2000., 1.\n", r"\*GAP CONDUCTANCE: .* ascend"),
         ("*GAP CONDUCTANCE\n1000.\n", "*GAP CONDUCTANCE\n-1000.\n", r"\*GAP CONDUCTANCE: the conductance -1000"),
+        ("1000.\n", "1000.\n*GAP CONDUCTANCE\n1000., 0.\n2000., 1.\n", r"one conductance, and a table besides"),
         ("NAME=I\n", "NAME=I\n*GAP HEAT GENERATION\n1., 0.3\n", r"only half of it"),
         ("NAME=I\n", "NAME=I\n*GAP HEAT GENERATION\n1., 0.5, 3.\n", r"a given velocity is not supported"),
         ("HEAT TRANSFER, STEADY STATE", "STATIC", r"line 7, .*component 11|conduct heat alone"),

@@ -132,6 +132,12 @@ MATERIALS = {
         before("*Material", "*Orientation, name=o\n"),
         "a data line with six coordinates is nee",
     ),
+    "orientation twice": (
+        before(
+            "*Material", "*Orientation, name=o\n1., 0., 0., 0., 1., 0.\n*Orientation, name=O\n0., 1., 0., 0., 0., 1.\n"
+        ),
+        "orientation 'O' is defined twice, first in line",
+    ),
     "orientation with an origin": (
         before("*Material", "*Orientation, name=o\n1., 0., 0., 0., 1., 0., 0., 0., 1.\n"),
         "an origin of the axes is not supported",

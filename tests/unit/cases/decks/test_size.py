@@ -52,17 +52,30 @@ LINES = {
 }
 
 
+def check_size(folder, small, text, count):
+    """Bytes at the peak of reading a deck with so many cells."""
+    deck_of(folder, small)  # imports
+    tracemalloc.start()
+    deck = deck_of(folder, text)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert len(deck.model.mesh.cells["hex8"]) == count
+    assert peak < 20 * len(text), f"{peak / len(text):.1f} bytes a byte"
+
+
 @pytest.mark.parametrize("kind", LINES)
 def test_twenty_bytes_a_byte(kind, tmp_path):
     old, new = LINES[kind]
-    text = block(16).replace(old, new(16)) if old else block(16)
-    deck_of(tmp_path, block(1).replace(old, new(1)) if old else block(1))  # imports
-    tracemalloc.start()
-    deck = deck_of(tmp_path, text)
-    _, peak = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert len(deck.model.mesh.cells["hex8"]) == 16**3
-    assert peak < 20 * len(text), f"{peak / len(text):.1f} bytes a byte"
+    small, large = (block(n).replace(old, new(n)) if old else block(n) for n in (1, 16))
+    check_size(tmp_path, small, large, 16**3)
+
+
+@pytest.mark.parametrize(
+    "load", ["*Cload\n{node}, 3, {cube}.", "*Dload\n{cube}, P2, {cube}.", "*Dload\n{cube}, P2, 1."]
+)
+def test_twenty_bytes_a_byte_of_lone_cubes(load, tmp_path):
+    small, large = (many_forces(n, *load.split("\n")) for n in (2, 1400))
+    check_size(tmp_path, small, large, 1400)
 
 
 def test_a_member_that_is_missing_is_told_by_its_line(tmp_path):
@@ -94,18 +107,18 @@ def many_steps(number):
     return NODES + MATERIAL + "*Mpc\nTIE, 11, 5\nTIE, 12, 6\nTIE, 13, 7\nTIE, 14, 8\n" + SUPPORTS + steps
 
 
-def many_forces(number):
-    """As many nodes with a force of their own: bars of single cubes, all held."""
+def many_forces(number, keyword="*Cload", load="{node}, 3, {cube}."):
+    """Single cubes, all held, each with a load of its own: by default as many nodes with a force."""
     nodes, cells, forces = [], [], []
     for k in range(number):
         first = 8 * k + 1
         nodes += [f"{first + n}, {2 * k + x}., {y}., {z}." for n, (x, y, z) in enumerate(CORNERS)]
         cells.append(f"{k + 1}, " + ", ".join(str(first + n) for n in range(8)))
-        forces += [f"{first + 4}, 3, {k + 1}."]
+        forces += [load.format(node=first + 4, cube=k + 1)]
     text = "*Node, nset=nall\n" + "\n".join(nodes) + "\n*Element, type=C3D8, elset=all\n" + "\n".join(cells)
     text += "\n*Material, name=s\n*Elastic\n1000., 0.\n*Solid section, elset=all, material=s\n*Boundary\n"
     text += "".join(f"{8 * k + n}, 1, 3\n" for k in range(number) for n in (1, 2, 3, 4))
-    return text + "*Step\n*Static\n*Cload\n" + "\n".join(forces) + "\n*End step\n"
+    return f"{text}*Step\n*Static\n{keyword}\n" + "\n".join(forces) + "\n*End step\n"
 
 
 CORNERS = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
@@ -130,6 +143,7 @@ def test_forces_and_displacements_of_their_own(tmp_path):
 
 
 TURNED = "*Transform, nset=seven\n1., 1., 0., -1., 1., 0.\n"
+TOP = "*Surface, name=top\n2, S2\n"
 # Loads of three cubes on each other's side, and what they add up to along x, or y.
 ADDED = {
     "of elements and a set": ("*Dload\n1, BX, 2.\n2, BX, 3.\nall, BX, 2.\n", 0, (4.0, 5.0, 2.0)),
@@ -137,6 +151,7 @@ ADDED = {
     "gravity": ("*Dload\n1, GRAV, 2., 3., 0., 0.\n2, GRAV, 6., 1., 0., 0.\n", 0, (20.0, 60.0, 0.0)),
     "centrifugal": ("*Dload\n" + "".join(f"{k}, CENTRIF, {k / 100}, 0., 0., 0., 0., 0., 1.\n" for k in (1, 2, 3)), 0,
                     (0.05, 0.5, 1.35)),
+    "on faces": ("*Dload\n1, P2, 2.\n2, P2, 3.\n3, P2, 5.\n*Dsload\ntop, P, 1.\n", 2, (-2.0, -4.0, -5.0)),
     "along local axes": ("*Cload\n7, 1, 1.\n7, 2, 1.\n", 1, (2.0**0.5, 0.0, 0.0)),
 }  # fmt: skip
 
@@ -146,7 +161,9 @@ ADDED = {
 def test_loads_on_the_same_add_up(kind, tmp_path):
     lines, axis, expected = ADDED[kind]
     head, _, _ = many_forces(3).partition("*Cload\n")
-    head = head.replace("*Elastic", "*Density\n10.\n*Elastic").replace("*Step", f"*Nset, nset=seven\n7\n{TURNED}*Step")
+    head = head.replace("*Elastic", "*Density\n10.\n*Elastic").replace(
+        "*Step", f"*Nset, nset=seven\n7\n{TURNED}{TOP}*Step"
+    )
     deck = deck_of(tmp_path, f"{head}{lines}*End step\n")
     (step,) = deck.solve()
     held = [[deck.point(8 * k + n) for n in (1, 2, 3, 4)] for k in range(3)]
