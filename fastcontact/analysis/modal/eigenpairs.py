@@ -23,7 +23,7 @@ from fastcontact.linear.protocol import LinearSolver
 # Error of vectors, to the square of which eigenvalues are right.
 ACCURACY = 1e-5
 UNSTABLE = (
-    "the settled step is not stable, small motions about it grow by themselves: where nodes slide, as round a tightened bolt, "
+    "the settled step is not stable, small motions grow by themselves: where nodes slide, as round a tightened bolt, "
     "hold them (hold_sliding=True); beyond a load that buckles take a lower one, or leave out the stiffness by stresses "
     "(stress_stiffening=False)"
 )
