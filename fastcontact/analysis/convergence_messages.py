@@ -118,10 +118,12 @@ def named_nodes(problem: Problem, nodes: Mapping[str, list[int]]) -> str:
 def _smoother(problem: Problem) -> str:
     """Return the advice for pairs that oscillate between facets at a node, supports of dual functions, branches of a law."""
     faceted = [name for name, pair in problem.pairs.items() if pair.normals == "facet" and len(pair.primary.points)]
-    torn = [name for name, pair in problem.pairs.items() if pair.options.cohesion is not None]
+    laws = {name: pair.options.cohesion for name, pair in problem.pairs.items() if pair.options.cohesion is not None}
+    reach = {name: 2.0 * law.energy / law.strength for name, law in laws.items() if law.reversible}
     dual = [name for name, pair in problem.pairs.items() if getattr(pair, "multipliers", "") == "dual"]
     options = {
         'normals="averaged"': faceted, 'multipliers="standard"': dual,
-        "facets shorter than what is partly torn off or only attracted": torn,
+        f"facets no longer than the reach of adhesion, {min(reach.values(), default=0.0):.3g},": list(reach),
+        "facets shorter than what is partly torn off": [name for name in laws if name not in reach],
     }  # fmt: skip
     return "".join(f"{option} for contact {names[0]!r}, " for option, names in options.items() if names)

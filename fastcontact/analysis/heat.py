@@ -45,6 +45,38 @@ class Temperatures:
 
 
 @dataclass(frozen=True, eq=False)
+class ThermalLoads:
+    """What loads and films exchange with the surroundings of the bodies.
+
+    Attributes
+    ----------
+    films : csr_array (n_points, n_points)
+        Matrix of all films [power / temperature].
+    powers, ambient : dict of ramp table to ndarray (n_points,)
+        By history, at multiplier 1: of loads, and of films by the rise of their surroundings [power].
+    """
+
+    films: csr_array
+    powers: ByRamp
+    ambient: ByRamp
+
+
+def thermal_loads(model: Model, displacement: Array | None = None) -> ThermalLoads:
+    """Return what loads and films of a model exchange, over areas and volumes at a displacement (n_points, dim) [length]."""
+    mesh, kinematics = model.mesh, model.kinematics
+    films = csr_array((mesh.n_points, mesh.n_points))
+    powers: dict[Table | None, Array] = {}
+    ambient: dict[Table | None, Array] = {}
+    for load in model.heat_loads:
+        if isinstance(load, Heating):
+            powers[load.ramp] = powers.get(load.ramp, 0.0) + load.power(mesh, kinematics, displacement)
+        elif isinstance(load, Film):
+            matrix, power = load.exchange(mesh, kinematics, model.reference_temperature, displacement)
+            films, ambient[load.ramp] = csr_array(films + matrix), ambient.get(load.ramp, 0.0) + power
+    return ThermalLoads(films, powers, ambient)
+
+
+@dataclass(frozen=True, eq=False)
 class Heat:
     """The conduction of heat of a model, prepared for analysis; temperatures are rises over the reference.
 
@@ -55,16 +87,18 @@ class Heat:
     criteria : Criteria
     conduction : Conduction
         In the reference configuration.
-    matrix, films : csr_array (n_points, n_points)
-        Of that conduction, and of films [power / temperature].
+    matrix : csr_array (n_points, n_points)
+        Of that conduction [power / temperature].
+    loads : ThermalLoads
+        Loads and films in that configuration.
     merged : csr_array (n_points, n_points)
         From the temperatures of nodes to those of all that have the same [-].
     body : ndarray of int (n_points,)
         Body of each node, -1 for none.
     fixed : ndarray of bool (n_points,)
         Merged nodes with a prescribed temperature.
-    prescribed, powers, ambient : dict of ramp table to ndarray (n_points,)
-        By history, at multiplier 1: rises [temperature], powers of loads, and of films by their surroundings [power].
+    prescribed : dict of ramp table to ndarray (n_points,)
+        By history, at multiplier 1: rises of prescribed temperatures [temperature].
     linear_solver : str
     linear_tolerance : float
     """
@@ -74,13 +108,11 @@ class Heat:
     criteria: Criteria
     conduction: Conduction
     matrix: csr_array
-    films: csr_array
+    loads: ThermalLoads
     merged: csr_array
     body: Numbers
     fixed: Mask
     prescribed: ByRamp
-    powers: ByRamp
-    ambient: ByRamp
     linear_solver: str
     linear_tolerance: float
 
@@ -127,13 +159,15 @@ class Heat:
             If a body is left alone by open contacts, so that nothing determines its temperature, or heat is not in balance.
         """
         n = (self.model.mesh.n_points,)
+        inner, outer = self.matrix, self.loads
+        if displacement is not None and self.finite:
+            inner, outer = self.conductors(displacement).matrix(), thermal_loads(self.model, displacement)
         rise, loads, ambient = (
-            combined(by_ramp, self.ramp, instant, n) for by_ramp in (self.prescribed, self.powers, self.ambient)
+            combined(by_ramp, self.ramp, instant, n) for by_ramp in (self.prescribed, outer.powers, outer.ambient)
         )
         rubbed = np.zeros(n) if friction is None else friction
-        inner = self.matrix if displacement is None or not self.finite else self.conductors(displacement).matrix()
         inner = inner if contact is None else csr_array(inner + contact)
-        films = self.films
+        films = outer.films
         if obstacles is not None:
             films, ambient = csr_array(films + obstacles[0]), ambient + obstacles[1]
         self._check_reached(contact, films)
@@ -189,19 +223,9 @@ def prepared_heat(
     """Return the heat of a model that was checked before; None where it conducts none."""
     if not model.conducts:
         return None
-    mesh, kinematics = model.mesh, model.kinematics
-    conduction, same = model.conduction(), model.same_temperature()
-    n, films = mesh.n_points, csr_array((mesh.n_points,) * 2)
-    powers: dict[Table | None, Array] = {}
-    ambient: dict[Table | None, Array] = {}
-    for load in model.heat_loads:
-        if isinstance(load, Heating):
-            powers[load.ramp] = powers.get(load.ramp, 0.0) + load.power(mesh, kinematics)
-        elif isinstance(load, Film):
-            matrix, power = load.exchange(mesh, kinematics, model.reference_temperature)
-            films, ambient[load.ramp] = csr_array(films + matrix), ambient.get(load.ramp, 0.0) + power
+    conduction, same, n = model.conduction(), model.same_temperature(), model.mesh.n_points
     merged = csr_array((np.ones(n), same, np.arange(n + 1)), shape=(n, n))
     return Heat(
-        model, ramp, criteria, conduction, conduction.matrix(), films, merged, bodies(mesh)[1],
-        *model.fixed_temperatures(), powers, ambient, linear_solver, linear_tolerance,
+        model, ramp, criteria, conduction, conduction.matrix(), thermal_loads(model), merged, bodies(model.mesh)[1],
+        *model.fixed_temperatures(), linear_solver, linear_tolerance,
     )  # fmt: skip

@@ -52,8 +52,8 @@ def modes(
 
     What contact has closed stays closed, what sticks does not slip, what slides or is open is free; supports, relations,
     couplings and springs hold, with what they prescribe kept, and pretension sections keep their length. Stresses of the step
-    stiffen, as in a string, or soften; at finite strains the bodies are those deformed. Obstacles that forces drive have no
-    mass.
+    stiffen, as in a string, or soften; at finite strains the bodies are those deformed, and pressures follow them. Obstacles
+    that forces drive have no mass.
 
     Parameters
     ----------
@@ -204,7 +204,10 @@ def _stiffness(model: Model, step: StepResult | None, field: MaterialField) -> b
         if model.strain == "small":
             model.refuse_nonlinear("modes about a step are")
         rise = model.expanding_rise(step.iterations.get("temperature_factors", ()), step.temperature)
-        return stiffened(bodies.at(step.displacement, bodies.beginning, rise=rise).K, model.springs)
+        K = stiffened(bodies.at(step.displacement, bodies.beginning, rise=rise).K, model.springs)
+        for factor, (pressure, _) in zip(step.iterations.get("pressure_factors", ()), model.following_pressures()):
+            K = bsr_array(K + factor * pressure.at(step.displacement)[1])
+        return K
     K = stiffened(stiffness(mesh, kinematics, field.moduli, field.loops, None, field.treatment), model.springs)
     if step is None:
         return K

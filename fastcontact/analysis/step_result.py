@@ -48,7 +48,8 @@ def recover(
     temperature, initial = (
         problem.factors(own, instant[1]) for own in (problem.model.temperatures, problem.model.initial_states)
     )
-    factors = {"temperature_factors": temperature, "initial_factors": initial}
+    pressures = [multiplier(table, problem.ramp, instant[1]) for _, table in problem.following]
+    factors = {"temperature_factors": temperature, "initial_factors": initial, "pressure_factors": pressures}
     iterations = {**iterations, **{key: multipliers for key, multipliers in factors.items() if multipliers}}
     heat = None if end.rise is None else problem.model.reference_temperature + end.rise
     sections = problem.model.pretensions

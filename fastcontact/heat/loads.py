@@ -1,6 +1,7 @@
 """What heats or cools solid cells: prescribed temperatures, fluxes, films, sources, heat at nodes.
 
 Powers of nodes are integrals with the shape functions, in axisymmetry over the full circle, in the plane by unit thickness.
+At a displacement they are those over deformed areas and volumes, with values by reference positions.
 """
 
 from __future__ import annotations
@@ -95,11 +96,17 @@ class FixedTemperature(TemporaryHeat):
 class Heating(Load):
     """A load of heat that does not depend on the temperature."""
 
-    def power(self, mesh: Mesh, kinematics: str) -> Array:
-        """Return the powers (n_points,) of the nodes at multiplier 1, positive into the body [power]."""
+    def power(self, mesh: Mesh, kinematics: str, displacement: Array | None = None) -> Array:
+        """Return the powers (n_points,) of the nodes at multiplier 1, positive into the body [power].
+
+        With a `displacement` (n_points, dim) those of the deformed body [length].
+        """
         total = np.zeros((mesh.n_points, 1))
-        self._add_to(total, mesh, kinematics)
+        self._add_power(total, mesh, kinematics, _deformed(mesh, displacement))
         return total[:, 0]
+
+    def _add_power(self, total: Array, mesh: Mesh, kinematics: str, deformed: Mesh) -> None:
+        raise NotImplementedError
 
 
 @dataclass(frozen=True)
@@ -111,11 +118,11 @@ class HeatFlux(Heating):
     value: Value
     ramp: Table | None = None
 
-    def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
+    def _add_power(self, total: Array, mesh: Mesh, kinematics: str, deformed: Mesh) -> None:
         for element, facets in facets_of(mesh, self.group).items():
-            x, N, normal = facet_points(mesh, element, facets, kinematics)
-            density = evaluated(self.value, x, self.name) * np.linalg.norm(normal, axis=2)
-            add_density(forces, facets, N, density[:, :, None])
+            x, N, _ = facet_points(mesh, element, facets, kinematics)
+            area = np.linalg.norm(facet_points(deformed, element, facets, kinematics)[2], axis=2)
+            add_density(total, facets, N, (evaluated(self.value, x, self.name) * area)[:, :, None])
 
 
 @dataclass(frozen=True)
@@ -127,10 +134,11 @@ class HeatSource(VolumeLoad, Heating):
     value: Value
     ramp: Table | None = None
 
-    def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
+    def _add_power(self, total: Array, mesh: Mesh, kinematics: str, deformed: Mesh) -> None:
         for element, cells in self.cells(mesh):
-            x, N, volume = cell_points(mesh, element, cells, kinematics)
-            add_density(forces, cells, N, (evaluated(self.value, x, self.name) * volume)[:, :, None])
+            x, N, _ = cell_points(mesh, element, cells, kinematics)
+            volume = cell_points(deformed, element, cells, kinematics)[2]
+            add_density(total, cells, N, (evaluated(self.value, x, self.name) * volume)[:, :, None])
 
 
 @dataclass(frozen=True)
@@ -145,9 +153,9 @@ class NodalHeat(Heating):
     def _check_place(self, mesh: Mesh, kinematics: str) -> None:
         check_points(mesh, self.group, "nothing can heat it")
 
-    def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
+    def _add_power(self, total: Array, mesh: Mesh, kinematics: str, deformed: Mesh) -> None:
         nodes = mesh.points_of(self.group)
-        forces[nodes, 0] = evaluated(self.value, mesh.points[nodes], self.name)
+        total[nodes, 0] = evaluated(self.value, mesh.points[nodes], self.name)
 
 
 @dataclass(frozen=True)
@@ -176,20 +184,27 @@ class Film(TemporaryHeat):
         """Coefficient and ambient temperature."""
         return [self.coefficient, self.ambient]
 
-    def exchange(self, mesh: Mesh, kinematics: str, reference: float) -> tuple[csr_array, Array]:
+    def exchange(
+        self, mesh: Mesh, kinematics: str, reference: float, displacement: Array | None = None
+    ) -> tuple[csr_array, Array]:
         """Return the matrix (n_points, n_points) [power / temperature] and the powers (n_points,) by the rise of the ambient.
 
-        The latter at multiplier 1 [power]; `reference` is the temperature that rises count from [temperature]. ModelError if
-        a coefficient is negative.
+        The latter at multiplier 1 [power]; `reference` is the temperature that rises count from [temperature]. With a
+        `displacement` (n_points, dim) those of the deformed surface [length]. ModelError if a coefficient is negative.
         """
-        entries, powers = Entries(), np.zeros((mesh.n_points, 1))
+        entries, powers, deformed = Entries(), np.zeros((mesh.n_points, 1)), _deformed(mesh, displacement)
         for element, facets in facets_of(mesh, self.group).items():
-            x, N, normal = facet_points(mesh, element, facets, kinematics)
+            x, N, _ = facet_points(mesh, element, facets, kinematics)
             h = evaluated(self.coefficient, x, f"the coefficient of {self.name}")
             if h.min(initial=0.0) < 0.0:
                 raise ModelError(f"the coefficient of {self.name} is {h.min():g}: it must not be negative")
-            h *= np.linalg.norm(normal, axis=2)
+            h *= np.linalg.norm(facet_points(deformed, element, facets, kinematics)[2], axis=2)
             rise = evaluated(self.ambient, x, f"the ambient temperature of {self.name}") - reference
             add_density(powers, facets, N, (h * rise)[:, :, None])
             entries.add(facets, facets, np.einsum("fq,qa,qb->fab", h, N, N))
         return entries.matrix((mesh.n_points, mesh.n_points)), powers[:, 0]
+
+
+def _deformed(mesh: Mesh, displacement: Array | None) -> Mesh:
+    """Return the mesh at a displacement (n_points, dim) [length]."""
+    return mesh if displacement is None else mesh.replace(points=mesh.points + displacement)

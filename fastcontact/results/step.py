@@ -293,8 +293,8 @@ class StepResult:
         alone holds bodies, ``regularised``: their springs and the forces in them. If round-off kept the contact geometry
         from settling to the criterion, ``scatter``: by how much ``displacement`` and contact ``force`` still vary [-].
         With temperatures, ``temperature_factors``: what each of them is multiplied with; with initial
-        stresses and strains ``initial_factors`` [-]. ``work`` and, with pretension sections, ``pretension``: see the
-        properties of these names.
+        stresses and strains ``initial_factors``, with pressures at finite strains ``pressure_factors`` [-]. ``work``
+        and, with pretension sections, ``pretension``: see the properties of these names.
     warnings : tuple of str
         Warnings of the step.
     cell_fields : dict of str to ndarray (n_solids,)

@@ -40,6 +40,13 @@ def solved(path, folder, numbers, limit=120.0, asked="U, RF"):
     return printed((folder / "run.dat").read_text(encoding="utf-8"))
 
 
+def frequencies(folder):
+    """Return the frequencies (n,) that the last step of the deck which `solved` has run in `folder` prints, per time."""
+    table = (folder / "run.dat").read_text(encoding="utf-8").split("E I G E N V A L U E   O U T P U T")[1]
+    rows = re.findall(r"^ +\d+ +\S+ +\S+ +(\S+) +\S+ *$", table.split("P A R T")[0], re.MULTILINE)
+    return np.array(rows, float)
+
+
 def printed(text):
     """Return what `solved` does from the text of a ``.dat`` file."""
     found, table = {}, None

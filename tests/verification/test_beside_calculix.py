@@ -245,6 +245,28 @@ def on_faces(text, surface, letter, values):
     return faces.replace("S", letter).replace("\n", f", {values}\n")
 
 
+@pytest.mark.parametrize(
+    ("load", "nlgeom"),
+    [
+        ("*DSLOAD\nS_XMAX, P, -50.\n", ", NLGEOM"),
+        ("*CLOAD\nXMAX, 1, 70.\n", ", NLGEOM"),
+        ("*CLOAD\nXMAX, 1, 70.\n", ""),
+    ],
+)
+def test_frequencies_of_a_loaded_bar(load, nlgeom, tmp_path):
+    """A pull that follows the end of the bar lowers its first frequency, one that keeps its direction raises it."""
+    mesh = box((60.0, 4.0, 3.0), (8, 1, 1), "hex20")
+    text = deck_of(mesh, ["BOX"], ["XMIN", "XMAX"], ["XMAX"]) + MATERIAL + BLOCK.format("BOX")
+    text += f"*BOUNDARY\nXMIN, 1, 3\n*STEP{nlgeom}\n*STATIC\n{load}*END STEP\n"
+    (tmp_path / "deck.inp").write_text(text + "*STEP, PERTURBATION\n*FREQUENCY\n5\n*END STEP\n", encoding="utf-8")
+    deck = fc.read_deck(tmp_path / "deck.inp")
+    calculix.solved(tmp_path / "deck.inp", tmp_path, [1])
+    ours = fc.modes(deck.model, deck.solve()[-1], **deck.modes).frequencies
+    assert ours == pytest.approx(calculix.frequencies(tmp_path), rel=2e-5 if nlgeom else 1e-4)
+    rest = fc.modes(deck.model, n=1).frequencies[0]
+    assert (ours[0] < rest) == ("*DSLOAD" in load)
+
+
 @pytest.mark.parametrize("element", ["hex8", "hex20"])
 def test_heat_of_a_source_through_two_blocks_into_a_film(element, tmp_path):
     mesh = stacked(element, (2, 2, 2), (2, 2, 2))

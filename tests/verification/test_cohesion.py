@@ -153,6 +153,16 @@ def test_a_ball_is_pulled_off_with_the_force_of_johnson_kendall_and_roberts(form
     assert pulls[-1] == 0.0
 
 
+def test_adhesion_on_facets_longer_than_its_reach_tells_it():
+    model = elastic_model(fc.generate.block((1.0, 1.0), (8, 8), origin=(0.0, -1.0)), "axisymmetric", E=1.0, nu=0.0)
+    model.fix("BOTTOM", "xy")
+    ball, law = fc.obstacles.Sphere((0.0, 1.0), 1.0), {"work": 3.5e-5, "strength": 0.1}
+    model.add_obstacle("ball", secondary="TOP", obstacle=ball, motion={"y": -1e-3}, adhesion=law)
+    criteria = fc.Criteria(max_geometry_updates=1)
+    with pytest.raises(fc.ConvergenceError, match=r"facets no longer than the reach of adhesion, 0\.0007, .* 'ball'"):
+        fc.solve(model, 1, criteria=criteria)
+
+
 def test_what_is_refused():
     for options, culprit in (
         ({"law": {"strength": -1.0}}, "must be positive"),

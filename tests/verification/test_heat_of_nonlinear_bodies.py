@@ -169,6 +169,31 @@ def test_heat_is_conducted_in_the_deformed_bodies_and_across_the_deformed_contac
     assert step.heat["contacts"]["c"] == pytest.approx(flux * 0.05 * 1.2, rel=1e-9)
 
 
+@pytest.mark.parametrize("kinematics", ["plane_strain", "axisymmetric", "3d"])
+def test_films_fluxes_and_sources_count_deformed_areas_and_volumes(kinematics):
+    """A bar that is 1.3 times as wide and 0.9 times as long, with a source, a flux at its top and a film at its bottom."""
+    if kinematics == "3d":
+        mesh, top, bottom = fc.generate.box((1.0, 1.0, 2.0), (1, 1, 4), "hex20"), "ZMAX", "ZMIN"
+    else:
+        mesh, top, bottom = fc.generate.block((1.0, 2.0), (2, 4), "quad8"), "TOP", "BOTTOM"
+    axis = "xyz"[mesh.dim - 1]
+    model = fc.Model(mesh, kinematics, strain="finite", reference_temperature=10.0)
+    model.add_material(fc.LinearElastic(E=1.0, nu=0.0, conductivity=5.0))
+    wide = {name: lambda x, i=i: 0.3 * x[:, i] for i, name in enumerate("xyz"[: mesh.dim - 1])}
+    model.prescribe("BOX" if kinematics == "3d" else "BLOCK", **wide, **{axis: lambda x: -0.1 * x[:, -1]})
+    model.add_heat_source(lambda x: 2.0 * x[:, -1])  # by positions before the deformation
+    model.add_heat_flux(top, 3.0)
+    model.add_film(bottom, lambda x: 4.0 + 0.0 * x[:, 0], 20.0)
+    step = fc.solve(model, 1)[-1]
+    z = mesh.points[:, -1]
+    flux = 3.0 + 0.9 * (4.0 - z**2)  # downwards, through the area as it is
+    exact = 20.0 + flux[z == 0.0][0] / 4.0 + 0.9 / 5.0 * ((3.0 + 3.6) * z - 0.9 * z**3 / 3.0)
+    assert step.temperature == pytest.approx(exact, rel=1e-4)  # quadratic cells, a cubic
+    assert step.temperature[z == 0.0] == pytest.approx(exact[z == 0.0], rel=1e-10)
+    area = {"plane_strain": 1.3, "axisymmetric": np.pi * 1.69, "3d": 1.69}[kinematics]
+    assert step.heat["films"] == pytest.approx(-6.6 * area, rel=1e-10)
+
+
 def test_a_plastic_law_that_does_not_yield_exchanges_heat_as_a_linear_one():
     results = []
     for law in (fc.LinearElastic, lambda **given: fc.ElasticPlastic(**given, yield_stress=1e12)):

@@ -23,8 +23,9 @@ from fastcontact.linear.protocol import LinearSolver
 # Error of vectors, to the square of which eigenvalues are right.
 ACCURACY = 1e-5
 UNSTABLE = (
-    "the settled step is not stable: small motions about it grow by themselves, or what has no mass is free; take a lower "
-    "load, hold what slides (hold_sliding=True), or leave out the stiffness by stresses (stress_stiffening=False)"
+    "the settled step is not stable, small motions grow by themselves: where nodes slide, as round a tightened bolt, "
+    "hold them (hold_sliding=True); beyond a load that buckles take a lower one, or leave out the stiffness by stresses "
+    "(stress_stiffening=False)"
 )
 # Iterations until that is looked at, and how often.
 ROUND, ROUNDS = 20, 15
@@ -64,7 +65,7 @@ def lowest(
     try:
         solver.prepare(shifted, near_nullspace, np.empty(0, np.intp))
     except ModelError as error:
-        raise ModelError(f"{UNSTABLE} ({error})") from error
+        raise ModelError(UNSTABLE) from error
     rng = np.random.default_rng(0)
     if isinstance(solver, Multigrid):
         start = rng.normal(size=(len(free), n + n // 2 + 2)) * free[:, None]

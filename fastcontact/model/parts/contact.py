@@ -323,11 +323,6 @@ class ModelContact(ModelConnections):
                 f"contact '{pair.name}' is {'glued' if options.cohesion else options.kind}, which lets no fluid in: name "
                 "another pair"
             )
-        if pair.formulation == "continuous" and side.order > 1 and self.mesh.dim == 3:
-            raise ContactError(
-                f"contact '{pair.name}' is continuous on quadratic faces, whose nodal pressures waver too much to tell where "
-                "fluid comes in: use formulation 'mortar', or linear elements"
-            )
         return mask
 
     def _facet_kinds(self, group: str) -> tuple[list[str], bool]:
