@@ -98,13 +98,18 @@ def _file_name(number: int) -> str:
     return f"{module.rpartition('.')[2]}.{name}"
 
 
-def start(runs: Sequence[str], helpers: int, output: int = subprocess.PIPE) -> list[subprocess.Popen[str]]:
-    """Start processes that share the kernels of some kinds of runs; each writes to `output` which one it is at."""
+def start(
+    runs: Sequence[str], helpers: int, output: int = subprocess.PIPE, errors: int = subprocess.DEVNULL
+) -> list[subprocess.Popen[str]]:
+    """Start processes that share the kernels of some kinds of runs.
+
+    Each writes to `output` which one it is at, and to `errors` why one was not compiled.
+    """
     path = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
     command = [sys.executable, "-m", __name__, str(helpers)]
     started = [
         subprocess.Popen(
-            [*command, str(first), *runs], stdin=subprocess.PIPE, stdout=output, stderr=subprocess.DEVNULL, text=True,
+            [*command, str(first), *runs], stdin=subprocess.PIPE, stdout=output, stderr=errors, text=True,
             env={**os.environ, "PYTHONPATH": path},
         )
         for first in range(helpers)
@@ -210,18 +215,25 @@ def expect(runs: Sequence[str]) -> None:
     begin()
 
 
-def main(arguments: Sequence[str]) -> None:
-    """Compile every `n`-th kernel of some kinds of runs, except those read from standard input: what a helper does."""
+def main(arguments: Sequence[str]) -> int:
+    """Compile every `n`-th kernel of some kinds of runs, except those read from standard input: what a helper does.
+
+    Return the number of those that cannot be compiled.
+    """
     n, first, *runs = arguments
     taken: set[int] = set()
+    failed = 0
     threading.Thread(target=lambda: taken.update(map(int, sys.stdin)), daemon=True).start()
     for number in kernels_of(runs)[int(first) :: int(n)]:
         print(number, flush=True)
         if number not in taken:
-            with contextlib.suppress(Exception):  # the run will tell, if it needs the kernel
+            try:
                 compile_kernel(number)
+            except Exception as error:  # the run will tell, if it needs the kernel
+                failed += 1
+                print(f"{_file_name(number)}: {type(error).__name__}: {error}".split("\n")[0], file=sys.stderr, flush=True)
+    return failed
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
-    os._exit(0)  # Python would not end beside a thread that reads its standard input
+    os._exit(min(main(sys.argv[1:]), 1))  # Python would not end beside a thread that reads its standard input
