@@ -92,6 +92,13 @@ def compile_kernel(number: int) -> None:
     getattr(importlib.import_module(module), name).compile(tuple(map(numba_type, given)))
 
 
+def _is_kept(number: int) -> bool:
+    """Return whether a kernel of the table is found compiled, for any types."""
+    module, name, _ = table()["kernels"][number]
+    found = kernel_files.files.get(getattr(importlib.import_module(module), name).py_func)
+    return found is not None and found.exist()
+
+
 def _file_name(number: int) -> str:
     """Return how the file of a kernel of the table begins."""
     module, name, _ = table()["kernels"][number]
@@ -194,7 +201,9 @@ class Help:
 
 
 def expect(runs: Sequence[str]) -> None:
-    """Let helpers compile what some kinds of runs need as soon as this process compiles more than a few kernels.
+    """Let helpers compile what some kinds of runs need as soon as this process lacks more than a few kernels.
+
+    They start if one of these is no kernel that Python may run: a run after the first one needs no help.
 
     Not in a process that works for another one, nor where threads are limited to one, kernels are not kept, or the
     interpreter is part of another program.
@@ -208,6 +217,8 @@ def expect(runs: Sequence[str]) -> None:
         if compiling.count > ALONE and begin in compiling.helpers:
             compiling.helpers.remove(begin)
             _helped.update(new)
+            if all(map(_is_kept, compiled_of(new))):  # what is left Python runs in their place
+                return
             with contextlib.suppress(OSError):  # the run compiles alone
                 compiling.waiters.append(Help(new, start(new, helpers)).wait)
 
