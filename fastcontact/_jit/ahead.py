@@ -242,7 +242,9 @@ def main(arguments: Sequence[str]) -> int:
                 compile_kernel(number)
             except Exception as error:  # the run will tell, if it needs the kernel
                 failed += 1
-                print(f"{_file_name(number)}: {type(error).__name__}: {error}".split("\n")[0], file=sys.stderr, flush=True)
+                print(
+                    f"{_file_name(number)}: {type(error).__name__}: {error}".split("\n")[0], file=sys.stderr, flush=True
+                )
     return failed
 
 

@@ -2,7 +2,8 @@
 
 A kernel that loops once or twice over a small mesh takes Python some hundredths of a second, and Numba one or two seconds.
 Python runs it until it has spent about as much time on it as compiling takes, in this run and those before: whatever runs
-follow, that takes no more than twice the time of the better choice. The arithmetic is the same to the last bit: sums, products, quotients and square roots of doubles, in the order written.
+follow, that takes no more than twice the time of the better choice. The arithmetic is the same to the last bit: sums,
+products, quotients and square roots of doubles, in the order written.
 """
 
 from __future__ import annotations
