@@ -105,7 +105,8 @@ def no_attribute(module: str, name: str, known: Iterable[str]) -> AttributeError
     if name.startswith("_"):  # what tools look for
         return AttributeError(text)
     near = difflib.get_close_matches(name.casefold(), known, n=3, cutoff=0.5)
-    return AttributeError(text + (": did you mean " + " or ".join(map(repr, near)) + "?" if near else ""))
+    remedy = ": did you mean " + " or ".join(map(repr, near)) + "?" if near else ""
+    return AttributeError(text + remedy, name=name, obj=text)  # of a text: Python adds no names of the module again
 
 
 def names_of(module: str, known: list[str]) -> tuple[Callable[[str], object], Callable[[], list[str]]]:

@@ -92,19 +92,31 @@ def compile_kernel(number: int) -> None:
     getattr(importlib.import_module(module), name).compile(tuple(map(numba_type, given)))
 
 
+def _is_kept(number: int) -> bool:
+    """Return whether a kernel of the table is found compiled, for any types."""
+    module, name, _ = table()["kernels"][number]
+    found = kernel_files.files.get(getattr(importlib.import_module(module), name).py_func)
+    return found is not None and found.exist()
+
+
 def _file_name(number: int) -> str:
     """Return how the file of a kernel of the table begins."""
     module, name, _ = table()["kernels"][number]
     return f"{module.rpartition('.')[2]}.{name}"
 
 
-def start(runs: Sequence[str], helpers: int, output: int = subprocess.PIPE) -> list[subprocess.Popen[str]]:
-    """Start processes that share the kernels of some kinds of runs; each writes to `output` which one it is at."""
+def start(
+    runs: Sequence[str], helpers: int, output: int = subprocess.PIPE, errors: int = subprocess.DEVNULL
+) -> list[subprocess.Popen[str]]:
+    """Start processes that share the kernels of some kinds of runs.
+
+    Each writes to `output` which one it is at, and to `errors` why one was not compiled.
+    """
     path = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
     command = [sys.executable, "-m", __name__, str(helpers)]
     started = [
         subprocess.Popen(
-            [*command, str(first), *runs], stdin=subprocess.PIPE, stdout=output, stderr=subprocess.DEVNULL, text=True,
+            [*command, str(first), *runs], stdin=subprocess.PIPE, stdout=output, stderr=errors, text=True,
             env={**os.environ, "PYTHONPATH": path},
         )
         for first in range(helpers)
@@ -189,7 +201,9 @@ class Help:
 
 
 def expect(runs: Sequence[str]) -> None:
-    """Let helpers compile what some kinds of runs need as soon as this process compiles more than a few kernels.
+    """Let helpers compile what some kinds of runs need as soon as this process lacks more than a few kernels.
+
+    They start if one of these is no kernel that Python may run: a run after the first one needs no help.
 
     Not in a process that works for another one, nor where threads are limited to one, kernels are not kept, or the
     interpreter is part of another program.
@@ -203,6 +217,8 @@ def expect(runs: Sequence[str]) -> None:
         if compiling.count > ALONE and begin in compiling.helpers:
             compiling.helpers.remove(begin)
             _helped.update(new)
+            if all(map(_is_kept, compiled_of(new))):  # what is left Python runs in their place
+                return
             with contextlib.suppress(OSError):  # the run compiles alone
                 compiling.waiters.append(Help(new, start(new, helpers)).wait)
 
@@ -210,18 +226,27 @@ def expect(runs: Sequence[str]) -> None:
     begin()
 
 
-def main(arguments: Sequence[str]) -> None:
-    """Compile every `n`-th kernel of some kinds of runs, except those read from standard input: what a helper does."""
+def main(arguments: Sequence[str]) -> int:
+    """Compile every `n`-th kernel of some kinds of runs, except those read from standard input: what a helper does.
+
+    Return the number of those that cannot be compiled.
+    """
     n, first, *runs = arguments
     taken: set[int] = set()
+    failed = 0
     threading.Thread(target=lambda: taken.update(map(int, sys.stdin)), daemon=True).start()
     for number in kernels_of(runs)[int(first) :: int(n)]:
         print(number, flush=True)
         if number not in taken:
-            with contextlib.suppress(Exception):  # the run will tell, if it needs the kernel
+            try:
                 compile_kernel(number)
+            except Exception as error:  # the run will tell, if it needs the kernel
+                failed += 1
+                print(
+                    f"{_file_name(number)}: {type(error).__name__}: {error}".split("\n")[0], file=sys.stderr, flush=True
+                )
+    return failed
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
-    os._exit(0)  # Python would not end beside a thread that reads its standard input
+    os._exit(min(main(sys.argv[1:]), 1))  # Python would not end beside a thread that reads its standard input

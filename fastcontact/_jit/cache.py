@@ -59,7 +59,7 @@ class KernelFiles:
     def exist(self) -> bool:
         """Return whether the kernel, as it is now, is kept for any signature."""
         with contextlib.suppress(OSError):
-            return self._version in _versions(self.folder, os.stat(self.folder).st_mtime_ns)
+            return self.version in _versions(self.folder, os.stat(self.folder).st_mtime_ns)
         return False
 
     def load(self, key: Any) -> Any:
@@ -99,10 +99,10 @@ class KernelFiles:
         """Do nothing: what is out of date has another name."""
 
     def _path(self, key: Any) -> Path:
-        return self.folder / f"{self._version}.{_digest(repr(key).encode())[:24]}.nbc"
+        return self.folder / f"{self.version}.{_digest(repr(key).encode())[:24]}.nbc"
 
     @cached_property
-    def _version(self) -> str:
+    def version(self) -> str:
         """The name, and a digest of what the machine code depends on, apart from the signature and the processor."""
         environment = {name: getattr(numba.config, name, None) for name in OPTIONS}
         parts = [__version__, numba.__version__, llvmlite.__version__, sys.version, self._options, repr(environment)]

@@ -1,14 +1,21 @@
 """Kernels that run as Python for as long as they are not compiled, where that takes less time than compiling them.
 
 A kernel that loops once or twice over a small mesh takes Python some hundredths of a second, and Numba one or two seconds.
-The arithmetic is the same to the last bit: sums, products, quotients and square roots of doubles, in the order written.
+Python runs it until it has spent about as much time on it as compiling takes, in this run and those before: whatever runs
+follow, that takes no more than twice the time of the better choice. The arithmetic is the same to the last bit: sums,
+products, quotients and square roots of doubles, in the order written.
 """
 
 from __future__ import annotations
 
+import atexit
+import contextlib
 import functools
+import json
+import os
 import time
 from collections.abc import Callable
+from pathlib import Path
 from types import FunctionType
 from typing import Any
 
@@ -20,6 +27,8 @@ from fastcontact._jit.cache import KernelFiles
 # Entries of all arguments of a call, and seconds in all calls of a kernel, up to which it runs as Python: that takes 1 to 8
 # microseconds an entry, and Numba 0.2 to 3 seconds a kernel.
 ENTRIES, SECONDS = 200_000, 0.5
+# File beside the compiled kernels: seconds that Python has spent on others, by their versions.
+SPENT = "interpreted.json"
 # NumPy computes with smaller types in other ones than Numba; those of a byte are compared only.
 EXACT = ("float64", "int64", "int32", "uint8", "bool")
 
@@ -48,15 +57,60 @@ class Interpretable:
     def _choose(self, *arguments: Any) -> Any:
         """Compute a call by Python, or this and all later ones by the compiled kernel."""
         began = time.thread_time()
-        small = self._spent <= SECONDS and entries(arguments) <= ENTRIES
-        if not small or self.compiled.signatures or (self._files is not None and self._files.exist()):
+        if self._is_compiled() or not self._is_small(arguments):
             self._call = self.compiled
             return self.compiled(*arguments)
         if self._spent == 0.0:
             compiling.replace()
+            _interpreted.append(self)
         result = interpret(self, arguments)
         self._spent += time.thread_time() - began
         return result
+
+    def _is_compiled(self) -> bool:
+        """Return whether it is compiled, in this process or on disk."""
+        return bool(self.compiled.signatures) or (self._files is not None and self._files.exist())
+
+    def _is_small(self, arguments: tuple[Any, ...]) -> bool:
+        """Return whether Python may run a call: what it has spent on others is less than compiling costs."""
+        before = _spent_before(self._files.folder).get(self._files.version, 0.0) if self._files is not None else 0.0
+        return before + self._spent <= SECONDS and entries(arguments) <= ENTRIES
+
+    @property
+    def spent(self) -> tuple[Path, str, float] | None:
+        """Folder, version, and the seconds that Python has spent on it in this process; None if it is not kept."""
+        return None if self._files is None else (self._files.folder, self._files.version, self._spent)
+
+
+# Kernels that Python has run in this process.
+_interpreted: list[Interpretable] = []
+
+
+@functools.cache
+def _spent_before(folder: Path) -> dict[str, float]:
+    """Return the seconds that Python spent on kernels in earlier runs, by their versions."""
+    with contextlib.suppress(OSError, ValueError):
+        read = json.loads((folder / SPENT).read_text(encoding="utf-8"))
+        return {str(version): float(seconds) for version, seconds in read.items()}
+    return {}
+
+
+def note_spent() -> None:
+    """Add the seconds of this process to those of earlier runs; of runs that end at the same time one counts."""
+    spent = [kernel.spent for kernel in _interpreted if kernel.spent is not None]
+    for folder in {folder for folder, _, _ in spent}:
+        _spent_before.cache_clear()
+        sums = dict(_spent_before(folder))
+        for _, version, seconds in (entry for entry in spent if entry[0] == folder):
+            sums[version] = round(sums.get(version, 0.0) + seconds, 4)
+        temporary = folder / f"{SPENT}.{os.getpid()}"
+        with contextlib.suppress(OSError):
+            temporary.write_text(json.dumps(sums), encoding="utf-8")
+            os.replace(temporary, folder / SPENT)
+    _interpreted.clear()
+
+
+atexit.register(note_spent)
 
 
 def interpret(kernel: Any, arguments: tuple[Any, ...]) -> Any:

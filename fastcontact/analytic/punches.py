@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fastcontact.analytic._inputs import array, exactly_one, number, poisson, positive
+from fastcontact.analytic._inputs import array, exactly_one, poisson, positive
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 
@@ -232,7 +232,8 @@ def cone_punch(
     *,
     E: float,
     nu: float,
-    slope_angle: float,
+    slope_angle: float | None = None,
+    slope: float | None = None,
     force: float | None = None,
     approach: float | None = None,
     radius: float | None = None,
@@ -243,19 +244,22 @@ def cone_punch(
     ----------
     E, nu, force, approach, radius : float
         As for `power_law_punch`.
-    slope_angle : float
+    slope_angle : float, optional
         Angle between the cone's side and the surface, above 0 and below 90 [degrees]; the formula is linear: choose it small.
+    slope : float, optional
+        In its place, its tangent, as of `obstacles.cone` [-].
 
     Examples
     --------
     >>> from fastcontact import analytic
-    >>> cone = analytic.cone_punch(E=1000.0, nu=0.3, slope_angle=0.1, force=10.0)
+    >>> cone = analytic.cone_punch(E=1000.0, nu=0.3, slope=0.1, force=10.0)
     """
-    angle = number("slope_angle", slope_angle)
-    if not 0.0 < angle < 90.0:
-        raise ModelError(f"slope_angle is {angle:g}: it must lie between 0 and 90 degrees")
+    name, value = exactly_one(slope_angle=slope_angle, slope=slope)
+    if name == "slope_angle" and not 0.0 < value < 90.0:
+        raise ModelError(f"slope_angle is {value:g}: it must lie between 0 and 90 degrees")
     given = exactly_one(force=force, approach=approach, radius=radius)
-    return _solve(_modulus(E, nu), math.tan(math.radians(angle)), 1.0, *given)
+    rise = math.tan(math.radians(value)) if name == "slope_angle" else value
+    return _solve(_modulus(E, nu), rise, 1.0, *given)
 
 
 def paraboloid_punch(

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
+import tempfile
 import time
 
 from fastcontact.cli._terminal import say, somebody_watches
@@ -40,14 +42,18 @@ def _warm_up(show: bool) -> int:
     from fastcontact._jit import ahead, decorators
     from fastcontact.analysis.progress import StatusLine
 
-    total, ours, theirs = len(ahead.kernels_of(())), *os.pipe()
-    processes = ahead.start((), decorators.threads(), theirs)
-    os.close(theirs)
-    done = 0
-    with open(ours, encoding="ascii") as lines, StatusLine(len("compiling kernels: 000 of 000"), show) as status:
-        for done, _ in enumerate(lines, start=1):
-            status.draw(f"compiling kernels: {done} of {total}")
-    codes = [process.wait() for process in processes]
-    if done < total or any(codes):
-        raise FastcontactError(f"only {done} of {total} kernels were compiled: was a process ended by lack of memory?")
+    total, ours, theirs, done = len(ahead.kernels_of(())), *os.pipe(), 0
+    with tempfile.TemporaryFile("w+", encoding="utf-8") as errors:
+        processes = ahead.start((), decorators.threads(), theirs, errors.fileno())
+        os.close(theirs)
+        with open(ours, encoding="ascii") as lines, StatusLine(len("compiling kernels: 000 of 000"), show) as status:
+            for done, _ in enumerate(lines, start=1):
+                status.draw(f"compiling kernels: {done} of {total}")
+        failed = [code for code in (process.wait() for process in processes) if code]
+        errors.seek(0)
+        told = errors.read().split("\n")
+    if failed:
+        how = f"by {signal.Signals(-failed[0]).name}" if failed[0] < 0 else f"with exit code {failed[0]}"
+        why = next(filter(None, reversed(told)), "was it lack of memory?")
+        raise FastcontactError(f"a process that compiles kernels ended {how}, {done} of {total} kernels begun: {why}")
     return done

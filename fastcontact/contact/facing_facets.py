@@ -18,6 +18,9 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import cells_of_outer_facets, outer_facets
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
+# How far inside of a facet the points beside its nodes are looked at from, relative to the way to its middle.
+INSET = 0.02
+
 
 @dataclass(frozen=True, eq=False)
 class OuterFacets:
@@ -59,7 +62,10 @@ class OuterFacets:
         """Points inside the facets: the facet (m,) of each, where it is (m, dim) [length], the outward normal (m, dim)."""
         owner, point, normal = [], [], []
         for (name, facets), first in zip(self.blocks.items(), self.first):
-            shape, gradient, _ = elements.get(name).tables
+            element = elements.get(name)
+            inside = element.nodes + INSET * (element.nodes.mean(axis=0) - element.nodes)
+            xi = np.concatenate([element.quadrature[0], inside])  # nodes too: facets may face each other by a strip
+            shape, gradient = element.shape(xi), element.gradient(xi)
             corners = self.mesh.points[facets]
             point.append((shape @ corners).reshape(-1, self.mesh.dim))
             normal.append(area_vectors(corners, gradient).reshape(-1, self.mesh.dim))

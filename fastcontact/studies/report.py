@@ -71,7 +71,7 @@ class Report:
         """Return tables and sentences for a person, as the command line prints them."""
         lines = [self.title]
         for caption, rows in self.tables():
-            lines += ["", caption, *aligned(rows)]
+            lines += ["", *filter(None, [caption]), *aligned(rows)]
         lines += [f"  {text}" for text in self.remarks()]
         sentences = self.sentences()
         return [*lines, "", *sentences] if sentences else lines
@@ -97,7 +97,8 @@ class Report:
         return data_frame(self.table(), {name: unit(name, self.units) for name in self.table().dtype.names or ()})
 
     def __repr__(self) -> str:
-        return "\n".join([f"{type(self).__name__} of '{self.name}'", *self.lines()])
+        lines = self.lines()[self.title == self.name :]  # of a function without docstring
+        return "\n".join([f"{type(self).__name__} of '{self.name}'", *lines])
 
     def _repr_html_(self) -> str:
         """Return the tables for notebooks."""

@@ -89,7 +89,7 @@ class Sweep(Report):
 
     def tables(self) -> list[tuple[str, Rows]]:
         """See `Report`."""
-        return [(self.combination, self._rows())]
+        return [(self.combination if self.combination != self.title else "", self._rows())]
 
     def remarks(self) -> list[str]:
         """See `Report`."""
@@ -105,7 +105,8 @@ class Sweep(Report):
         names, drawing = self._main(), Drawing(self.parameters, self.points, self.theories, self.units, self.compared)
         known = any(name in point.theory for point in self.points for name in names)
         size = (8.8 if known else 5.2, 0.5 + 3.1 * len(names))
-        axes = panels(len(names), 1 + known, size, f"{self.title}\n{self.combination}", fontsize=11)
+        heading = "\n".join(dict.fromkeys((self.title, self.combination)))  # of a function they are the same
+        axes = panels(len(names), 1 + known, size, heading, fontsize=11)
         for row, name in zip(axes, names, strict=True):
             drawing.draw_values(row[0], name)
             if known:

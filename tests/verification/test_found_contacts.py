@@ -121,6 +121,16 @@ def test_spheres_have_the_results_of_groups_by_name():
     assert checked.model.contact[0].options["friction"] == 0.1
 
 
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_facet_that_is_faced_by_a_narrow_strip_is_found(dim):
+    """The upper block ends 0.1 beyond a facet of the lower one; without the next facet its edge sank into the lower block."""
+    make, flat = (block, (1.0,)) if dim == 2 else (box, (3.0, 1.0))
+    lower = make((3.0, *flat), (5, 5, 1)[3 - dim :], name="LOW")
+    upper = make((2.0, *(2.0, 1.0)[3 - dim :]), (4, 4, 1)[3 - dim :], origin=(0.5, 0.5, 1.0)[3 - dim :], name="UP")
+    (pair,) = fc.find_contacts(union(lower, upper))
+    assert (pair.bodies, pair.facets) == (("UP", "LOW"), (4 ** (dim - 1), 5 ** (dim - 1)))
+
+
 def test_distance_angle_and_groups():
     lower, upper = block((2.0, 1.0), (2, 2), name="LOW"), block((1.0, 1.0), (2, 2), origin=(0.5, 2.5), name="UP")
     mesh = union(lower, upper)

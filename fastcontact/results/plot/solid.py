@@ -26,8 +26,9 @@ ROOM = 0.9
 WIDEST = 0.8
 # Heights and directions of the eye [degrees]: from above and from below, by way of the four corners.
 VIEWS = [(height, direction) for height in (25.0, -25.0) for direction in (-60.0, 30.0, 120.0, -150.0)]
-# Ticks on an axis that is seen as long as the diagonal of the box.
-TICKS = 14
+# Ticks on an axis that is seen as long as the diagonal of the box; how near an end of y, relative to it, its numbers stand
+# on those of other axes.
+TICKS, NEAR_END = 10, 0.1
 
 
 def draw_solid(
@@ -77,17 +78,19 @@ def show_box(ax: Any, low: Array, high: Array, view: tuple[float, float]) -> Non
 
     Whatever changes the limits must come here: with other proportions strokes would not lie on their faces.
     """
+    from matplotlib.ticker import MaxNLocator
+
     size, eye = np.maximum(high - low, 1e-9 * np.ptp([low, high])), towards(view)
     diagonal = float(np.linalg.norm(size))
     level = np.array([-np.sin(np.radians(view[1])), np.cos(np.radians(view[1])), 0.0])
     widest = float((np.abs([level, np.cross(eye, level)]) @ size).max()) / diagonal
     fraction = size * np.sqrt(1.0 - eye**2) / diagonal
     for name, begin, end, along in zip("xyz", low, high, fraction):
+        ticks = MaxNLocator(int(np.clip(TICKS * along, 1, 9)), steps=[1, 2, 5, 10]).tick_values(begin, end)
+        margin = (NEAR_END if name == "y" else -1e-9) * (end - begin)
+        ticks = ticks[(ticks >= begin + margin) & (ticks <= end - margin)]
         getattr(ax, f"set_{name}lim")(begin, end)
-        locator = getattr(ax, f"{name}axis").get_major_locator()
-        # The first number on y stands where the last one on x does.
-        prune = "both" if name == "y" and TICKS * along > 3.0 else "lower" if TICKS * along < 1.5 else None
-        locator.set_params(nbins=int(np.clip(TICKS * along, 1, 9)), prune=prune)
+        getattr(ax, f"set_{name}ticks")(ticks)
     ax.set_box_aspect(size, zoom=ROOM * min(1.0, WIDEST / widest))
 
 

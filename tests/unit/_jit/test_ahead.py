@@ -103,6 +103,15 @@ def test_help_comes_once_for_each_kind_of_runs(started, monkeypatch):
     assert started == [(["2d"], 1), (["3d"], 1)]
 
 
+def test_no_help_where_python_may_run_all_that_is_not_kept(started, monkeypatch):
+    numbers = []
+    monkeypatch.setattr(ahead, "_is_kept", lambda number: numbers.append(number) or True)
+    monkeypatch.setattr(compiling, "count", 100)
+    ahead.expect(["2d"])
+    assert started == []
+    assert numbers == ahead.compiled_of(["2d"])
+
+
 @pytest.mark.parametrize("spoilt", ["one thread", "works for another", "not kept", "part of a program"])
 def test_no_help(started, monkeypatch, spoilt):
     if spoilt == "one thread":

@@ -3,6 +3,7 @@
 import copy
 import dis
 import importlib
+import json
 import os
 import pkgutil
 import shutil
@@ -152,6 +153,29 @@ def test_python_runs_a_kernel_until_it_has_taken_its_time_and_never_one_that_is_
         for _ in range(2)
     ]
     assert answers == ["2.0 0 1 2.0 1 float\n", "2.0 1 0 2.0 1 float\n"]
+
+
+def test_the_time_of_earlier_runs_counts(tmp_path):
+    """In the first run Python has spent nothing yet; in the second one more than it may."""
+    short = ASK.replace("answers = [", "interpreting.SECONDS = 1e-9\nanswers = [", 1)
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "NUMBA_DISABLE_JIT": "0"}
+
+    def ask():
+        run = subprocess.run([sys.executable, "-c", short], env=environment, capture_output=True, text=True, check=True)
+        return run.stdout.split()[1]
+
+    assert ask() == "0"
+    (path,) = tmp_path.rglob(interpreting.SPENT)
+    ((version, seconds),) = json.loads(path.read_text()).items()
+    assert version.startswith("norms_kernels.largest_difference.")
+    assert 0.0 < seconds < 1.0
+    for kept in tmp_path.rglob("*.nbc"):
+        kept.unlink()
+    assert ask() == "1"
+    for kept in tmp_path.rglob("*.nbc"):
+        kept.unlink()
+    path.write_text("damaged")
+    assert ask() == "0"
 
 
 class Bytes:

@@ -99,6 +99,7 @@ def test_flat_punch():
 
 def test_cone_has_its_closed_form():
     cone = cone_punch(**SOLID, slope_angle=5.0, approach=0.01)
+    assert cone_punch(**SOLID, slope=math.tan(math.radians(5.0)), approach=0.01).force == pytest.approx(cone.force)
     slope = math.tan(math.radians(5.0))
     assert cone.approach == pytest.approx(0.5 * math.pi * cone.radius * slope, rel=1e-14)
     assert cone.force == pytest.approx(2.0 / math.pi * cone.E_star * 0.01**2 / slope, rel=1e-13)

@@ -1,5 +1,6 @@
 """The command line as a person uses it: what it writes, prints, and returns."""
 
+import io
 import json
 import subprocess
 import sys
@@ -11,6 +12,7 @@ from case_texts import HERTZ, UNITS, spheres
 from models import elastic_model
 
 import fastcontact as fc
+from fastcontact._jit import ahead
 from fastcontact.cli import main
 from fastcontact.cli._main import history_lines
 from fastcontact.results import write_arrays
@@ -314,6 +316,32 @@ def test_environment_is_shown(capsys):
 def test_kernels_are_compiled_on_request(capsys):
     assert main(["env", "--warmup"]) == 0
     assert capsys.readouterr().out.splitlines()[-1].startswith("warm-up")
+
+
+@pytest.mark.parametrize(
+    ("helper", "end"),
+    [
+        ("print(0); raise SystemExit('no memory')", "with exit code 1, 1 of {} kernels begun: no memory"),
+        ("import os; os.kill(os.getpid(), 9)", "by SIGKILL, 0 of {} kernels begun: was it lack of memory?"),
+    ],
+)
+def test_a_warm_up_tells_what_failed(helper, end, monkeypatch, capsys):
+    def start(runs, helpers, output, errors):
+        return [subprocess.Popen([sys.executable, "-S", "-c", helper], stdout=output, stderr=errors)]
+
+    monkeypatch.setattr(ahead, "start", start)
+    assert main(["env", "--warmup"]) == 1
+    total = len(ahead.kernels_of(()))
+    assert capsys.readouterr().err == f"error: a process that compiles kernels ended {end.format(total)}\n"
+
+
+def test_a_kernel_that_cannot_be_compiled_is_told_by_the_helper(monkeypatch, capsys):
+    monkeypatch.setattr(sys, "stdin", io.StringIO())
+    monkeypatch.setattr(ahead, "kernels_of", lambda runs: [0])
+    monkeypatch.setattr(ahead, "compile_kernel", lambda number: {}[number])
+    assert ahead.main(["1", "0"]) == 1
+    module, name, _ = ahead.table()["kernels"][0]
+    assert capsys.readouterr().err == f"{module.rpartition('.')[2]}.{name}: KeyError: 0\n"
 
 
 def test_all_names_are_offered():
