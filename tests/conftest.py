@@ -109,7 +109,10 @@ def meshes_made_once():
 
     with pytest.MonkeyPatch.context() as patch:
         for name in ("half_spheres", "sphere_on_block", "cylinder_on_block", "rings", "quarter_disc", "graded_block"):
-            patch.setattr(fc.generate, name, once(getattr(fc.generate, name)))
+            make = once(getattr(fc.generate, name))
+            patch.setattr(fc.generate, name, make)
+            if name in fc.generate.GENERATORS:  # case files and commands look there
+                patch.setitem(fc.generate.GENERATORS, name, make)
         yield
 
 

@@ -250,8 +250,8 @@ def test_springs_alone_precondition_the_matrix_that_they_are_part_of(kind):
 @pytest.mark.parametrize(
     ("element", "penalty"),
     [
-        pytest.param("hex20", 1e3, marks=pytest.mark.slow), ("hex20", 1e5), ("tet10", 1e3),
-        pytest.param("tet10", 1e5, marks=pytest.mark.slow),
+        pytest.param("hex20", 1e3, marks=pytest.mark.slow), ("hex20", 1e5),
+        *(pytest.param("tet10", penalty, marks=pytest.mark.slow) for penalty in (1e3, 1e5)),
     ],
 )  # fmt: skip
 def test_stiff_penalties_of_standard_multipliers_on_quadratic_facets_need_no_factors(element, penalty):

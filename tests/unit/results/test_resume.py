@@ -384,6 +384,7 @@ LIMITED = """
 """ + FULL.replace("import sys\n", "\n", 1)
 
 
+@pytest.mark.slow  # `test_a_disk_that_is_full_stops_the_run` sets such a limit for a resumed run, too
 @pytest.mark.skipif(importlib.util.find_spec("resource") is None, reason="needs resource limits")
 def test_a_limit_of_file_sizes_costs_no_step_of_a_resumed_run(path: Path) -> None:
     begun(path, (1 / 60,))

@@ -93,7 +93,7 @@ def test_what_a_function_calls_outside_of_the_package_is_its_own():
     assert found == pytest.approx({"a/b.py/f": 1.0 + 3.0 + 0.3, "c.py/g": 2.0 + 1.0 + 0.1, "other": 0.5})
 
 
-@pytest.mark.parametrize("name", sorted(SUBJECTS))
+@pytest.mark.parametrize("name", [pytest.param(s, marks=SLOW if s == "startup" else ()) for s in sorted(SUBJECTS)])
 def test_smallest_size_runs_and_is_recorded(name, tmp_path, capsys):
     path = tmp_path / "run.json"
     assert main(["bench", name, "--smallest", "--json", str(path)]) == 0
@@ -107,7 +107,6 @@ def test_smallest_size_runs_and_is_recorded(name, tmp_path, capsys):
     assert name in capsys.readouterr().out
 
 
-SLOW = pytest.mark.slow
 
 
 @pytest.mark.parametrize(
@@ -116,7 +115,7 @@ SLOW = pytest.mark.slow
         pytest.param("sphere-on-block", marks=SLOW),
         "forma04c",
         pytest.param("pressed-blocks", marks=SLOW),
-        "pushed-blocks",
+        pytest.param("pushed-blocks", marks=SLOW),
     ],
 )
 def test_contact_in_detail(problem, tmp_path):

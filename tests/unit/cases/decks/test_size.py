@@ -52,7 +52,9 @@ LINES = {
 }
 
 
-@pytest.mark.parametrize("kind", LINES)
+@pytest.mark.parametrize(
+    "kind", [pytest.param(k, marks=pytest.mark.slow if k in ("sets", "same forces") else ()) for k in LINES]
+)
 def test_twenty_bytes_a_byte(kind, tmp_path):
     old, new = LINES[kind]
     text = block(16).replace(old, new(16)) if old else block(16)
