@@ -8,9 +8,8 @@ from fastcontact.cli import main
 from fastcontact.cli.bench import suite
 
 SUBJECTS = {"assembly", "contact", "io", "linear", "recovery", "search", "startup", "study"}
-
-
 TABLES = {"robustness", "threads"}
+SLOW = pytest.mark.slow
 
 
 def test_all_subjects_are_there():
@@ -105,8 +104,6 @@ def test_smallest_size_runs_and_is_recorded(name, tmp_path, capsys):
     assert last["ratio"] == 1.0
     assert all(found["cpu_s"] > 0 and found["wall_s"] > 0 for found in entry["works"].values())
     assert name in capsys.readouterr().out
-
-
 
 
 @pytest.mark.parametrize(
