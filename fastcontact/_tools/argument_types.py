@@ -184,6 +184,7 @@ def words(annotation: Any) -> str:
     return kind_of(annotation).words
 
 
+@functools.cache
 def kind_of(annotation: Any) -> Kind:
     """Return the test of an annotated type, and its name."""
     kind, members = typing.get_origin(annotation) or annotation, typing.get_args(annotation)

@@ -18,7 +18,7 @@ from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.elements import Element
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import poorest_cell
-from fastcontact.mesh.topology import outer_facets
+from fastcontact.mesh.topology import outer_facets, remembered
 from fastcontact.model.checks import initial_gaps
 from fastcontact.model.hanging_nodes import hanging_nodes_warning
 from fastcontact.model.prescribed_overlap import Supports, prescribed_overlap_warnings
@@ -239,6 +239,7 @@ def _unramped(model: Model, ramp: Ramp) -> list[str]:
     ]
 
 
+@remembered
 def _stiffness(mesh: Mesh) -> list[str]:
     """Return a warning if the quadrature of the stiffness is inexact, on cells that are curved or distorted.
 

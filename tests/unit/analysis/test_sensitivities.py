@@ -123,8 +123,8 @@ def test_axisymmetric_spheres():
 
 @pytest.mark.parametrize("solver", [pytest.param("direct", marks=pytest.mark.slow), "amg"])
 def test_in_space_with_factors_and_with_a_hierarchy(solver):
-    lower = fc.generate.box((4.0, 4.0, 2.0), (4, 4, 2))
-    upper = fc.generate.transformed(fc.generate.box((2.2, 2.4, 1.5), (3, 3, 2)), translate=(0.83, 0.72, 2.0))
+    lower = fc.generate.box((4.0, 4.0, 2.0), (4, 4, 1))
+    upper = fc.generate.transformed(fc.generate.box((2.2, 2.4, 1.5), (2, 3, 1)), translate=(0.83, 0.72, 2.0))
     mesh = fc.generate.union(
         fc.generate.renamed(lower, lambda name: "L" + name), fc.generate.renamed(upper, lambda name: "U" + name)
     )

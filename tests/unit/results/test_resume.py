@@ -359,6 +359,7 @@ FULL = """
 """
 
 
+@pytest.mark.slow  # by default `test_a_disk_that_is_full_stops_the_run`, where a limit stands for the end of the disk
 def test_a_full_disk_costs_no_step_and_the_run_goes_on_when_there_is_room(small_disk: Path, path: Path) -> None:
     full = small_disk / "run.vtkhdf"
     command = [sys.executable, "-c", textwrap.dedent(FULL), str(Path(__file__).parent), str(full)]
