@@ -378,28 +378,6 @@ def test_a_full_disk_costs_no_step_and_the_run_goes_on_when_there_is_room(small_
     assert np.abs(last_step.displacement - whole.displacement).max() <= 1e-12 * np.abs(whole.displacement).max()
 
 
-LIMITED = """
-    import resource, signal, sys
-    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[3]), int(sys.argv[3])))
-""" + FULL.replace("import sys\n", "\n", 1)
-
-
-@pytest.mark.slow  # `test_a_disk_that_is_full_stops_the_run` sets such a limit for a resumed run, too
-@pytest.mark.skipif(importlib.util.find_spec("resource") is None, reason="needs resource limits")
-def test_a_limit_of_file_sizes_costs_no_step_of_a_resumed_run(path: Path) -> None:
-    begun(path, (1 / 60,))
-    limit = path.stat().st_size + 900_000
-    command = [sys.executable, "-c", textwrap.dedent(LIMITED), str(Path(__file__).parent), str(path), str(limit)]
-    done = subprocess.run(command, capture_output=True, text=True)
-    last = done.stderr.strip().splitlines()[-1]
-    assert done.returncode == 1
-    assert f"'{path}' cannot be written at step" in last
-    n_steps = len(open_results(path))
-    assert 1 < n_steps < 60
-    assert len(resumed(path, fc.linear_ramp(60))) == 60
-
-
 # ---------------------------------------------------------------------------------------------- packing
 
 
