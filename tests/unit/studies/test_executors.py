@@ -1,4 +1,4 @@
-"""Sweeps on Dask and MPI: addresses, and processes that are lost; `docs/howto/cluster.md` compares numbers of all executors."""
+"""Sweeps on Dask and MPI: addresses, and lost processes; `docs/howto/cluster.md` compares the numbers of all executors."""
 
 import json
 import os
