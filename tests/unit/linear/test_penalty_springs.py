@@ -208,7 +208,7 @@ def test_a_penalty_against_a_wall(friction, penalty):
 
 def test_a_tangential_penalty_costs_no_columns():
     exact = exact_iterations(0.3, **DUAL)
-    for tangential, penalty in ((1.0, {}), (100.0, {"penalty": 100.0}), (1e5, {}), (1e5, {"penalty": 100.0})):
+    for tangential, penalty in ((1.0, {}), (100.0, {"penalty": 100.0}), (1e5, {})):
         assert_agree(pressed(friction=0.3, tangential_penalty=tangential, **penalty, **DUAL), 2 * exact)
 
 
