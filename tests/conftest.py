@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import gc
 import os
 import shutil
 import signal
@@ -91,8 +92,19 @@ def linear_solver(request: pytest.FixtureRequest):
         yield
 
 
-@pytest.fixture(scope="session", autouse=True)
-def meshes_made_once():
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """Look for garbage when all tests are collected, not while they are, and not among what they consist of."""
+    make_meshes_once()
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.enable()
+        gc.freeze()
+
+
+def make_meshes_once() -> None:
     """Make each mesh of a costly generator once for all tests of a process: meshes do not change."""
 
     def once(make):
@@ -107,10 +119,10 @@ def meshes_made_once():
 
         return find
 
-    with pytest.MonkeyPatch.context() as patch:
-        for name in ("half_spheres", "sphere_on_block", "cylinder_on_block", "rings", "quarter_disc", "graded_block"):
-            patch.setattr(fc.generate, name, once(getattr(fc.generate, name)))
-        yield
+    for name in ("half_spheres", "sphere_on_block", "cylinder_on_block", "rings", "quarter_disc", "graded_block"):
+        make = once(getattr(fc.generate, name))
+        setattr(fc.generate, name, make)
+        fc.generate.GENERATORS[name.replace("_", "-")] = make  # case files and commands look there
 
 
 @pytest.fixture

@@ -56,12 +56,12 @@ def _checked(call: Callable[..., Any], name: str, error: type[FastcontactError])
     @functools.wraps(call)
     def checking(*args: Any, **kwargs: Any) -> Any:
         try:
-            given = signature.bind(*args, **kwargs).arguments
+            given, annotations = signature.bind(*args, **kwargs).arguments, types_of(call)
         except TypeError:  # Python says best which argument is missing, or is none
             return call(*args, **kwargs)
         for key, value in given.items():
             parameter = signature.parameters[key]
-            annotation = types_of(call).get(key, Any)
+            annotation = annotations.get(key, Any)
             if parameter.kind is parameter.VAR_KEYWORD:
                 each = {**value}
                 annotation = Any if typing.get_origin(annotation) is typing.Unpack else annotation
@@ -72,8 +72,8 @@ def _checked(call: Callable[..., Any], name: str, error: type[FastcontactError])
             else:
                 each = {key: value}
             for argument, member in each.items():
-                whose = f"the argument {argument} of {_called(call, name, args)}"
-                check_type(whose, member, annotation, error)
+                if is_masked(member) or not fits(member, annotation):
+                    check_type(f"the argument {argument} of {_called(call, name, args)}", member, annotation, error)
         return call(*args, **kwargs)
 
     checking.__signature__ = _named(signature, call)  # type: ignore[attr-defined]
@@ -184,6 +184,7 @@ def words(annotation: Any) -> str:
     return kind_of(annotation).words
 
 
+@functools.cache
 def kind_of(annotation: Any) -> Kind:
     """Return the test of an annotated type, and its name."""
     kind, members = typing.get_origin(annotation) or annotation, typing.get_args(annotation)

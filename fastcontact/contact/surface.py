@@ -13,7 +13,7 @@ from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.errors import ContactError, MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.mesh.topology import ordered_line, outer_facets, same_facets
+from fastcontact.mesh.topology import ordered_line, outer_facets, remembered, same_facets
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,6 +161,7 @@ def line_neighbours(local: Indices) -> Indices:
     return np.column_stack([ends[local[:, 0]], begins[local[:, 1]]])
 
 
+@remembered
 def surface(mesh: Mesh, group: str) -> Surface:
     """Return the facets of `group` oriented from the solid behind them, as ORIE_PEAU of code_aster does.
 

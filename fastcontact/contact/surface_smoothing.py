@@ -140,9 +140,11 @@ def _axes(block: FacetBlock, coordinates: Array, normal: Array) -> Array:
 
 def smooth_side(side: Surface, points: Array) -> SmoothSide | None:
     """Return the smooth surface of a side at `points` (n_points, dim); None where its facets have no sag."""
+    if _in_one_plane(points[side.points]):
+        return None
     near, nodes, taken = _neighbours(side, np.concatenate([_normals(block, points) for block in side.blocks]))
     around, first, fits = points[side.points[nodes]], 0, []
-    if _flat(points[side.points], around, taken):
+    if _flat(around, taken):
         return None
     for block in side.blocks:
         rows = slice(first, first + len(block.facets))
@@ -174,11 +176,14 @@ def _neighbours(side: Surface, normal: Array) -> tuple[csr_array, Indices, Mask]
     return near, padded, taken
 
 
-def _flat(points: Array, around: Array, taken: Mask) -> bool:
-    """Return whether points (n, dim) lie in one plane, or the points `around` (n, m, dim) every facet in one of their own."""
+def _in_one_plane(points: Array) -> bool:
+    """Return whether points (n, dim) lie in one plane."""
     away = points - points.mean(axis=0)
-    if np.linalg.svd(away, compute_uv=False)[-1] <= FLAT * np.linalg.norm(away):
-        return True
+    return bool(np.linalg.svd(away, compute_uv=False)[-1] <= FLAT * np.linalg.norm(away))
+
+
+def _flat(around: Array, taken: Mask) -> bool:
+    """Return whether the points `around` (n, m, dim) every facet lie in a plane of their own."""
     count = taken.sum(axis=1)[:, None]
     away = np.where(taken[:, :, None], around, 0.0)
     away = np.where(taken[:, :, None], away - (away.sum(axis=1) / count)[:, None], 0.0)

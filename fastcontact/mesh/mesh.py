@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable, Iterable, Mapping, Sized
 from dataclasses import dataclass, field
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
@@ -147,7 +148,7 @@ class Mesh:
         """Dimension of the space, 2 or 3."""
         return int(self.points.shape[1])
 
-    @property
+    @cached_property
     def offsets(self) -> dict[str, int]:
         """Number of the first cell of each element."""
         return starts_of(self.cells)
@@ -203,8 +204,14 @@ class Mesh:
             return self.point_groups[group]
         if group not in self.cell_groups:
             raise MeshError(self._no_group("group", group, self.group_names))
-        blocks = [block.ravel() for block in self.cells_of(group).values()]
-        return np.unique(np.concatenate(blocks)) if blocks else np.empty(0, np.int32)
+        if group not in self._nodes_of_groups:
+            blocks = [block.ravel() for block in self.cells_of(group).values()]
+            self._nodes_of_groups[group] = np.unique(np.concatenate(blocks)) if blocks else np.empty(0, np.int32)
+        return self._nodes_of_groups[group].copy()
+
+    @cached_property
+    def _nodes_of_groups(self) -> dict[str, AnyArray]:
+        return {}
 
     def _no_group(self, kind: str, group: str, known: Iterable[str]) -> str:
         if not self.group_names:

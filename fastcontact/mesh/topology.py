@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import wraps
 from types import MappingProxyType
-from typing import TypeVar
+from typing import Concatenate, ParamSpec, TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -21,6 +21,7 @@ from fastcontact.mesh import elements, topology_kernels
 from fastcontact.mesh.mesh import Mesh
 
 Found = TypeVar("Found")
+Further = ParamSpec("Further")
 
 
 def corner_areas(mesh: Mesh, name: str) -> Array:
@@ -100,15 +101,16 @@ def _direction(facets: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.column_stack([facets[rows, first], ahead, behind if count > 2 else first])
 
 
-def remembered(function: Callable[[Mesh], Found]) -> Callable[[Mesh], Found]:
-    """Return `function`, computed once for every mesh: meshes do not change, and many parts of an analysis need it."""
-    known: WeakKeyDictionary[Mesh, Found] = WeakKeyDictionary()
+def remembered(function: Callable[Concatenate[Mesh, Further], Found]) -> Callable[Concatenate[Mesh, Further], Found]:
+    """Return `function`, computed once for every mesh and further arguments: meshes do not change, and much needs it."""
+    known: WeakKeyDictionary[Mesh, dict[tuple[object, ...], Found]] = WeakKeyDictionary()
 
     @wraps(function)
-    def remembered(mesh: Mesh) -> Found:
-        if mesh not in known:
-            known[mesh] = function(mesh)
-        return known[mesh]
+    def remembered(mesh: Mesh, *args: Further.args, **kwargs: Further.kwargs) -> Found:
+        of_mesh, key = known.setdefault(mesh, {}), (*args, *kwargs.items())
+        if key not in of_mesh:
+            of_mesh[key] = function(mesh, *args, **kwargs)
+        return of_mesh[key]
 
     return remembered
 

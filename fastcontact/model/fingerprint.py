@@ -22,6 +22,7 @@ from fastcontact.elasticity.materials import LinearElastic, Material
 from fastcontact.elasticity.varying_constants import Varying
 from fastcontact.heat.loads import TemporaryHeat
 from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.topology import remembered
 from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.model import Model
 from fastcontact.model.parts.base import Support
@@ -39,7 +40,6 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
     elements = model.kinematics != "axisymmetric" and any(name in BENDING for name in mesh.solids)
     bends = [elements and material.incompatible_modes for material, _ in model.materials]
     parts: dict[str, Any] = {
-        "the mesh": mesh,
         "the kinematics": model.kinematics,
         **({"the strain": model.strain} if model.strain != "small" else {}),
         "the materials": model.materials,
@@ -61,7 +61,7 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
         **{f"{SMOOTHING} '{pair.name}'": True for pair in model.contact if model.bind(pair).smoothing},
         **{f"the option {name}": value for name, value in (options or {}).items()},
     }
-    return {name: _digest(part, mesh) for name, part in parts.items()}
+    return {"the mesh": _digest_of_mesh(mesh), **{name: _digest(part, mesh) for name, part in parts.items()}}
 
 
 def different(one: Mapping[str, str], other: Mapping[str, str]) -> list[str]:
@@ -98,6 +98,11 @@ def _choices() -> Iterable[tuple[str, dict[str, str]]]:
 
 def _unordered(items: Iterable[Any], mesh: Mesh) -> list[str]:
     return sorted(_digest(item, mesh) for item in items)
+
+
+@remembered
+def _digest_of_mesh(mesh: Mesh) -> str:
+    return _digest(mesh, mesh)
 
 
 def _digest(value: Any, mesh: Mesh) -> str:

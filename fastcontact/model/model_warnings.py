@@ -18,10 +18,10 @@ from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.elements import Element
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import poorest_cell
-from fastcontact.mesh.topology import outer_facets
+from fastcontact.mesh.topology import outer_facets, remembered
 from fastcontact.model.checks import initial_gaps
 from fastcontact.model.hanging_nodes import hanging_nodes_warning
-from fastcontact.model.prescribed_overlap import Supports, prescribed_overlap_warnings
+from fastcontact.model.prescribed_overlap import Pairs, Supports, prescribed_overlap_warnings
 from fastcontact.model.ramp import Harmonic, Ramp, Table
 from fastcontact.model.repeated_pairs import split_side_warnings
 from fastcontact.model.units import in_si, misfit
@@ -52,21 +52,22 @@ RUBBING = 3.0
 @on_one_blas_thread
 def model_warnings(model: Model, ramp: Ramp) -> list[str]:
     """Return the warnings about a model that `Model.check` has found complete, for an analysis along a ramp."""
-    warnings = _moduli(model) + _named_units(model) + _proportions(model)
+    supports = Supports(*model.prescribed_by_ramp(), ramp)
+    pairs, pushed = [(pair, model.bind(pair)) for pair in model.contact], _pushed(supports)
+    warnings = _moduli(model) + _named_units(model) + _proportions(model, pushed)
     warnings += [text for text in (poorest_cell(model.mesh), hanging_nodes_warning(model)) if text] + _coincident(model)
-    warnings += _friction(model) + _penetrating(model) + _unramped(model, ramp)
-    warnings += _prescribed_overlaps(model, ramp) + _lost_loads(model) + _split_sides(model)
+    warnings += _friction(model) + _penetrating(model, pairs, pushed) + _unramped(model, ramp)
+    warnings += _prescribed_overlaps(pairs, supports) + _lost_loads(model) + _split_sides(model, pairs)
     return warnings + _stiffness(model.mesh) + [text for load in model.loads for text in _load_integral(model, load)]
 
 
-def _prescribed_overlaps(model: Model, ramp: Ramp) -> list[str]:
+def _prescribed_overlaps(pairs: Pairs, supports: Supports) -> list[str]:
     """Return a warning for each contact with nodes that supports alone bring into its other side."""
-    fixed, by_ramp = model.prescribed_by_ramp()
-    supported = [pair for pair in model.contact if fixed[model.mesh.points_of(pair.secondary)].any()]
-    return prescribed_overlap_warnings([(p, model.bind(p)) for p in supported], Supports(fixed, by_ramp, ramp))
+    supported = [(pair, bound) for pair, bound in pairs if supports.fixed[bound.secondary.points].any()]
+    return prescribed_overlap_warnings(supported, supports)
 
 
-def _split_sides(model: Model) -> list[str]:
+def _split_sides(model: Model, pairs: Pairs) -> list[str]:
     """Return a warning for each two contacts that go on in each other."""
     touched = {
         pair.name: np.union1d(*(model.mesh.points_of(side) for side in (pair.secondary, pair.primary)))
@@ -75,8 +76,9 @@ def _split_sides(model: Model) -> list[str]:
     }
     points, count = np.unique(np.concatenate([*touched.values(), np.empty(0, np.int32)]), return_counts=True)
     common = points[count > 1]
-    near = [pair for pair in model.contact if pair.primary and np.isin(touched[pair.name], common).any()]
-    return split_side_warnings([(pair, model.bind(pair)) for pair in near])
+    return split_side_warnings(
+        [(pair, bound) for pair, bound in pairs if pair.primary and np.isin(touched[pair.name], common).any()]
+    )
 
 
 def _lost_loads(model: Model) -> list[str]:
@@ -124,10 +126,9 @@ def _named_units(model: Model) -> list[str]:
     return texts
 
 
-def _proportions(model: Model) -> list[str]:
+def _proportions(model: Model, moved: float) -> list[str]:
     """Compare prescribed displacements with the size of the model, and loads with its stiffness."""
     size = float(np.ptp(model.mesh.points, axis=0).max())
-    moved = _pushed(model)
     texts = []
     if moved > DISPLACED * size:
         texts.append(
@@ -146,10 +147,9 @@ def _proportions(model: Model) -> list[str]:
     return texts
 
 
-def _pushed(model: Model) -> float:
+def _pushed(supports: Supports) -> float:
     """Return the largest prescribed displacement, by its history or as it is given without one [length]."""
-    _, prescribed = model.prescribed_by_ramp()
-    straight = {ramp: values for ramp, values in prescribed.items() if not isinstance(ramp, Harmonic)}  # not what turns
+    straight = {ramp: at for ramp, at in supports.by_ramp.items() if not isinstance(ramp, Harmonic)}  # not what turns
     return max((_peak(ramp) * float(np.abs(values).max(initial=0.0)) for ramp, values in straight.items()), default=0.0)
 
 
@@ -204,12 +204,10 @@ def _friction(model: Model) -> list[str]:
     ]
 
 
-def _penetrating(model: Model) -> list[str]:
+def _penetrating(model: Model, pairs: Pairs, pushed: float) -> list[str]:
     """Return a warning for each contact whose sides penetrate by more than supports push before they do."""
-    pushed = _pushed(model)
     texts = []
-    for pair in model.contact if pushed else ():
-        bound = model.bind(pair)
+    for pair, bound in pairs if pushed else ():
         gap = initial_gaps(bound)
         row = int(np.argmin(gap))
         if -gap[row] > pushed:
@@ -243,6 +241,7 @@ def _unramped(model: Model, ramp: Ramp) -> list[str]:
     ]
 
 
+@remembered
 def _stiffness(mesh: Mesh) -> list[str]:
     """Return a warning if the quadrature of the stiffness is inexact, on cells that are curved or distorted.
 

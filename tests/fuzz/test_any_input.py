@@ -31,6 +31,7 @@ HEADS = {
 
 
 @few
+@pytest.mark.usefixtures("meshio_here")
 @given(suffix=st.sampled_from(sorted(HEADS)), head=st.booleans(), data=st.binary(max_size=400))
 def test_any_bytes(tmp_path, suffix, head, data):
     path = tmp_path / f"any{suffix}"

@@ -63,5 +63,5 @@ def prepared(name: str, folder: Path) -> KilledCase:
     if name in feature_cases.CASES:
         return KilledCase(feature_cases.written(name, folder), 0.0)
     path = folder / f"{name}.toml"
-    path.write_text({"friction": RUBBING, "small": spheres(4.0, 12)}[name], encoding="utf-8")
+    path.write_text({"friction": RUBBING, "small": spheres(6.0, 12)}[name], encoding="utf-8")
     return KilledCase(path, 1e-10 if name == "friction" else 1e-12)

@@ -33,11 +33,13 @@ def test_a_child_forked_after_threads_started_is_refused_in_words_and_does_not_h
     assert "'spawn' or 'forkserver'" in child["text"]
 
 
+@pytest.mark.slow
 def test_the_remedy_named_in_that_message_works():
     answer = found("fork", "small", NUMBA_THREADING_LAYER="workqueue")
     assert answer["child"] == answer["parent"]
 
 
+@pytest.mark.slow
 def test_a_forked_child_that_needs_no_parallel_kernel_runs():
     answer = found("fork", "plane")
     assert answer["child"] == answer["parent"]

@@ -18,7 +18,7 @@ from fastcontact._jit import parallel
 
 def plane() -> list[fc.StepResult]:
     """Two half-spheres, a factorisation."""
-    model = fc.Model(fc.generate.half_spheres("tri3", size=6.0), "axisymmetric")
+    model = fc.Model(fc.generate.half_spheres("tri3", size=10.0), "axisymmetric")
     model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
     model.fix("A1A2", "x")
     model.prescribe("A2B2", y=-2.0)

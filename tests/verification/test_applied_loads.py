@@ -242,7 +242,7 @@ def driven_by_force(mesh, formulation, force, gap=0.0, **load):
 
 @pytest.mark.parametrize("solver", ["direct", "amg"])
 @pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
-@pytest.mark.parametrize("steps", [1, 4])
+@pytest.mark.parametrize("steps", [4, 1])
 def test_force_driven_is_displacement_driven(formulation, solver, steps, forma04):
     mesh = fc.generate.half_spheres("tri3", size=4.0)
     options = {"linear_solver": solver, "linear_tolerance": 1e-12}

@@ -130,7 +130,7 @@ def test_without_a_lock_the_force_stays():
     assert pulled.contact["joint"].force[1] == pytest.approx(FORCE - 1.5, rel=1e-9)
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("solver", [SOLVERS[0], pytest.param(SOLVERS[1], marks=pytest.mark.slow)])
 def test_the_number_of_steps_does_not_matter_and_a_run_goes_on_from_any(solver, tmp_path):
     model, options = joint(4.4), {"linear_solver": solver, "linear_tolerance": 1e-12}
     once = fc.solve(model, [1.0, 2.0], **options)

@@ -37,6 +37,7 @@ def test_ball_on_block(elements, options):
     assert changes(model, "ball") < 1e-4
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("options", FORMULATIONS, ids=str)
 @pytest.mark.parametrize("elements", ["quad4", "tri6", "hex8"])
 def test_stiff_body_on_soft_one(elements, options):

@@ -62,8 +62,13 @@ def compare(one, ring, steps=(None, None), n=3, rel=1e-7, **options):
     return found, together
 
 
-@pytest.mark.parametrize(("sectors", "element"), [(2, "quad4"), (3, "quad8"), (5, "tri6"), (6, "quad8"), (4, "hex8")])
-@pytest.mark.parametrize("solver", ["direct", "amg"])
+@pytest.mark.parametrize(
+    ("sectors", "element", "solver"),
+    [
+        (2, "quad4", "amg"), (3, "quad8", "direct"), (5, "tri6", "amg"), (6, "quad8", "direct"), (4, "hex8", "direct"),
+        pytest.param(4, "hex8", "amg", marks=pytest.mark.slow),
+    ],
+)  # fmt: skip
 def test_a_free_ring(sectors, element, solver):
     divisions = (6, 3, 2) if element == "hex8" else (6, 3)
     part = sector(sectors, 1.0, 2.0, divisions, element)
@@ -123,6 +128,7 @@ def press_fit(sectors, element="quad8", cells=((6, 2), (6, 3)), **options):
 
 
 @pytest.mark.filterwarnings("ignore:contact 'fit' (penetrates|is closed where)")
+@pytest.mark.each_value
 @pytest.mark.parametrize(("options", "element"), [*((name, "quad8") for name in list(OPTIONS)[:4]), ("plain", "hex8")])
 @pytest.mark.parametrize("law", ["friction", "none", "tied", "penalty"])
 def test_a_press_fit(options, element, law):

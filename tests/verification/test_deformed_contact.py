@@ -67,7 +67,9 @@ def test_the_width_of_a_contact_is_that_of_the_deformed_shape() -> None:
     assert max(contact.radius[0], 0.0) in (pytest.approx(grown, rel=1e-6), pytest.approx(0.5 * grown, rel=1e-6))
 
 
-@pytest.mark.parametrize(("element", "formulation"), [("quad4", "node_to_segment"), ("quad8", None)])
+@pytest.mark.parametrize(
+    ("element", "formulation"), [("quad4", "node_to_segment"), pytest.param("quad8", None, marks=pytest.mark.slow)]
+)
 @pytest.mark.filterwarnings("ignore:contact 'ball' has only")
 def test_a_ball_slides_over_a_rubber_block(element: str, formulation: str | None) -> None:
     """Pressed in by a quarter of the height, then the block is drawn on by three nodes; friction of 0.5."""

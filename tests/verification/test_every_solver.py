@@ -1,7 +1,8 @@
 """One table that shows that results do not depend on the linear solver: multigrid beside factors.
 
 Every element, formulation and dimension, rigid obstacles too, with and without friction and penalty, either side secondary.
-The default run takes each element, formulation and friction once, in turn with a penalty or swapped; the whole table is slow.
+The default run takes each element, formulation and friction once, in turn with a penalty or swapped, of elements in space two
+formulations; the whole table is slow.
 """
 
 from itertools import product
@@ -34,14 +35,17 @@ FRICTION, PENALTY = 0.3, 1e5
 SAME = 1e-7  # of the largest; multigrid stops at residuals of 1e-10
 
 
-def cells(kinematics, elements):
-    """Return (kinematics, element, formulation, friction, penalty, swapped); what the default run leaves out is slow."""
+def cells(kinematics, elements, every=1):
+    """Return (kinematics, element, formulation, friction, penalty, swapped); what the default run leaves out is slow.
+
+    It takes one in `every` of the formulations of each element, in turn.
+    """
     table = []
     for (i, element), (j, formulation), (k, friction) in product(
         enumerate(elements), enumerate(FORMULATIONS), enumerate((0.0, FRICTION))
     ):
         for penalty, swapped in product((None, PENALTY), (False, True)):
-            taken = (i + j + k + (penalty is not None) + 2 * swapped) % 4 == 0
+            taken = (i + j) % every == 0 == (i + j + k + (penalty is not None) + 2 * swapped) % 4
             marks = () if taken else pytest.mark.slow
             cell = (kinematics, element, formulation, friction, penalty, swapped)
             name = "-".join([kinematics, element, formulation, "friction" * bool(friction), "penalty" * bool(penalty)])
@@ -158,7 +162,7 @@ def compare(cell, obstacle=False):
 WHOLE = ("kinematics", "element", "formulation", "friction", "penalty", "swapped")
 
 
-@pytest.mark.parametrize(WHOLE, cells("3d", (*SOLIDS, "hex8+tet10", "wedge6+hex20")))
+@pytest.mark.parametrize(WHOLE, cells("3d", (*SOLIDS, "hex8+tet10", "wedge6+hex20"), every=2))
 def test_multigrid_gives_what_factors_give_in_space(kinematics, element, formulation, friction, penalty, swapped):
     compare((kinematics, element, formulation, friction, penalty, swapped))
 

@@ -194,6 +194,7 @@ def test_a_pin_in_a_hole_presses_where_it_touches(method, sides, carried):
     assert along == pytest.approx(np.abs(contact.force[1]), rel=0.02)
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("multipliers", ["standard", "dual"])
 @pytest.mark.parametrize("element", ["hex8", "hex20", "tet10"])
 def test_barely_covered_faces_have_no_wild_pressure(element, multipliers, carried):

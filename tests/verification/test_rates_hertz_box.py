@@ -94,6 +94,7 @@ def test_rates_on_hertz_in_a_box(kinematics, element, formulation, sizes, bounds
     falls_as_expected(kinematics, element, formulation, sizes, bounds)
 
 
+@pytest.mark.slow
 def test_rates_of_hexahedra_under_a_wide_contact():
     falls_as_expected("3d", "hex8", "node_to_segment", (6, 8, 12, 16), (0.055, 0.00105), radius=WIDE)
 

@@ -46,8 +46,8 @@ PUSHED = {"force": {"z": -240.0}}
 @pytest.mark.parametrize(
     ("formulation", "driving"),
     [
-        ("node_to_segment", {}), ("node_to_segment", PUSHED), ("continuous", {}),
-        pytest.param("continuous", PUSHED, marks=pytest.mark.slow),
+        ("node_to_segment", {}), ("node_to_segment", PUSHED),
+        *(pytest.param("continuous", driving, marks=pytest.mark.slow) for driving in ({}, PUSHED)),
     ],
 )  # fmt: skip
 @pytest.mark.filterwarnings("ignore:contact 'ball' has only")

@@ -67,7 +67,7 @@ def test_a_flat_block_wears_evenly():
     assert sunk == pytest.approx(-5e-6 * FORCE / 2.0 * 2.0, rel=1e-9)
 
 
-@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
+@pytest.mark.parametrize("formulation", ["node_to_segment", pytest.param("continuous", marks=pytest.mark.slow)])
 def test_a_shoe_wears_in_until_it_presses_evenly(formulation):
     """A guided shoe that wears everywhere alike presses everywhere alike: its force over its area."""
     model = shoe(formulation, wear=4e-5)

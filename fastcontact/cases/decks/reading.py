@@ -58,7 +58,7 @@ class Reader:
                 raise block.location.refuse(
                     "is not supported inside of an instance: put it into the part or the assembly"
                 )
-            read(content, self._open_part(), block)
+            read(content, self.part or self.content.root, block)
         elif known.place == "model":
             if keyword != "AMPLITUDE":
                 self._not_in_step(block)
@@ -73,9 +73,6 @@ class Reader:
             read(content, self.step, block)
         else:
             read(block)
-
-    def _open_part(self) -> Part:
-        return self.part or self.content.root
 
     def _not_in_step(self, block: Block) -> None:
         if self.step is not None:

@@ -48,6 +48,7 @@ def together(step):
     return total
 
 
+@pytest.mark.pairwise
 @pytest.mark.parametrize("element", ["hex8", "tet4"])
 @pytest.mark.parametrize("penalty", [None, 1e5])
 @pytest.mark.parametrize("solver", ["direct", "amg"])

@@ -213,7 +213,9 @@ def test_other_treatments_of_the_geometry(criteria, friction):
     check_resumed(lambda: spheres(friction=friction), fc.linear_ramp(4), relative, criteria=Criteria(**criteria))
 
 
-@pytest.mark.parametrize(("solver", "updates", "friction"), [("direct", 6, 0.3), ("amg", 7, 0.05)])
+@pytest.mark.parametrize(
+    ("solver", "updates", "friction"), [("direct", 6, 0.3), pytest.param("amg", 7, 0.05, marks=pytest.mark.slow)]
+)
 def test_steps_cut_in_halves(solver, updates, friction):
     """The first step is cut, and the next one starts from its last part (extrapolated, with an iterative solver).
 

@@ -144,6 +144,7 @@ MODELS = {
 }
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("solver", ["direct", "amg"])
 @pytest.mark.parametrize("name", list(MODELS))
 def test_a_failed_step_leaves_no_trace(name, solver):

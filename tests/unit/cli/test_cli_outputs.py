@@ -184,7 +184,7 @@ def test_the_data_file_of_an_xdmf_mesh_is_read_too(option, files, monkeypatch, c
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/stdout"), reason="needs names of open files")
-@pytest.mark.parametrize("name", ["/dev/fd/1", "link"])
+@pytest.mark.parametrize("name", ["/dev/fd/1", pytest.param("link", marks=pytest.mark.slow)])
 def test_what_a_shell_opened_to_append_to_is_appended_to(name, files):
     os.symlink("/dev/stdout", files / "link")
     (files / "log").write_text("kept\n")
@@ -198,7 +198,7 @@ def test_what_a_shell_opened_to_append_to_is_appended_to(name, files):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="files as POSIX numbers them")
-@pytest.mark.parametrize("closed", [">&-", "<&- >&- 2>&-"])
+@pytest.mark.parametrize("closed", [pytest.param(">&-", marks=pytest.mark.slow), "<&- >&- 2>&-"])
 def test_a_process_without_standard_files(closed, files):
     """As daemons are started: no file that is opened takes the place of what is printed."""
     command = f"'{sys.executable}' -m fastcontact run case.toml -o out.vtkhdf --json out.json {closed}"

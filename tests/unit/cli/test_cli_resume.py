@@ -279,6 +279,7 @@ def test_a_full_disk_stops_the_run_before_anything_is_replaced(whole, small_disk
     assert sorted(os.listdir(small_disk)) == ["other", path.name]
 
 
+@pytest.mark.slow
 def test_two_runs_begun_at_once_leave_one_good_file(whole, path):
     case, steps = whole
     command = [sys.executable, "-m", "fastcontact", "run", str(case), "-q", "-o", str(path)]

@@ -70,6 +70,7 @@ def little_garbage() -> Iterator[None]:
     gc.unfreeze()
 
 
+@pytest.mark.each_value
 @pytest.mark.usefixtures("little_garbage")
 @pytest.mark.parametrize("shared", [write_arrays.SHARED, 0], ids=["steps share a chunk", "a chunk a step"])
 @pytest.mark.parametrize("error", [OSError(errno.EIO, "Input/output error"), KeyboardInterrupt()], ids=["disk", "user"])

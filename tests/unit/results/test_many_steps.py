@@ -51,8 +51,8 @@ def test_indices_do_not_gather_in_memory(shared: int, tmp_path: Path, monkeypatc
     assert max(kept[36:]) <= max(kept[:24])
     with open_results(path) as results:
         assert len(results) == 60
-        for number, step in enumerate(results):
-            assert_same(step, nth_step(number), f"step {number}")
+        for number in range(0, 60, 7):
+            assert_same(results[number], nth_step(number), f"step {number}")
 
 
 def test_a_resumed_file_is_read_step_by_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

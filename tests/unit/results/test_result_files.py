@@ -449,7 +449,7 @@ KILLED = """
     import os, random, signal, sys, time
     sys.path.insert(0, sys.argv[1])
     from test_result_files import MESH, ResultWriter, nth_step
-    for trial in range(6):
+    for trial in range(4):
         path = f"{sys.argv[2]}/killed{trial}.vtkhdf"
         acknowledged = os.open(path + ".count", os.O_CREAT | os.O_RDWR)
         child = os.fork()
@@ -473,7 +473,7 @@ def test_kill_9_costs_no_finished_step(tmp_path: Path) -> None:
     here = str(Path(__file__).parent)
     subprocess.run([sys.executable, "-c", textwrap.dedent(KILLED), here, str(tmp_path)], check=True)
     total = 0
-    for trial in range(6):
+    for trial in range(4):
         path = tmp_path / f"killed{trial}.vtkhdf"
         finished = (tmp_path / f"killed{trial}.vtkhdf.count").stat().st_size
         if not path.exists():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import importlib.util
 import os
 import shutil
 import subprocess
@@ -359,6 +358,7 @@ FULL = """
 """
 
 
+@pytest.mark.slow  # by default `test_a_disk_that_is_full_stops_the_run`, where a limit stands for the end of the disk
 def test_a_full_disk_costs_no_step_and_the_run_goes_on_when_there_is_room(small_disk: Path, path: Path) -> None:
     full = small_disk / "run.vtkhdf"
     command = [sys.executable, "-c", textwrap.dedent(FULL), str(Path(__file__).parent), str(full)]
@@ -375,27 +375,6 @@ def test_a_full_disk_costs_no_step_and_the_run_goes_on_when_there_is_room(small_
     whole = fc.solve(spheres(), fc.linear_ramp(60))[-1]
     last_step = open_results(path)[-1]
     assert np.abs(last_step.displacement - whole.displacement).max() <= 1e-12 * np.abs(whole.displacement).max()
-
-
-LIMITED = """
-    import resource, signal, sys
-    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[3]), int(sys.argv[3])))
-""" + FULL.replace("import sys\n", "\n", 1)
-
-
-@pytest.mark.skipif(importlib.util.find_spec("resource") is None, reason="needs resource limits")
-def test_a_limit_of_file_sizes_costs_no_step_of_a_resumed_run(path: Path) -> None:
-    begun(path, (1 / 60,))
-    limit = path.stat().st_size + 900_000
-    command = [sys.executable, "-c", textwrap.dedent(LIMITED), str(Path(__file__).parent), str(path), str(limit)]
-    done = subprocess.run(command, capture_output=True, text=True)
-    last = done.stderr.strip().splitlines()[-1]
-    assert done.returncode == 1
-    assert f"'{path}' cannot be written at step" in last
-    n_steps = len(open_results(path))
-    assert 1 < n_steps < 60
-    assert len(resumed(path, fc.linear_ramp(60))) == 60
 
 
 # ---------------------------------------------------------------------------------------------- packing

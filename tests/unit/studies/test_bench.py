@@ -8,9 +8,8 @@ from fastcontact.cli import main
 from fastcontact.cli.bench import suite
 
 SUBJECTS = {"assembly", "contact", "io", "linear", "recovery", "search", "startup", "study"}
-
-
 TABLES = {"robustness", "threads"}
+SLOW = pytest.mark.slow
 
 
 def test_all_subjects_are_there():
@@ -93,7 +92,7 @@ def test_what_a_function_calls_outside_of_the_package_is_its_own():
     assert found == pytest.approx({"a/b.py/f": 1.0 + 3.0 + 0.3, "c.py/g": 2.0 + 1.0 + 0.1, "other": 0.5})
 
 
-@pytest.mark.parametrize("name", sorted(SUBJECTS))
+@pytest.mark.parametrize("name", [pytest.param(s, marks=SLOW if s == "startup" else ()) for s in sorted(SUBJECTS)])
 def test_smallest_size_runs_and_is_recorded(name, tmp_path, capsys):
     path = tmp_path / "run.json"
     assert main(["bench", name, "--smallest", "--json", str(path)]) == 0
@@ -107,16 +106,13 @@ def test_smallest_size_runs_and_is_recorded(name, tmp_path, capsys):
     assert name in capsys.readouterr().out
 
 
-SLOW = pytest.mark.slow
-
-
 @pytest.mark.parametrize(
     "problem",
     [
         pytest.param("sphere-on-block", marks=SLOW),
         "forma04c",
         pytest.param("pressed-blocks", marks=SLOW),
-        "pushed-blocks",
+        pytest.param("pushed-blocks", marks=SLOW),
     ],
 )
 def test_contact_in_detail(problem, tmp_path):

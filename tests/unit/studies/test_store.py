@@ -16,7 +16,7 @@ from fastcontact.cli import main
 def test_a_killed_sweep_redoes_no_finished_run(root, tmp_path):
     store, target = tmp_path / "store", tmp_path / "sweep.json"
     command = [sys.executable, "-m", "fastcontact", "sweep", str(root / "data/cases/forma04c.toml")]
-    command += ["--set", "approach=0.1:4:12", "--level", "0", "--workers", "2", "--store", str(store), "-q"]
+    command += ["--set", "approach=0.1:4:8", "--level", "0", "--workers", "2", "--store", str(store), "-q"]
     command += ["--json", str(target)]
     first = subprocess.Popen(command, start_new_session=True)
     deadline = time.monotonic() + 120
@@ -26,14 +26,14 @@ def test_a_killed_sweep_redoes_no_finished_run(root, tmp_path):
     first.wait()
     kept = finished(store)
     assert len(kept) >= 3
-    assert not target.exists() or len(kept) == 12
+    assert not target.exists() or len(kept) == 8
     assert main([*command[3:], "--workers", "1"]) == 0
     after = finished(store)
-    assert len(after) == 12
+    assert len(after) == 8
     assert {name: after[name] for name in kept} == kept
     points = json.loads(target.read_text())["points"]
     forces = [point["force"] for point in points]
-    assert len(forces) == 12
+    assert len(forces) == 8
     assert forces == sorted(forces)
 
 

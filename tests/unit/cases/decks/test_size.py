@@ -63,7 +63,9 @@ def check_size(folder, small, text, count):
     assert peak < 20 * len(text), f"{peak / len(text):.1f} bytes a byte"
 
 
-@pytest.mark.parametrize("kind", LINES)
+@pytest.mark.parametrize(
+    "kind", [pytest.param(k, marks=pytest.mark.slow if k in ("sets", "same forces") else ()) for k in LINES]
+)
 def test_twenty_bytes_a_byte(kind, tmp_path):
     old, new = LINES[kind]
     small, large = (block(n).replace(old, new(n)) if old else block(n) for n in (1, 16))
