@@ -39,8 +39,6 @@ PATIENCE, FALL = 12, 0.5
 # Stiffness of springs along closed gaps beside the largest of the bodies. What contact does not hold, such as gaps between
 # values of a pressure field, creeps with stiff ones: an O-ring takes 5, 7, 11 iterations with 5e-5, 2e-4, 1e-3.
 HELD = 5e-5, 1e-3
-# After changes of the displacement up to this, relative to its size, a tangent serves a second iteration.
-SMALL = 1e-5
 # Contact geometry of the linearised bodies settles to this part of the last relative change of the displacement.
 FORCING = 1e-3
 # Relative error of the displacement below which iterations end. Changes below SCATTER that do not fall to the part STAYS of
@@ -108,14 +106,14 @@ class _Newton:
         u, bodies, changes = origin, problem.deformed(origin, start, self._load.rise), [1.0]
         for _ in range(MOST):
             before, here = u, bodies
-            target, force = self._solve(here, before, changes[-1])
-            u, bodies, fraction = self._reach(before, target)
+            target, force = self._solve(here, before, changes)
+            u, bodies, fraction = self._reach(before, target, changes)
             balanced = self._balanced(u, bodies, force, before)
             if history and fraction == 1.0 and balanced.excess > 1.0:
                 u, bodies, fraction = self._searched((before, here), (u, bodies), force)
                 balanced = self._balanced(u, bodies, force, before) if fraction < 1.0 else balanced
-            moved, size = largest_difference(u, before), max(map(largest, (u, self._load.lift, start.u)))
-            changes.append(moved / size if size else 0.0)
+            moved = largest_difference(u, before)
+            changes.append(self._relative(moved, u))
             history.append(_told(self._iterate, changes[-1], balanced, fraction))
             if (
                 fraction == 1.0
@@ -131,16 +129,21 @@ class _Newton:
             history,
         )
 
+    def _relative(self, moved: float, u: Array) -> float:
+        """Return the largest change of displacements to u (n_dofs,), `moved` [length], relative to their size."""
+        size = max(map(largest, (u, self._load.lift, self._start.u)))
+        return moved / size if size else 0.0
+
     def _balanced(self, u: Array, bodies: DeformedBodies, contact_force: Array, linearised_at: Array) -> Balance:
         """Return the balance of forces at displacements u, fluid's those of a linearisation elsewhere (n_dofs,) [length]."""
         contact_force = contact_force + self._fluid_change(linearised_at, u)
         internal = self._problem.internal(bodies, u, self._load)
         return balance(self._problem, u, contact_force, self._load.force, self._start.largest_force, internal)
 
-    def _solve(self, bodies: DeformedBodies, u: Array, change: float) -> tuple[Array, Array]:
+    def _solve(self, bodies: DeformedBodies, u: Array, changes: list[float]) -> tuple[Array, Array]:
         """Return displacements (n_dofs,) [length] and contact forces (n_dofs,) [force] of the bodies linearised at u.
 
-        Contact geometry settles to a part of the last relative `change` of the displacement. Where the tangent is not
+        Contact geometry settles to a part of the last of the relative `changes` of the displacement. Where the tangent is not
         positive definite, the springs of floating bodies are stiffened, then the constraints that the last contact held, by
         soft springs first: this leaves the iterations quadratic but for what contact does not hold. Where that does not help,
         parts of the geometric stiffness are left out. Once springs have helped, they are tried first.
@@ -152,7 +155,7 @@ class _Newton:
             if failed or tangent.geometric < WHOLE:  # the stiffness of the bodies is taken apart by now
                 bodies = self._problem.deformed(u, self._start, self._load.rise, geometric=tangent.geometric)
             try:
-                solution = self._linear_contact(bodies, u, change, tangent)
+                solution = self._linear_contact(bodies, u, changes, tangent)
             except (ModelError, ConvergenceError) as error:
                 log.info("the tangent fails with %s: %s", tangent, error)
                 failed = error
@@ -174,22 +177,24 @@ class _Newton:
         return whole + held + [_Tangent(less, 0.0, floats) for less in range(WHOLE)[::-1]]
 
     def _linear_contact(
-        self, bodies: DeformedBodies, u: Array, change: float, tangent: _Tangent
+        self, bodies: DeformedBodies, u: Array, changes: list[float], tangent: _Tangent
     ) -> tuple[Array, Array]:
         """Return the result of `_solve` for a tangent, and keep the contact."""
         start, iterate = self._start, self._iterate
-        problem, self._kept = (self._kept, None) if change <= SMALL else (None, None)
-        if problem is None:
+        problem, self._kept = (self._kept, None) if self._serves_again(changes) else (None, None)
+        if problem is not None:
+            problem = replace(problem, linearised_at=None if problem.linearised_at is None else u)
+        else:
             scale = tangent.held and tangent.held * float(bodies.K.diagonal().max())
             added = self._added(scale, u) if tangent.geometric == WHOLE else None
             problem = self._problem.linearised(bodies, u, self._load, iterate.rigid, added, tangent.stiff)
-            if tangent.geometric == WHOLE and not problem.pairs:  # where there is contact, its geometry goes on
+            if tangent.geometric == WHOLE:
                 self._kept = problem
         load = problem.about(bodies, u, self._load, iterate.rigid)
         iterate.u, iterate.history = u.copy(), []
         loaded, settled = with_loads(problem, load), None
         if problem.pairs:
-            enough = min(max(problem.criteria.geometry, FORCING * change), LOOSEST)
+            enough = min(max(problem.criteria.geometry, FORCING * changes[-1]), LOOSEST)
             inner = replace(problem, criteria=replace(problem.criteria, geometry=enough))
             dofs = problem.dofs.for_step(iterate.u, load.lift)
             step = StepContext(inner, start, load, dofs.loaded(loaded), dofs)
@@ -234,16 +239,32 @@ class _Newton:
             change[:n] += (now - then).ravel()
         return change
 
-    def _reach(self, u: Array, target: Array) -> tuple[Array, DeformedBodies, float]:
+    def _serves_again(self, changes: list[float]) -> bool:
+        """Return whether a second iteration with the last tangent is expected to be the last iteration.
+
+        Newton's next change is C times the square of the last one. It leaves C^2 times the cube, if the tangent is old.
+        """
+        before, last = changes[-2:] if len(changes) > 2 else (0.0, changes[-1])
+        C = last / before**2 if before else 1.0
+        return len(changes) > 1 and C**2 * last**3 <= self._enough
+
+    @property
+    def _enough(self) -> float:
+        return max(self._problem.criteria.geometry, UNCHANGED)
+
+    def _reach(self, u: Array, target: Array, changes: list[float]) -> tuple[Array, DeformedBodies, float]:
         """Return the displacements to go on from, the bodies there, and the part of the way to the `target` (n_dofs,).
 
-        Half of the way, of that half, and so on, is gone where cells turn inside out farther on.
+        Half of the way, of that half, and so on, is gone where cells turn inside out farther on. After `changes` and the
+        whole way, a tangent may not be needed any more.
         """
+        changes = [*changes, self._relative(largest_difference(target, u), target)]
+        tangent = not (_still(self._problem, changes) or (self._kept is not None and self._serves_again(changes)))
         fraction = 1.0
         for _ in range(HALVINGS):
             end = target if fraction == 1.0 else u + fraction * (target - u)
             try:
-                return end, self._problem.deformed(end, self._start, self._load.rise), fraction
+                return end, self._problem.deformed(end, self._start, self._load.rise, tangent=tangent), fraction
             except ConvergenceError as error:
                 failed = error
             fraction *= 0.5

@@ -227,7 +227,7 @@ def _add_isochoric(value, first, power, F, J, G, slope, bend, P, A):
 def _invariants(constants, F, J, G, P, A):
     """C10 (I1 - 3) + C20 (I1 - 3)^2 + C30 (I1 - 3)^3 + C01 (I2 - 3) of isochoric invariants; return the energy density.
 
-    (Rivlin and Saunders, 1951; Yeoh, 1993.) Halves of the invariants, of which F is a derivative, are taken in the kernel above.
+    (Rivlin and Saunders, 1951; Yeoh, 1993.) The kernel above takes halves of the invariants: F is then a derivative.
     """
     C10, C01, C20, C30 = constants[3], constants[4], constants[5], constants[6]
     P[:], A[:], I1 = 0.0, 0.0, 0.0
