@@ -4,9 +4,10 @@
 height and sheared by as much. FElupe solves by conjugate gradients with Jacobi's preconditioner, which takes less than its
 default, SuperLU.
 
-``python bench/nonlinear.py indentation [SIZE] [STEPS]``: a rigid ball of quad8 pressed into an elastic-plastic block of
-quad8, axisymmetric; SIZE is the length of the facets in contact, 0.02 by default. CalculiX (``ccx``) takes the same mesh,
-CAX8R, and surface-to-surface contact by a penalty, in as many fixed increments; ours has mortar.
+``python bench/nonlinear.py indentation [SIZE] [STEPS] [RADIUS]``: a rigid ball of quad8 pressed into an elastic-plastic block
+of quad8, axisymmetric; SIZE is the length of the facets in contact, 0.02 by default, and cells are as small up to RADIUS, 0.6
+by default. CalculiX (``ccx``) takes the same mesh, CAX8R, and surface-to-surface contact by a penalty, in as many fixed
+increments; ours has mortar.
 """
 
 from __future__ import annotations
@@ -62,11 +63,11 @@ print(mesh.points.size, count, *force.reshape(-1, 3)[top].sum(axis=0))
 """
 INDENTED = """
 import sys, numpy as np, fastcontact as fc
-size, steps = float(sys.argv[1]), int(sys.argv[2])
-block = fc.generate.graded_block("quad8", width=6.0, contact_radius=0.6, contact_size=size)
+size, steps, radius = float(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3])
+block = fc.generate.graded_block("quad8", width=6.0, contact_radius=radius, contact_size=size)
 cap = fc.generate.block((1.0, 1.0), (round(0.8 / size), 2), "quad8", name="BALL")
-angle, radius = 0.4 * cap.points[:, 0], 2.5 - 0.2 * cap.points[:, 1]
-cap = cap.replace(points=np.column_stack([radius * np.sin(angle), 2.5 - radius * np.cos(angle)]))
+angle, radii = 0.4 * cap.points[:, 0], 2.5 - 0.2 * cap.points[:, 1]
+cap = cap.replace(points=np.column_stack([radii * np.sin(angle), 2.5 - radii * np.cos(angle)]))
 cap = fc.generate.renamed(cap, lambda group: {"BALL": "BALL", "BOTTOM": "ARC"}.get(group))
 mesh = fc.generate.union(block, cap)
 model = fc.Model(mesh, "axisymmetric")
@@ -76,8 +77,8 @@ model.fix("BOTTOM", "xy")
 model.fix("SYMMETRY_X", "x")
 model.prescribe("BALL", x=0.0, y=-0.04)
 model.add_contact("ball", secondary="CONTACT", primary="ARC")
-if sys.argv[3:]:
-    np.savez(sys.argv[3], points=mesh.points, cells=mesh.cells["quad8"],
+if sys.argv[4:]:
+    np.savez(sys.argv[4], points=mesh.points, cells=mesh.cells["quad8"],
              of_ball=mesh.split(mesh.cell_groups["BALL"])["quad8"],
              top=mesh.cells_of("CONTACT")["line3"], arc=mesh.cells_of("ARC")["line3"],
              **{name: mesh.points_of(name) for name in ("BOTTOM", "SYMMETRY_X", "BALL")})
@@ -114,16 +115,16 @@ def deck(problem: Path, steps: int, path: Path) -> None:
         )
 
 
-def indentation(size: str = "0.02", steps: str = "40") -> None:
+def indentation(size: str = "0.02", steps: str = "40", radius: str = "0.6") -> None:
     """Print times, unknowns, iterations and forces of a pair of runs, after one of ours that compiles."""
-    timed([sys.executable, "-c", INDENTED, "0.1", "1"])
-    ours = timed([sys.executable, "-c", INDENTED, size, steps])
+    timed([sys.executable, "-c", INDENTED, "0.1", "1", "0.6"])
+    ours = timed([sys.executable, "-c", INDENTED, size, steps, radius])
     print(
         f"fastcontact: user {ours[0]:.1f} s, wall {ours[1]:.1f} s; unknowns, iterations, force: {ours[2]}", flush=True
     )
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        timed([sys.executable, "-c", INDENTED, size, steps, str(folder / "problem.npz")])
+        timed([sys.executable, "-c", INDENTED, size, steps, radius, str(folder / "problem.npz")])
         deck(folder / "problem.npz", int(steps), folder / "deck.inp")
         theirs = timed(["ccx", "deck"], folder)
         totals = [line.split() for line in (folder / "deck.dat").read_text().splitlines() if line.strip()]

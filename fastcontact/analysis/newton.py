@@ -42,8 +42,6 @@ PATIENCE, FALL = 12, 0.5
 # Stiffness of springs along closed gaps beside the largest of the bodies. What contact does not hold, such as gaps between
 # values of a pressure field, creeps with stiff ones: an O-ring takes 5, 7, 11 iterations with 5e-5, 2e-4, 1e-3.
 HELD = 5e-5, 1e-3
-# After changes of the displacement up to this, relative to its size, a tangent serves a second iteration.
-SMALL = 1e-5
 # Contact geometry of the linearised bodies settles to this part of the last relative change of the displacement.
 FORCING = 1e-3
 # Relative error of the displacement below which iterations end. Changes below SCATTER that do not fall to the part STAYS of
@@ -124,8 +122,8 @@ class _Newton:
         u, changes = origin, [1.0]
         for _ in range(MOST):
             before = u
-            target, contact_force = self._solve(before, changes[-1])
-            u, fraction = self._reach(before, target)
+            target, contact_force = self._solve(before, changes)
+            u, fraction = self._reach(before, target, changes)
             balanced = self._balanced(u, contact_force, before)
             if self._terms.prepared:
                 if self._is_exact(balanced):
@@ -134,10 +132,11 @@ class _Newton:
             if history and fraction == 1.0 and balanced.excess > 1.0:
                 u, fraction = self._searched(before, u, contact_force)
                 balanced = self._balanced(u, contact_force, before) if fraction < 1.0 else balanced
-            moved, size = largest_difference(u, before), max(map(largest, (u, self._load.lift, self._start.u)))
-            changes.append(moved / size if size else 0.0)
+            moved = largest_difference(u, before)
+            changes.append(self._relative(moved, u))
             history.append(_told(self._iterate, changes[-1], balanced, fraction))
-            if fraction == 1.0 and balanced.excess <= 1.0 and self._stands_still(changes, moved):
+            small = self._stands_still(changes) or moved <= self._start.gap_round_off
+            if fraction == 1.0 and balanced.excess <= 1.0 and small:
                 return StepEquilibrium(self._settled, u, balanced, self._terms, history)
             if len(changes) > PATIENCE and min(changes[-PATIENCE:]) > FALL * min(changes[:-PATIENCE]):
                 break
@@ -162,28 +161,40 @@ class _Newton:
         balanced.check(self._begin.index, self._problem, self._iterate.history)
         return True
 
-    def _stands_still(self, changes: list[float], moved: float) -> bool:
-        """Return whether relative `changes` leave an error below the criterion, or are round-off; `moved` is the last one.
+    def _relative(self, moved: float, u: Array) -> float:
+        """Return the largest change of displacements to u (n_dofs,), `moved` [length], relative to their size."""
+        size = max(map(largest, (u, self._load.lift, self._start.u)))
+        return moved / size if size else 0.0
 
-        That in units of length.
-        """
+    @property
+    def _enough(self) -> float:
+        """Relative error of the displacement at which iterations end."""
+        return max(self._problem.criteria.geometry, UNCHANGED)
+
+    def _stands_still(self, changes: list[float]) -> bool:
+        """Return whether relative `changes` leave an error below the criterion, or are round-off."""
         before, last = changes[-2:]
         error = last * min(last / before, 1.0) if before else last
-        return (
-            error <= max(self._problem.criteria.geometry, UNCHANGED)
-            or (last <= SCATTER and last > STAYS * before)
-            or moved <= self._start.gap_round_off
-        )
+        return error <= self._enough or (last <= SCATTER and last > STAYS * before)
+
+    def _serves_again(self, changes: list[float]) -> bool:
+        """Return whether a second iteration with the last tangent is expected to be the last iteration.
+
+        Newton's next change is C times the square of the last one. It leaves C^2 times the cube, if the tangent is old.
+        """
+        before, last = changes[-2:] if len(changes) > 2 else (0.0, changes[-1])
+        C = last / before**2 if before else 1.0
+        return len(changes) > 1 and C**2 * last**3 <= self._enough
 
     def _balanced(self, u: Array, contact_force: Array, linearised_at: Array) -> Balance:
         """Return the balance of forces at displacements u, of contact those of a linearisation elsewhere (n_dofs,)."""
         internal = self._terms.residual(u, self._fluid(linearised_at))
         return balance(self._problem, u, contact_force, self._load.force, self._start.largest_force, internal)
 
-    def _solve(self, u: Array, change: float) -> tuple[Array, Array]:
+    def _solve(self, u: Array, changes: list[float]) -> tuple[Array, Array]:
         """Return displacements (n_dofs,) [length] and contact forces (n_dofs,) [force] of terms linearised at u (n_dofs,).
 
-        Contact geometry settles to a part of the last relative `change` of the displacement. Where the tangent is not
+        Contact geometry settles to a part of the last of the relative `changes` of the displacement. Where the tangent is not
         positive definite, the springs of floating bodies are stiffened, then the constraints that the last contact held, by
         soft springs first: this leaves the iterations quadratic but for what contact does not hold. Where that does not help,
         parts of the geometric stiffness are left out. Once springs have helped, they are tried first.
@@ -195,7 +206,7 @@ class _Newton:
             if self._held and by.geometric == WHOLE and not by.held:
                 continue  # it failed an iteration ago
             try:
-                solution = self._linearised_contact(u, change, by)
+                solution = self._linearised_contact(u, changes, by)
             except (ModelError, ConvergenceError) as error:
                 log.info("the tangent fails with %s: %s", by, error)
                 failed = error
@@ -223,19 +234,21 @@ class _Newton:
         loaded = begin.loaded if first else with_loads(self._problem, self._load)
         return self._contact(self._problem, self._load, loaded, u, self._start.extrapolation)
 
-    def _linearised_contact(self, u: Array, change: float, by: Regularisation) -> tuple[Array, Array]:
+    def _linearised_contact(self, u: Array, changes: list[float], by: Regularisation) -> tuple[Array, Array]:
         """Return the result of `_solve` for a tangent."""
         terms, iterate = self._terms, self._iterate
-        problem, self._kept = (self._kept, None) if change <= SMALL else (None, None)
-        if problem is None:
+        problem, self._kept = (self._kept, None) if self._serves_again(changes) else (None, None)
+        if problem is not None:
+            problem = replace(problem, linearised_at=None if problem.linearised_at is None else u)
+        else:
             K = terms.tangent(u, by.geometric)
             contact = self._stiffness_of_contact(K, u, by) if by.geometric == WHOLE else None
             problem = linearised(self._problem, K, u, iterate.rigid, contact, by.stiff)
-            if by.geometric == WHOLE and not problem.pairs:  # where there is contact, its geometry goes on
+            if by.geometric == WHOLE:
                 self._kept = problem
         load = load_about(problem, terms, u, self._load, iterate.rigid)
         iterate.u, iterate.history = u.copy(), []
-        enough = min(max(problem.criteria.geometry, FORCING * change), LOOSEST)
+        enough = min(max(problem.criteria.geometry, FORCING * changes[-1]), LOOSEST)
         inner = replace(problem, criteria=replace(problem.criteria, geometry=enough))
         return self._contact(inner, load, with_loads(problem, load), u, Extrapolation())
 
@@ -283,18 +296,21 @@ class _Newton:
         wetted = [part.wetted for part in self._settled.constraints.parts.values()]
         return [Fluid(self._problem, each, at) for each in wetted if each is not None]
 
-    def _reach(self, u: Array, target: Array) -> tuple[Array, float]:
+    def _reach(self, u: Array, target: Array, changes: list[float]) -> tuple[Array, float]:
         """Return the displacements (n_dofs,) to go on from, and the part of the way from u to the `target` (n_dofs,).
 
-        Half of the way, of that half, and so on, is gone where cells turn inside out farther on.
+        Half of the way, of that half, and so on, is gone where cells turn inside out farther on. After `changes` and the
+        whole way, a tangent may not be needed any more.
         """
         fraction, bodies = 1.0, self._terms.bodies
         if bodies is None:
             return target, fraction
+        changes = [*changes, self._relative(largest_difference(target, u), target)]
+        last = self._stands_still(changes) or (self._kept is not None and self._serves_again(changes))
         for _ in range(HALVINGS):
             end = target if fraction == 1.0 else u + fraction * (target - u)
             try:
-                bodies.at(end)
+                bodies.at(end, tangent=not last)
             except ConvergenceError as error:
                 failed = error
             else:

@@ -242,14 +242,16 @@ class Problem:
             friction_factor=load.friction_factors.get(name, 1.0),
         )
 
-    def deformed(self, u: Array, start: State, rise: Array | None, *, geometric: int = WHOLE) -> DeformedBodies:
+    def deformed(
+        self, u: Array, start: State, rise: Array | None, *, geometric: int = WHOLE, tangent: bool = True
+    ) -> DeformedBodies:
         """Return `NonlinearBodies.at` displacements u (n_dofs,) [length], in a load step that begins at `start`.
 
         `rise` (n_points,) is that of the temperature at its end [temperature].
         """
         assert self.bodies is not None
         before = start.history or self.bodies.beginning
-        return self.bodies.at(self.displacement(u), before, rise=rise, geometric=geometric)
+        return self.bodies.at(self.displacement(u), before, rise=rise, geometric=geometric, tangent=tangent)
 
     def initial_state(self) -> State:
         """Return the state before the first load step."""

@@ -83,8 +83,8 @@ class Bodies:
         self._kept: list[tuple[Array, DeformedBodies]] = []
         self._taken: Array | None = None
 
-    def at(self, u: Array) -> DeformedBodies:
-        """Return the bodies at u.
+    def at(self, u: Array, *, tangent: bool = True) -> DeformedBodies:
+        """Return the bodies at u; whether their tangent is expected to be needed says `tangent`.
 
         Raises
         ------
@@ -94,7 +94,7 @@ class Bodies:
         for known, bodies in self._kept:
             if known is u:
                 return bodies
-        bodies = self._problem.deformed(u, self._start, self._rise)
+        bodies = self._problem.deformed(u, self._start, self._rise, tangent=tangent)
         self._kept = [*self._kept[-1:], (u, bodies)]
         return bodies
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from fastcontact._jit.decorators import kernel
 from fastcontact.elasticity.constitutive_kernels import add_second_derivative, cofactor, determinant, respond, voigt
+from fastcontact.elasticity.dilatation_kernels import back_substitute, reduce
 from fastcontact.elasticity.element_2d_kernels import TWO_PI, owned
 from fastcontact.mesh.jacobian_kernels import at_nodes, gradients, inverse_jacobian
 
@@ -21,11 +22,14 @@ INVERTED, NO_PLANE_STRESS = 1, 2
 
 
 @kernel
-def _gradients(x, N, dN, weights, axisymmetric, J, inverse, gradient, hoop, volume):
-    """Fill shape derivatives `gradient` (n_q, n_nodes, dim), N / r in `hoop` (n_q, n_nodes), weights `volume` (n_q,)."""
+def _gradients(x, N, dN, weights, axisymmetric, J, inverse, at_point, gradient, hoop, volume):
+    """Fill shape derivatives `gradient` (n_q, dim, n_nodes), N / r in `hoop` (n_q, n_nodes), weights `volume` (n_q,)."""
     for q in range(N.shape[0]):
         volume[q] = weights[q] * inverse_jacobian(x, dN, q, J, inverse)
-        gradients(dN, q, inverse, gradient[q])
+        gradients(dN, q, inverse, at_point)
+        for i in range(x.shape[1]):
+            for a in range(x.shape[0]):
+                gradient[q, i, a] = at_point[a, i]
         if axisymmetric:
             radius = 0.0
             for a in range(x.shape[0]):
@@ -36,20 +40,20 @@ def _gradients(x, N, dN, weights, axisymmetric, J, inverse, gradient, hoop, volu
 
 
 @kernel
-def _deformation(displacement, cell, gradient, hoop, F):
-    """Fill F (3, 3) from shape derivatives (n_nodes, dim)."""
+def _deformation(u, gradient, hoop, F):
+    """Fill F (3, 3) from displacements u (n_nodes, dim) and shape derivatives (dim, n_nodes)."""
     F[:] = 0.0
     F[0, 0] = F[1, 1] = F[2, 2] = 1.0
-    for a in range(gradient.shape[0]):
-        for i in range(gradient.shape[1]):
-            for j in range(gradient.shape[1]):
-                F[i, j] += displacement[cell[a], i] * gradient[a, j]
-        F[2, 2] += displacement[cell[a], 0] * hoop[a]
+    for a in range(u.shape[0]):
+        for i in range(u.shape[1]):
+            for j in range(u.shape[1]):
+                F[i, j] += u[a, i] * gradient[j, a]
+        F[2, 2] += u[a, 0] * hoop[a]
 
 
 @kernel
 def _expanded(strain, N, cell, rise, finite, F, gradient, hoop):
-    """Take the expansion by a `rise` (n_points,) out of F, shape derivatives (n_nodes, dim) and `hoop` (n_nodes,), in place.
+    """Take the expansion by a `rise` (n_points,) out of F, shape derivatives (dim, n_nodes) and `hoop` (n_nodes,), in place.
 
     `strain` (6,) is that of a degree, with engineering shears. Return the ratio of the volumes, and how much longer fibres
     along z are.
@@ -70,8 +74,8 @@ def _expanded(strain, N, cell, rise, finite, F, gradient, hoop):
     ratio = determinant(U)
     inverse /= ratio
     F[:] = F @ inverse
-    dim = gradient.shape[1]
-    gradient[:] = gradient @ np.ascontiguousarray(inverse[:dim, :dim])
+    dim = gradient.shape[0]
+    gradient[:] = np.ascontiguousarray(inverse[:dim, :dim].T) @ gradient
     hoop *= inverse[2, 2]
     return ratio, U[2, 2]
 
@@ -90,10 +94,11 @@ def _dilatation(F, finite, G):
 @kernel
 def _add_volumetric(F, G, pressure, turning, bulk, P, A):
     """Add the part of the dilatation: `pressure` times dJ/dF to P; to A its change by `bulk` with J, `turning` with dJ/dF."""
+    along = G.reshape(9)
     for row in range(9):
-        P[row // 3, row % 3] += pressure * G[row // 3, row % 3]
+        P[row // 3, row % 3] += pressure * along[row]
         for column in range(9):
-            A[row, column] += bulk * G[row // 3, row % 3] * G[column // 3, column % 3]
+            A[row, column] += bulk * along[row] * along[column]
     if turning != 0.0:
         add_second_derivative(F, turning, A)
 
@@ -124,8 +129,8 @@ def _through(constants, D, bulk, finite, thicker, F, old, new, P, A, G):
     """
     F[2, 2] = (1.0 + old[8]) / thicker if finite else 2.0 + old[8] - thicker
     for _ in range(THROUGH):
-        energy = respond(constants, D, F, old, new, P, A)
         J = _dilatation(F, finite, G)
+        energy = respond(constants, D, F, J, G, old, new, P, A)
         pressure = bulk * (J - 1.0)
         _add_volumetric(F, G, pressure, pressure if finite else 0.0, bulk, P, A)
         if not A[8, 8] > 0.0:
@@ -141,57 +146,110 @@ def _through(constants, D, bulk, finite, thicker, F, old, new, P, A, G):
 
 
 @kernel
-def _add_tangent_in_space(gradient, weight, A, product, local):
-    """As `_add_tangent`, with loop bounds that the compiler knows: the whole kernel takes 0.6 of the time on hex8."""
-    for b in range(gradient.shape[0]):
-        x, y, z = gradient[b, 0], gradient[b, 1], gradient[b, 2]
-        for row in range(9):
-            for k in range(3):
-                product[row, k] = weight * (A[row, 3 * k] * x + A[row, 3 * k + 1] * y + A[row, 3 * k + 2] * z)
-        for a in range(b + 1):
-            x, y, z = gradient[a, 0], gradient[a, 1], gradient[a, 2]
-            for i in range(3):
-                for k in range(3):
-                    local[a, b, i, k] += x * product[3 * i, k] + y * product[3 * i + 1, k] + z * product[3 * i + 2, k]
+def _respond(constants, D, bulk, pressure, thicker, plane_stress, finite, geometric, F, old, new, P, A, G):
+    """Fill the history `new` (9,), P and A of a point; return its energy density, and whether it found plane stress.
+
+    `pressure` is that of the projected dilatation, `bulk` the modulus of the rest; see `linearise` and `_through`.
+    """
+    if plane_stress:
+        energy, settled = _through(constants, D, bulk, finite, thicker, F, old, new, P, A, G)
+        if finite and geometric == 0:
+            _leave_out_initial_stress(G, determinant(F), P, 0.0, A)
+        return energy, settled
+    J = _dilatation(F, finite, G)
+    energy = respond(constants, D, F, J, G, old, new, P, A) + 0.5 * bulk * (J - 1.0) ** 2
+    pressure += bulk * (J - 1.0)
+    turning = pressure if finite and geometric == 2 else 0.0
+    if finite and geometric == 0:
+        turning = min(pressure, 0.0)
+        _leave_out_initial_stress(G, J, P, turning, A)
+    _add_volumetric(F, G, pressure, turning, bulk, P, A)
+    return energy, True
+
+
+@kernel
+def _project(polynomials, volume, gradient, hoop, finite, F, G, mass, projected):
+    """Fill the Cholesky factor `mass` (m, m) of the polynomials' mass matrix, and the dilatation in orthonormal ones.
+
+    `projected` (m, n_nodes * dim + 1) are its derivatives by displacements, first those of x, and the dilatation itself.
+    """
+    n_q, dim, n_nodes = gradient.shape
+    mass[:], projected[:] = 0.0, 0.0
+    for q in range(n_q):
+        J = _dilatation(F[q], finite, G)
+        for k in range(polynomials.shape[1]):
+            share = volume[q] * polynomials[q, k]
+            for n in range(k + 1):
+                mass[k, n] += share * polynomials[q, n]
+            projected[k, dim * n_nodes] += share * (J - 1.0)
+            for i in range(dim):
+                for j in range(dim):
+                    for a in range(n_nodes):
+                        projected[k, i * n_nodes + a] += share * G[i, j] * gradient[q, j, a]
+            for a in range(n_nodes):
+                projected[k, a] += share * G[2, 2] * hoop[q, a]
+    reduce(mass, projected)
+
+
+@kernel
+def _pressures(bulk, polynomials, mass, projected, pressure):
+    """Fill the `pressure` (n_q,) of the projected dilatation and return its energy."""
+    m, last = projected.shape
+    coefficients, energy = np.empty(m), 0.0
+    for k in range(m):
+        coefficients[k] = projected[k, last - 1]
+        energy += 0.5 * bulk * coefficients[k] ** 2
+    back_substitute(mass, coefficients)
+    for q in range(polynomials.shape[0]):
+        pressure[q] = 0.0
+        for k in range(m):
+            pressure[q] += bulk * polynomials[q, k] * coefficients[k]
+    return energy
+
+
+@kernel
+def _add_projected_tangent(bulk, projected, local):
+    """Add the stiffness of the projected dilatation to `local`, see `_add_tangent`."""
+    n_nodes, dim = local.shape[0], local.shape[1]
+    for b in range(n_nodes):
+        for k in range(dim):
+            for n in range(projected.shape[0]):
+                factor = bulk * projected[n, k * n_nodes + b]
+                for i in range(dim):
+                    for a in range(b + 1):
+                        local[b, k, i, a] += factor * projected[n, i * n_nodes + a]
 
 
 @kernel
 def _add_tangent(gradient, hoop, weight, A, product, local):
-    """Add a point's tangent to `local` (n_nodes, n_nodes, dim, dim), of nodes a <= b; `product` (9, dim) is room."""
-    n_nodes, dim = gradient.shape
-    if dim == 3:
-        _add_tangent_in_space(gradient, weight, A, product, local)
-        return
+    """Add a point's tangent to `local` (n_nodes b, dim k, dim i, n_nodes a), for a <= b; `product` (9,) is room.
+
+    What a node's displacement k changes is a column of A times its shape derivatives, of which the third are along z or hoop.
+    """
+    dim, n_nodes = gradient.shape
+    in_space, third = dim == 3, gradient[2] if dim == 3 else hoop
     for b in range(n_nodes):
-        for row in range(9):
-            if row != 8 and (row // 3 >= dim or row % 3 >= dim):
-                continue
-            for k in range(dim):
-                value = 0.0
-                for m in range(dim):
-                    value += A[row, 3 * k + m] * gradient[b, m]
-                if k == 0 and hoop[b] != 0.0:
-                    value += A[row, 8] * hoop[b]
-                product[row, k] = weight * value
-        for a in range(b + 1):
+        x, y, z = weight * gradient[0, b], weight * gradient[1, b], weight * third[b]
+        for k in range(dim):
+            column, last = (3 * k + 2, z) if in_space else (8, z if k == 0 else 0.0)
+            for row in range(9):
+                product[row] = A[row, 3 * k] * x + A[row, 3 * k + 1] * y + A[row, column] * last
             for i in range(dim):
-                for k in range(dim):
-                    value = 0.0
-                    for j in range(dim):
-                        value += gradient[a, j] * product[3 * i + j, k]
-                    if i == 0 and hoop[a] != 0.0:
-                        value += hoop[a] * product[8, k]
-                    local[a, b, i, k] += value
+                first, second = product[3 * i], product[3 * i + 1]
+                rest = product[3 * i + 2] if in_space else (product[8] if i == 0 else 0.0)
+                for a in range(b + 1):
+                    local[b, k, i, a] += first * gradient[0, a] + second * gradient[1, a] + rest * third[a]
 
 
 @kernel
 def _forces(gradient, hoop, weight, P, forces):
-    """Add a point's nodal forces to `forces` (n_nodes, dim)."""
-    for a in range(gradient.shape[0]):
-        for i in range(gradient.shape[1]):
-            for j in range(gradient.shape[1]):
-                forces[a, i] += weight * P[i, j] * gradient[a, j]
-        forces[a, 0] += weight * P[2, 2] * hoop[a]
+    """Add a point's nodal forces to `forces` (dim, n_nodes)."""
+    for i in range(gradient.shape[0]):
+        for j in range(gradient.shape[0]):
+            for a in range(gradient.shape[1]):
+                forces[i, a] += weight * P[i, j] * gradient[j, a]
+    for a in range(gradient.shape[1]):
+        forces[0, a] += weight * P[2, 2] * hoop[a]
 
 
 @kernel
@@ -210,6 +268,25 @@ def _cauchy(F, P, finite, out):
 
 
 @kernel
+def _assemble(local, slots, mine, data):
+    """Add the stiffness of a cell to `data` (n_blocks, dim, dim), in the rows of nodes that are `mine`.
+
+    That of a pair of nodes is the transpose of the other's, and a diagonal block is symmetric, but for round-off.
+    """
+    n_nodes, dim = local.shape[0], local.shape[1]
+    for b in range(n_nodes):
+        for a in range(b + 1):
+            upper, lower = slots[a, b], slots[b, a]
+            for i in range(dim):
+                for k in range(dim):
+                    value = local[b, k, i, a] if a != b or i <= k else local[b, i, k, a]
+                    if mine[a]:
+                        data[upper, i, k] += value
+                    if a != b and mine[b]:
+                        data[lower, k, i] += value
+
+
+@kernel
 def linearise(
     points, cells, N, dN, weights, polynomials, axisymmetric, plane_stress, finite, geometric, displacement,
     constants, moduli, bulk, expansion, rise,
@@ -222,79 +299,52 @@ def linearise(
     modulus of the dilatation projected on `polynomials` (n_q, m), and of the rest. Returns a status and the number of a
     cell, zero and -1 where all went well. A `rise` (n_points,) of the temperature, which may be empty, brings strains of
     `expansion` (n_materials, 6) a degree. With `geometric` 2 the tangent is whole; 1 leaves out how dJ/dF turns by pressure,
-    0 the initial-stress stiffness and how dJ/dF turns under tension, so that it is positive semidefinite.
+    0 the initial-stress stiffness and how dJ/dF turns under tension, so that it is positive semidefinite. Where `data` is
+    empty, there is no tangent.
     """
     n_cells, n_nodes = cells.shape
-    n_q, dim, m = N.shape[0], points.shape[1], polynomials.shape[1]
-    gradient, hoop, volume = np.empty((n_q, n_nodes, dim)), np.zeros((n_q, n_nodes)), np.empty(n_q)
-    x, jacobian, inverse = np.empty((n_nodes, dim)), np.empty((dim, dim)), np.empty((dim, dim))
-    F, J, G, thicker = np.empty((n_q, 3, 3)), np.empty(n_q), np.empty((3, 3)), np.ones(n_q)
-    P, A, product = np.empty((3, 3)), np.empty((9, 9)), np.empty((9, dim))
-    local, forces = np.empty((n_nodes, n_nodes, dim, dim)), np.empty((n_nodes, dim))
-    mass, projection, dilatation = np.empty((m, m)), np.empty((m, n_nodes * dim)), np.empty(m)
-    history, mine = np.empty(9), np.empty(n_nodes, np.bool_)
+    n_q, dim, m, tangent = N.shape[0], points.shape[1], polynomials.shape[1], len(data) > 0
+    gradient, hoop, volume = np.empty((n_q, dim, n_nodes)), np.zeros((n_q, n_nodes)), np.empty(n_q)
+    x, u, at_point = np.empty((n_nodes, dim)), np.empty((n_nodes, dim)), np.empty((n_nodes, dim))
+    jacobian, inverse = np.empty((dim, dim)), np.empty((dim, dim))
+    F, G, thicker, pressure = np.empty((n_q, 3, 3)), np.empty((3, 3)), np.ones(n_q), np.empty(n_q)
+    P, A, product, history = np.empty((3, 3)), np.empty((9, 9)), np.empty(9), np.empty(9)
+    local, forces = np.empty((n_nodes, dim, dim, n_nodes)), np.empty((dim, n_nodes))
+    mass, projected, mine = np.empty((m, m)), np.empty((m, n_nodes * dim + 1)), np.empty(n_nodes, np.bool_)
     for c in range(n_cells):
         if not owned(cells, c, owner, part, mine):
             continue
         at_nodes(points, cells, c, x)
-        _gradients(x, N, dN, weights, axisymmetric, jacobian, inverse, gradient, hoop, volume)
-        whole = bulk[material[c, 0], 0]
-        local[:], forces[:], mass[:], projection[:], dilatation[:] = 0.0, 0.0, 0.0, 0.0, 0.0
+        at_nodes(displacement, cells, c, u)
+        _gradients(x, N, dN, weights, axisymmetric, jacobian, inverse, at_point, gradient, hoop, volume)
         for q in range(n_q):
-            _deformation(displacement, cells[c], gradient[q], hoop[q], F[q])
+            _deformation(u, gradient[q], hoop[q], F[q])
             if len(rise):
                 strain = expansion[material[c, q]]
                 ratio, thicker[q] = _expanded(strain, N[q], cells[c], rise, finite, F[q], gradient[q], hoop[q])
                 volume[q] *= ratio
-            J[q] = _dilatation(F[q], finite, G)
-            if finite and not (J[q] > 0.0):
+            if finite and not determinant(F[q]) > 0.0:
                 return INVERTED, c
-            for k in range(m if whole > 0.0 else 0):
-                share = volume[q] * polynomials[q, k]
-                dilatation[k] += share * (J[q] - 1.0)
-                for n in range(m):
-                    mass[k, n] += share * polynomials[q, n]
-                for a in range(n_nodes):
-                    for i in range(dim):
-                        value = G[2, 2] * hoop[q, a] if i == 0 else 0.0
-                        for j in range(dim):
-                            value += G[i, j] * gradient[q, a, j]
-                        projection[k, a * dim + i] += share * value
-        stored = dissipated = 0.0
-        if whole > 0.0:
-            solved = np.linalg.solve(mass, projection)
-            coefficients = np.linalg.solve(mass, dilatation)
-            stored += 0.5 * whole * (coefficients * dilatation).sum()
-            for b in range(n_nodes):
-                for a in range(b + 1):
-                    for i in range(dim):
-                        for k in range(dim):
-                            for n in range(m):
-                                local[a, b, i, k] += whole * projection[n, a * dim + i] * solved[n, b * dim + k]
+        local[:], forces[:], pressure[:] = 0.0, 0.0, 0.0
+        stored, dissipated, mean = 0.0, 0.0, bulk[material[c, 0], 0]
+        if mean > 0.0:
+            _project(polynomials, volume, gradient, hoop, finite, F, G, mass, projected)
+            stored += _pressures(mean, polynomials, mass, projected, pressure)
+            if tangent:
+                _add_projected_tangent(mean, projected, local)
         for q in range(n_q):
             row = material[c, q]
-            law, rest = constants[row], bulk[row, 1]
-            if plane_stress:
-                own, settled = _through(law, moduli[row], rest, finite, thicker[q], F[q], old[c, q], history, P, A, G)
-                if not settled:
-                    return NO_PLANE_STRESS, c
-                if finite and geometric == 0:
-                    _leave_out_initial_stress(G, _dilatation(F[q], finite, G), P, 0.0, A)
-            else:
-                own = respond(law, moduli[row], F[q], old[c, q], history, P, A) + 0.5 * rest * (J[q] - 1.0) ** 2
-                pressure = rest * (J[q] - 1.0)
-                for k in range(m if whole > 0.0 else 0):
-                    pressure += whole * polynomials[q, k] * coefficients[k]
-                _dilatation(F[q], finite, G)
-                turning = pressure if finite and geometric == 2 else 0.0
-                if finite and geometric == 0:
-                    turning = min(pressure, 0.0)
-                    _leave_out_initial_stress(G, J[q], P, turning, A)
-                _add_volumetric(F[q], G, pressure, turning, rest, P, A)
-            stored += volume[q] * own
+            density, settled = _respond(
+                constants[row], moduli[row], bulk[row, 1], pressure[q], thicker[q], plane_stress, finite, geometric,
+                F[q], old[c, q], history, P, A, G,
+            )  # fmt: skip
+            if not settled:
+                return NO_PLANE_STRESS, c
+            stored += volume[q] * density
             dissipated += volume[q] * history[7]
-            _add_tangent(gradient[q], hoop[q], volume[q], A, product, local)
             _forces(gradient[q], hoop[q], volume[q], P, forces)
+            if tangent:
+                _add_tangent(gradient[q], hoop[q], volume[q], A, product, local)
             if mine[0]:
                 new[c, q] = history
                 _cauchy(F[q], P, finite, stress[c, q])
@@ -303,15 +353,7 @@ def linearise(
         for b in range(n_nodes):
             if mine[b]:
                 for i in range(dim):
-                    force[cells[c, b], i] += forces[b, i]
-            for a in range(b + 1):
-                upper, lower = slots[c, a, b], slots[c, b, a]
-                for i in range(dim):
-                    for k in range(dim):
-                        # The diagonal block is symmetric but for round-off.
-                        value = local[a, b, i, k] if a != b or i <= k else local[a, b, k, i]
-                        if mine[a]:
-                            data[upper, i, k] += value
-                        if a != b and mine[b]:
-                            data[lower, k, i] += value
+                    force[cells[c, b], i] += forces[i, b]
+        if tangent:
+            _assemble(local, slots[c], mine, data)
     return 0, -1

@@ -54,6 +54,14 @@ def add_second_derivative(F, factor, A):
 
 
 @kernel
+def _right_cauchy_green(F, C):
+    """Fill C (3, 3) with F^T F."""
+    for i in range(3):
+        for j in range(3):
+            C[i, j] = F[0, i] * F[0, j] + F[1, i] * F[1, j] + F[2, i] * F[2, j]
+
+
+@kernel
 def voigt(i, j):
     """Return the number of a component in the order xx, yy, zz, xy, yz, xz."""
     if i == j:
@@ -108,15 +116,13 @@ def _plastic(constants, F, old, new, P, A):
 
     The deviatoric part: isotropic hardening by a table, linear kinematic hardening (Prager).
     """
-    mu, kinematic = constants[1], constants[3]
-    strain, xi = 0.5 * (F + F.T), np.empty((3, 3))
-    third = (strain[0, 0] + strain[1, 1] + strain[2, 2]) / 3.0
-    square = 0.0
+    mu, kinematic, xi = constants[1], constants[3], np.empty(9)
+    third, square = (F[0, 0] + F[1, 1] + F[2, 2]) / 3.0, 0.0
     for i in range(3):
-        strain[i, i] -= third
         for j in range(3):
-            xi[i, j] = 2.0 * mu * strain[i, j] - (2.0 * mu + 2.0 / 3.0 * kinematic) * old[voigt(i, j)]
-            square += xi[i, j] ** 2
+            strain = 0.5 * (F[i, j] + F[j, i]) - (third if i == j else 0.0)
+            xi[3 * i + j] = 2.0 * mu * strain - (2.0 * mu + 2.0 / 3.0 * kinematic) * old[voigt(i, j)]
+            square += xi[3 * i + j] ** 2
     trial = np.sqrt(1.5 * square)
     p, work, remaining = old[6], old[7], trial
     limit, slope, end = _yield_stress(constants, p)
@@ -136,9 +142,9 @@ def _plastic(constants, F, old, new, P, A):
         for j in range(3):
             c = voigt(i, j)
             before += old[c] ** 2
-            new[c] = old[c] + flow * xi[i, j]
+            new[c] = old[c] + flow * xi[3 * i + j]
             after += new[c] ** 2
-            P[i, j] = 2.0 * mu * (strain[i, j] - new[c])
+            P[i, j] = 2.0 * mu * (0.5 * (F[i, j] + F[j, i]) - (third if i == j else 0.0) - new[c])
             energy += P[i, j] * P[i, j] / (4.0 * mu)
     new[7] = work + kinematic / 3.0 * (after - before)
     shear = 2.0 * mu * (1.0 - 2.0 * mu * flow)
@@ -146,17 +152,13 @@ def _plastic(constants, F, old, new, P, A):
     if increment > 0.0:
         turn = 9.0 * mu * mu / trial**2 * (1.0 / (3.0 * mu + kinematic + slope) - increment / trial)
     for row in range(9):
-        i, j = row // 3, row % 3
         for column in range(9):
-            k, m = column // 3, column % 3
-            value = -turn * xi[i, j] * xi[k, m]
-            if i == k and j == m:
-                value += 0.5 * shear
-            if i == m and j == k:
-                value += 0.5 * shear
-            if i == j and k == m:
-                value -= shear / 3.0
-            A[row, column] = value
+            A[row, column] = -turn * xi[row] * xi[column]
+    for i in range(3):
+        for j in range(3):
+            A[3 * i + j, 3 * i + j] += 0.5 * shear
+            A[3 * i + j, 3 * j + i] += 0.5 * shear
+            A[4 * i, 4 * j] -= shear / 3.0
     return energy
 
 
@@ -187,7 +189,9 @@ def _pushed(F, S, C, P, A):
 @kernel
 def _saint_venant(D, F, P, A):
     """Hooke's law between Green-Lagrange strain and second Piola-Kirchhoff stress; return the energy density."""
-    strain, S, C = 0.5 * (F.T @ F), np.empty((3, 3)), np.empty((9, 9))
+    strain, S, C = np.empty((3, 3)), np.empty((3, 3)), np.empty((9, 9))
+    _right_cauchy_green(F, strain)
+    strain *= 0.5
     for i in range(3):
         strain[i, i] -= 0.5
     energy = _hooke(D, strain, S)
@@ -199,68 +203,65 @@ def _saint_venant(D, F, P, A):
 
 
 @kernel
-def _modified(value, first, second, power, J, G, F, slope, tangent):
-    """Turn an invariant with its derivatives (3, 3), (9, 9) into ``J**-power`` times it; return that, in place.
+def _add_isochoric(value, first, power, F, J, G, slope, bend, P, A):
+    """Add to P and A what an energy with the invariant ``J**-power`` times `value` brings, but for the value's curvature.
 
-    Arrays `slope` (3, 3) and `tangent` (9, 9) take the derivatives.
+    `first` (3, 3) is the derivative of the value; `slope` and `bend` are derivatives of the energy in the invariant. Return
+    `slope` times ``J**-power``, which the second derivative of the value has as factor.
     """
-    scale = J**-power
+    scale, along, across = J**-power, first.reshape(9), G.reshape(9)
+    ratio, factor = power * value / J, slope * scale
     for row in range(9):
-        i, j = row // 3, row % 3
-        slope[i, j] = scale * (first[i, j] - power * value / J * G[i, j])
+        change = along[row] - ratio * across[row]
+        P[row // 3, row % 3] += factor * change
+        by_first = bend * scale * scale * change - factor * power / J * across[row]
+        by_volume = factor * power / J * ((power + 1.0) * value / J * across[row] - along[row])
+        by_volume -= bend * scale * scale * ratio * change
         for column in range(9):
-            k, m = column // 3, column % 3
-            mixed = first[i, j] * G[k, m] + G[i, j] * first[k, m]
-            tangent[row, column] = scale * (
-                second[row, column] - power / J * mixed + power * (power + 1.0) * value / J**2 * G[i, j] * G[k, m]
-            )
-    add_second_derivative(F, -scale * power * value / J, tangent)
-    return scale * value
+            A[row, column] += by_first * along[column] + by_volume * across[column]
+    add_second_derivative(F, -factor * ratio, A)
+    return factor
 
 
 @kernel
-def _invariants(constants, F, P, A):
+def _invariants(constants, F, J, G, P, A):
     """C10 (I1 - 3) + C20 (I1 - 3)^2 + C30 (I1 - 3)^3 + C01 (I2 - 3) of isochoric invariants; return the energy density.
 
-    (Rivlin and Saunders, 1951; Yeoh, 1993.)
+    (Rivlin and Saunders, 1951; Yeoh, 1993.) The kernel above takes halves of the invariants: F is then a derivative.
     """
     C10, C01, C20, C30 = constants[3], constants[4], constants[5], constants[6]
-    G, slope, tangent, second = np.empty((3, 3)), np.empty((3, 3)), np.empty((9, 9)), np.zeros((9, 9))
-    cofactor(F, G)
-    J, C = determinant(F), F.T @ F
-    I1 = C[0, 0] + C[1, 1] + C[2, 2]
+    P[:], A[:], I1 = 0.0, 0.0, 0.0
     for row in range(9):
-        second[row, row] = 2.0
-    x = _modified(I1, 2.0 * F, second, 2.0 / 3.0, J, G, F, slope, tangent) - 3.0
-    W1, W11 = C10 + 2.0 * C20 * x + 3.0 * C30 * x * x, 2.0 * C20 + 6.0 * C30 * x
+        I1 += F[row // 3, row % 3] ** 2
+    x = J ** (-2.0 / 3.0) * I1 - 3.0
+    slope, bend = C10 + 2.0 * C20 * x + 3.0 * C30 * x * x, 2.0 * C20 + 6.0 * C30 * x
+    factor = _add_isochoric(0.5 * I1, F, 2.0 / 3.0, F, J, G, 2.0 * slope, 4.0 * bend, P, A)
+    for row in range(9):
+        A[row, row] += factor
     energy = C10 * x + C20 * x**2 + C30 * x**3
-    for row in range(9):
-        P[row // 3, row % 3] = W1 * slope[row // 3, row % 3]
-        for column in range(9):
-            bend = W11 * slope[row // 3, row % 3] * slope[column // 3, column % 3]
-            A[row, column] = W1 * tangent[row, column] + bend
-    if C01 == 0.0:
-        return energy
-    left, FC = F @ F.T, F @ C
-    I2 = 0.5 * (I1 * I1 - (C * C).sum())
-    for row in range(9):
-        i, j = row // 3, row % 3
-        for column in range(9):
-            k, m = column // 3, column % 3
-            value = 2.0 * F[i, j] * F[k, m] - F[i, m] * F[k, j]
-            if row == column:
-                value += I1
-            if i == k:
-                value -= C[m, j]
-            if j == m:
-                value -= left[i, k]
-            second[row, column] = 2.0 * value
-    energy += C01 * (_modified(I2, 2.0 * (I1 * F - FC), second, 4.0 / 3.0, J, G, F, slope, tangent) - 3.0)
-    for row in range(9):
-        P[row // 3, row % 3] += C01 * slope[row // 3, row % 3]
-        for column in range(9):
-            A[row, column] += C01 * tangent[row, column]
-    return energy
+    return energy if C01 == 0.0 else energy + _second_invariant(C01, I1, F, J, G, P, A)
+
+
+@kernel
+def _second_invariant(C01, I1, F, J, G, P, A):
+    """Add C01 (I2 - 3) to P and A, see `_invariants`; return its energy density."""
+    C, first, square = np.empty((3, 3)), np.empty((3, 3)), 0.0
+    _right_cauchy_green(F, C)
+    for i in range(3):
+        for j in range(3):
+            first[i, j] = I1 * F[i, j] - F[i, 0] * C[0, j] - F[i, 1] * C[1, j] - F[i, 2] * C[2, j]
+            square += C[i, j] ** 2
+    I2 = 0.5 * (I1 * I1 - square)
+    factor = _add_isochoric(0.5 * I2, first, 4.0 / 3.0, F, J, G, 2.0 * C01, 0.0, P, A)
+    for i in range(3):
+        for j in range(3):
+            A[3 * i + j, 3 * i + j] += factor * I1
+            for k in range(3):
+                A[3 * i + j, 3 * i + k] -= factor * C[k, j]
+                A[3 * i + j, 3 * k + j] -= factor * (F[i, 0] * F[k, 0] + F[i, 1] * F[k, 1] + F[i, 2] * F[k, 2])
+                for m in range(3):
+                    A[3 * i + j, 3 * k + m] += factor * (2.0 * F[i, j] * F[k, m] - F[i, m] * F[k, j])
+    return C01 * (J ** (-4.0 / 3.0) * I2 - 3.0)
 
 
 @kernel
@@ -270,7 +271,9 @@ def _ogden(constants, F, P, A):
     Moduli in principal axes by Simo and Taylor (1991, equation 2.28).
     """
     n = int(constants[3])
-    squared, axes = np.linalg.eigh(F.T @ F)
+    C = np.empty((3, 3))
+    _right_cauchy_green(F, C)
+    squared, axes = np.linalg.eigh(C)
     scale = (squared[0] * squared[1] * squared[2]) ** (-1.0 / 6.0)
     beta, gamma, energy = np.zeros(3), np.zeros((3, 3)), 0.0
     powers = np.empty(3)
@@ -285,7 +288,7 @@ def _ogden(constants, F, P, A):
             for b in range(3):
                 gamma[a, b] += 2.0 * mu * (total / 9.0 - (powers[a] + powers[b]) / 3.0)
             gamma[a, a] += 2.0 * mu * powers[a]
-    S, C = np.zeros((3, 3)), np.zeros((9, 9))
+    S, moduli = np.zeros((3, 3)), np.zeros((9, 9))
     for a in range(3):
         for b in range(3):
             normal = (gamma[a, b] - (2.0 * beta[a] if a == b else 0.0)) / (squared[a] * squared[b])
@@ -301,21 +304,22 @@ def _ogden(constants, F, P, A):
                 left, mixed = axes[i, a] * axes[j, a], axes[i, a] * axes[j, b]
                 for column in range(9):
                     k, m = column // 3, column % 3
-                    C[row, column] += normal * left * axes[k, b] * axes[m, b]
+                    moduli[row, column] += normal * left * axes[k, b] * axes[m, b]
                     if a != b:
-                        C[row, column] += shear * mixed * (axes[k, a] * axes[m, b] + axes[k, b] * axes[m, a])
+                        moduli[row, column] += shear * mixed * (axes[k, a] * axes[m, b] + axes[k, b] * axes[m, a])
         for i in range(3):
             for j in range(3):
                 S[i, j] += beta[a] / squared[a] * axes[i, a] * axes[j, a]
-    _pushed(F, S, C, P, A)
+    _pushed(F, S, moduli, P, A)
     return energy
 
 
 @kernel
-def respond(constants, D, F, old, new, P, A):
+def respond(constants, D, F, J, G, old, new, P, A):
     """Fill `new`, P and A by the law of `constants` and return the elastic energy [energy / volume].
 
-    All of the law but its volumetric part, `constants[2]` being its bulk modulus. D (6, 6) are the moduli of Hooke's laws.
+    All of the law but its volumetric part, `constants[2]` being its bulk modulus. D (6, 6) are the moduli of Hooke's laws, J
+    and G (3, 3) the determinant of F and its derivative.
     """
     law = int(constants[0])
     new[:] = old
@@ -326,5 +330,5 @@ def respond(constants, D, F, old, new, P, A):
     if law == SAINT_VENANT:
         return _saint_venant(D, F, P, A)
     if law == INVARIANTS:
-        return _invariants(constants, F, P, A)
+        return _invariants(constants, F, J, G, P, A)
     return _ogden(constants, F, P, A)

@@ -53,36 +53,67 @@ def reordered(K: bsr_array, order: Indices) -> csc_array:
     return csc_array((rows.data, rows.indices, rows.indptr), shape=K.shape)  # its rows are its columns
 
 
-@on_one_blas_thread
-def factors(K: bsr_array, last: Indices) -> SymmetricFactors:
-    """Return the factors of the symmetric matrix K (n, n) [force / length] with the unknowns `last` (m,) last.
+class SymbolicFactors:
+    """Order of elimination and pattern of the factors of symmetric matrices with one pattern.
 
-    Raises
-    ------
-    ModelError
-        If K is singular or not positive definite.
+    Parameters
+    ----------
+    K : bsr_array (n, n)
+        One of them.
+    last : ndarray of int (m,)
+        Unknowns that are eliminated last.
     """
-    n = K.shape[0]
-    order = fill_reducing(K, last)
-    A = reordered(K, order)
-    late = np.zeros(n, bool)
-    late[last] = True
-    tree = elimination_tree(A)
-    nodes = supernodes(A, tree, late[order[tree.order]])
-    width, below = np.diff(nodes.first), np.diff(nodes.begin)
-    start = np.concatenate([[0], np.cumsum(np.repeat(nodes.first[1:] + below, width) - np.arange(n))])
-    values, d = np.empty(start[-1]), np.empty(n)
-    sizes = factorisation_kernels.room(tree.parent, nodes.first, nodes.begin)
-    bad = factorisation_kernels.factorise(
-        A.indptr, A.indices, A.data, tree.order, tree.place, tree.parent, *nodes, sizes, start, values, d
-    )
-    if bad >= 0:
-        if abs(d[bad]) <= SINGULAR * A.diagonal()[tree.order[bad]]:
-            raise singular()
-        raise ModelError("the stiffness matrix is not positive definite: check the material and the cells")
-    position = np.empty(n, np.intp)
-    position[order[tree.order]] = np.arange(n)
-    return SymmetricFactors(LowerTriangle(start, values, *nodes), d, position, last)
+
+    def __init__(self, K: bsr_array, last: Indices) -> None:
+        n = K.shape[0]
+        self._pattern, self._last = (K.indptr, K.indices), last
+        self._order = order = fill_reducing(K, last)
+        self._reordered: csc_array | None = None
+        late = np.zeros(n, bool)
+        late[last] = True
+        self._first: csc_array | None = reordered(K, order)
+        self._tree = elimination_tree(self._first)
+        self._nodes = supernodes(self._first, self._tree, late[order[self._tree.order]])
+        self._position = np.empty(n, np.intp)
+        self._position[order[self._tree.order]] = np.arange(n)
+
+    def serves(self, K: bsr_array, last: Indices) -> bool:
+        """Return whether a matrix has the pattern."""
+        return all(map(np.array_equal, (*self._pattern, self._last), (K.indptr, K.indices, last)))
+
+    @on_one_blas_thread
+    def factors(self, K: bsr_array) -> SymmetricFactors:
+        """Return the factors of a matrix K (n, n) with the pattern [force / length].
+
+        Raises
+        ------
+        ModelError
+            If K is singular or not positive definite.
+        """
+        A, tree, nodes, n = self._numbered(K), self._tree, self._nodes, K.shape[0]
+        width, below = np.diff(nodes.first), np.diff(nodes.begin)
+        start = np.concatenate([[0], np.cumsum(np.repeat(nodes.first[1:] + below, width) - np.arange(n))])
+        values, d = np.empty(start[-1]), np.empty(n)
+        sizes = factorisation_kernels.room(tree.parent, nodes.first, nodes.begin)
+        bad = factorisation_kernels.factorise(
+            A.indptr, A.indices, A.data, tree.order, tree.place, tree.parent, *nodes, sizes, start, values, d
+        )
+        if bad >= 0:
+            if abs(d[bad]) <= SINGULAR * A.diagonal()[tree.order[bad]]:
+                raise singular()
+            raise ModelError("the stiffness matrix is not positive definite: check the material and the cells")
+        return SymmetricFactors(LowerTriangle(start, values, *nodes), d, self._position, self._last)
+
+    def _numbered(self, K: bsr_array) -> csc_array:
+        """Return K in the order of elimination; where its numbers go is remembered from the second matrix on."""
+        if self._first is not None:
+            A, self._first = self._first, None
+            return A
+        if self._reordered is None:
+            numbers = np.arange(K.data.size, dtype=np.int64).reshape(K.data.shape)
+            self._reordered = reordered(bsr_array((numbers, K.indices, K.indptr), shape=K.shape), self._order)
+        A = self._reordered
+        return csc_array((K.data.ravel()[A.data], A.indices, A.indptr), shape=K.shape)
 
 
 class Tree(NamedTuple):

@@ -6,7 +6,7 @@ from scipy.sparse import bsr_array, csc_array
 from scipy.sparse.linalg import SuperLU, splu
 
 from fastcontact.arrays import Array, Indices
-from fastcontact.linear.cholesky.factorisation import factors, singular
+from fastcontact.linear.cholesky.factorisation import SymbolicFactors, singular
 from fastcontact.linear.cholesky.symmetric_factors import SymmetricFactors
 from fastcontact.linear.factors.factor_solver import FactorSolver
 
@@ -18,6 +18,7 @@ class Direct(FactorSolver):
     """
 
     name = "direct"
+    _symbolic: SymbolicFactors | None = None  # shared by the solvers of all tangents
 
     def __repr__(self) -> str:
         if not self.n:
@@ -41,7 +42,9 @@ class Direct(FactorSolver):
         return self._lu.solve(F)
 
     def _with_last(self, K: bsr_array, last: Indices) -> SymmetricFactors:
-        return factors(K, last)
+        if self._symbolic is None or not self._symbolic.serves(K, last):
+            self._symbolic = SymbolicFactors(K, last)
+        return self._symbolic.factors(K)
 
 
 SOLVER = Direct
