@@ -148,7 +148,10 @@ def smooth_side(side: Surface, points: Array) -> SmoothSide | None:
         return None
     for block in side.blocks:
         rows = slice(first, first + len(block.facets))
-        fits.append(_heights(block, points, _fit(block, points, around[rows], taken[rows], 2 * side.order)))
+        fit = _fit(block, points, around[rows], taken[rows], 2 * side.order)
+        reaching = fit.reaching(around[rows], taken[rows])
+        heights, curvature, axes = _heights(block, points, fit)
+        fits.append((heights * reaching[:, None, None], curvature * reaching[:, None, None], axes))
         first += len(block.facets)
     heights, curvature, axes = (np.concatenate(parts) for parts in zip(*fits, strict=True))
     if not heights.any():
@@ -228,6 +231,14 @@ class _Fit:
     def at(self, plane: Array) -> Array:
         """Return the heights (n, m) over points (n, m, d) of the planes."""
         return _conic(self.curvature, plane) + np.einsum("nqt,nt->nq", _terms(plane, *self.powers), self.polynomial)
+
+    def reaching(self, points: Array, taken: Mask) -> Mask:
+        """Return which surfaces (n,) of constant curvature reach all of those `points` (n, m, dim) that are `taken` (n, m).
+
+        Others fit nodes that do not determine them, as of three coarse facets in a row, and amplify round-off.
+        """
+        bent = np.einsum("nqd,nde->nqe", self.in_planes(points)[0], self.curvature)
+        return np.asarray((((bent**2).sum(axis=2) < 1.0) | ~taken).all(axis=1))
 
     def in_the_middle(self) -> tuple[Array, Array]:
         """Return slopes (n, d) and curvatures (n, d, d) in the middle of the facets."""
