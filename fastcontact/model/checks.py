@@ -120,7 +120,9 @@ def initial_gaps(pair: Formulation) -> Array:
     if pair.options.tied or pair.options.gap_only:
         return np.full(len(pair.secondary.points), np.inf)
     at_rest = Configuration.undeformed(pair.points)
-    gap = np.maximum(*(pair.nodal_gap(at_rest, with_clearance)[0] for with_clearance in (True, False)))
+    gap = pair.nodal_gap(at_rest, with_clearance=False)[0]
+    if pair.options.clearance is not None or pair.options.clearance_primary is not None:
+        gap = np.maximum(gap, pair.nodal_gap(at_rest)[0])
     return np.where(pair.options.excluded_nodes(pair.secondary), np.inf, gap)
 
 

@@ -7,6 +7,8 @@ import pages
 import pytest
 
 PAGES = pages.pages()
+# It starts processes of three kinds, each of which `test_executors` and `test_execute` start by default, too.
+SLOW = ("cluster.md",)
 LINK = re.compile(r"\]\((?P<target>[^)#\s]+)(#[^)\s]*)?\)")
 
 
@@ -15,7 +17,15 @@ def name(page):
 
 
 @pytest.mark.filterwarnings("default::pytest.PytestWarning")
-@pytest.mark.parametrize("page", [page for page in PAGES if any(map(pages.runnable, pages.blocks(page)))], ids=name)
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(page, marks=pytest.mark.slow if page.name in SLOW else ())
+        for page in PAGES
+        if any(map(pages.runnable, pages.blocks(page)))
+    ],
+    ids=name,
+)
 def test_all_blocks_of_a_page_run(page, tmp_path, monkeypatch):
     monkeypatch.setattr(
         "fastcontact.studies.execute._processors", lambda: 1
