@@ -7,8 +7,9 @@ import pages
 import pytest
 
 PAGES = pages.pages()
-# It starts processes of three kinds, each of which `test_executors` and `test_execute` start by default, too.
-SLOW = ("cluster.md",)
+RUN = [page for page in PAGES if any(map(pages.runnable, pages.blocks(page)))]
+# Processes of all kinds, each of which `test_executors` and `test_execute` start by default, too.
+RUN = [pytest.param(page, marks=pytest.mark.slow) if page.name == "cluster.md" else page for page in RUN]
 LINK = re.compile(r"\]\((?P<target>[^)#\s]+)(#[^)\s]*)?\)")
 
 
@@ -17,15 +18,7 @@ def name(page):
 
 
 @pytest.mark.filterwarnings("default::pytest.PytestWarning")
-@pytest.mark.parametrize(
-    "page",
-    [
-        pytest.param(page, marks=pytest.mark.slow if page.name in SLOW else ())
-        for page in PAGES
-        if any(map(pages.runnable, pages.blocks(page)))
-    ],
-    ids=name,
-)
+@pytest.mark.parametrize("page", RUN, ids=name)
 def test_all_blocks_of_a_page_run(page, tmp_path, monkeypatch):
     monkeypatch.setattr(
         "fastcontact.studies.execute._processors", lambda: 1
