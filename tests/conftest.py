@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parent.parent
 SHARED = ROOT.parent / "shared"
 
 # The same examples in every run, so that no change fails by chance; `--hypothesis-profile=long` looks further.
-settings.register_profile("fixed", max_examples=20, derandomize=True, deadline=None)
+settings.register_profile("fixed", max_examples=12, derandomize=True, deadline=None)
 settings.register_profile("long", max_examples=2000, deadline=None)
 settings.load_profile("fixed")
 
