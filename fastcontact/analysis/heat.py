@@ -63,15 +63,16 @@ class ThermalLoads:
 
 def thermal_loads(model: Model, displacement: Array | None = None) -> ThermalLoads:
     """Return what loads and films of a model exchange, over areas and volumes at a displacement (n_points, dim) [length]."""
-    mesh, kinematics = model.mesh, model.kinematics
-    films = csr_array((mesh.n_points, mesh.n_points))
+    mesh, films = model.mesh, csr_array((model.mesh.n_points,) * 2)
+    deformed = mesh if displacement is None else mesh.replace(points=mesh.points + displacement)
+    places = mesh, model.kinematics, deformed
     powers: dict[Table | None, Array] = {}
     ambient: dict[Table | None, Array] = {}
     for load in model.heat_loads:
         if isinstance(load, Heating):
-            powers[load.ramp] = powers.get(load.ramp, 0.0) + load.power(mesh, kinematics, displacement)
+            powers[load.ramp] = powers.get(load.ramp, 0.0) + load.power(*places)
         elif isinstance(load, Film):
-            matrix, power = load.exchange(mesh, kinematics, model.reference_temperature, displacement)
+            matrix, power = load.exchange(*places, model.reference_temperature)
             films, ambient[load.ramp] = csr_array(films + matrix), ambient.get(load.ramp, 0.0) + power
     return ThermalLoads(films, powers, ambient)
 

@@ -24,6 +24,7 @@ from fastcontact.analysis.state import State
 from fastcontact.analysis.step_equilibrium import StepEquilibrium
 from fastcontact.analysis.true_pressure import areas
 from fastcontact.arrays import Array
+from fastcontact.contact.cohesive_layer import Layer
 from fastcontact.contact.conductance import crossing
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
@@ -190,12 +191,19 @@ def _pressed(
     """Return the places where a pair touches, normal forces (m,) there [force] and gaps (m,), zero where it does [length]."""
     pair, constraints, solution = problem.pairs[name], settled.constraints.parts[name], settled.solution
     touching = LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max())
-    forces = np.maximum(constraints.normal_forces(solution.multiplier[rows]), 0.0)
+    forces = np.maximum(constraints.normal_forces(constraints.contact_forces(solution.multiplier[rows])), 0.0)
     if pair.options.tied:
         return pair.unilateral(Configuration.undeformed(pair.points)), forces, np.zeros(len(forces))
-    if pair.options.gap_only:
-        constraints = pair.unilateral(at)
-        gap = np.maximum(constraints.gaps(at.displacement), 0.0)
-        return constraints, np.zeros(len(gap)), np.where(gap <= touching, 0.0, gap)
-    gap = np.maximum(solution.gap[rows], 0.0)
-    return constraints, forces, np.where(solution.active[rows] | (gap <= touching), 0.0, gap)
+    closed, layer, wet = solution.active[rows], constraints.tied, constraints.wetted
+    if not pair.options.gap_only and layer is None and wet is None:
+        gap = np.maximum(solution.gap[rows], 0.0)
+        return constraints, forces, np.where(closed | (gap <= touching), 0.0, gap)
+    constraints = pair.unilateral(at)
+    gap = np.maximum(constraints.gaps(at.displacement), 0.0)
+    if wet is not None:
+        closed = closed & ~wet.rows
+    elif isinstance(layer, Layer):  # adhesion is closed up to its strength, a cohesive layer until it is broken
+        closed = layer.damage == 0.0 if layer.law.reversible else layer.damage < 1.0
+    elif pair.options.gap_only:
+        closed, forces = np.zeros(len(gap), bool), np.zeros(len(gap))
+    return constraints, forces, np.where(closed | (gap <= touching), 0.0, gap)

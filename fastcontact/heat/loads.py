@@ -1,7 +1,7 @@
 """What heats or cools solid cells: prescribed temperatures, fluxes, films, sources, heat at nodes.
 
 Powers of nodes are integrals with the shape functions, in axisymmetry over the full circle, in the plane by unit thickness.
-At a displacement they are those over deformed areas and volumes, with values by reference positions.
+They are those over the areas and volumes of a `deformed` mesh, with values by positions in the reference mesh.
 """
 
 from __future__ import annotations
@@ -96,13 +96,10 @@ class FixedTemperature(TemporaryHeat):
 class Heating(Load):
     """A load of heat that does not depend on the temperature."""
 
-    def power(self, mesh: Mesh, kinematics: str, displacement: Array | None = None) -> Array:
-        """Return the powers (n_points,) of the nodes at multiplier 1, positive into the body [power].
-
-        With a `displacement` (n_points, dim) those of the deformed body [length].
-        """
+    def power(self, mesh: Mesh, kinematics: str, deformed: Mesh) -> Array:
+        """Return the powers (n_points,) of the nodes of the `deformed` mesh at multiplier 1, into the body [power]."""
         total = np.zeros((mesh.n_points, 1))
-        self._add_power(total, mesh, kinematics, _deformed(mesh, displacement))
+        self._add_power(total, mesh, kinematics, deformed)
         return total[:, 0]
 
     def _add_power(self, total: Array, mesh: Mesh, kinematics: str, deformed: Mesh) -> None:
@@ -184,15 +181,13 @@ class Film(TemporaryHeat):
         """Coefficient and ambient temperature."""
         return [self.coefficient, self.ambient]
 
-    def exchange(
-        self, mesh: Mesh, kinematics: str, reference: float, displacement: Array | None = None
-    ) -> tuple[csr_array, Array]:
+    def exchange(self, mesh: Mesh, kinematics: str, deformed: Mesh, reference: float) -> tuple[csr_array, Array]:
         """Return the matrix (n_points, n_points) [power / temperature] and the powers (n_points,) by the rise of the ambient.
 
-        The latter at multiplier 1 [power]; `reference` is the temperature that rises count from [temperature]. With a
-        `displacement` (n_points, dim) those of the deformed surface [length]. ModelError if a coefficient is negative.
+        The latter at multiplier 1 [power]; `reference` is the temperature that rises count from [temperature]. ModelError if
+        a coefficient is negative.
         """
-        entries, powers, deformed = Entries(), np.zeros((mesh.n_points, 1)), _deformed(mesh, displacement)
+        entries, powers = Entries(), np.zeros((mesh.n_points, 1))
         for element, facets in facets_of(mesh, self.group).items():
             x, N, _ = facet_points(mesh, element, facets, kinematics)
             h = evaluated(self.coefficient, x, f"the coefficient of {self.name}")
@@ -203,8 +198,3 @@ class Film(TemporaryHeat):
             add_density(powers, facets, N, (h * rise)[:, :, None])
             entries.add(facets, facets, np.einsum("fq,qa,qb->fab", h, N, N))
         return entries.matrix((mesh.n_points, mesh.n_points)), powers[:, 0]
-
-
-def _deformed(mesh: Mesh, displacement: Array | None) -> Mesh:
-    """Return the mesh at a displacement (n_points, dim) [length]."""
-    return mesh if displacement is None else mesh.replace(points=mesh.points + displacement)

@@ -59,6 +59,15 @@ group = "LOWER_BOTTOM"
 coefficient = 1.5
 ambient = 20.0
 """
+# Beside the block a wall, along which a fluid comes from the top.
+WALL = """[obstacle.wall]
+secondary = "UPPER_RIGHT"
+shape = { kind = "half_space", point = [8.0, 0.0], normal = [-1.0, 0.0] }
+[[fluid_pressure]]
+contact = "wall"
+pressure = 1.0
+source = "UPPER_TOP"
+"""
 CONDUCTS = LINEAR + "\nconductivity = 50.0\nexpansion = 12e-6"
 CASES = {
     "plastic": _blocks(LINEAR + "\nyield_stress = 3.0\nhardening = [[0.0, 3.0], [0.1, 9.0]]\nkinematic = 20.0"),
@@ -77,6 +86,14 @@ CASES = {
     "adhesion": _blocks(options="adhesion = {work = 0.02, strength = 1.0}", down=0.01, along=0.0),
     "fluid": _blocks(
         tail='[[fluid_pressure]]\ncontact = "pair"\npressure = 8.0\nsource = "UPPER_LEFT"\n', along=0.005, down=-0.05
+    ),
+    "heat, layer and fluid": _blocks(
+        CONDUCTS,
+        "cohesion = {strength = 2.0, energy = 0.02}\nconductance = 5.0",
+        HOT + WALL,
+        "reference_temperature = 20.0",
+        down=0.03,
+        along=0.02,
     ),
     "modes": _blocks(
         LINEAR + "\ndensity = 1e-9", tail="[modes]\nn = 3\nstress_stiffening = true\n", options="friction = 0.3"

@@ -543,3 +543,34 @@ def test_heat_crosses_to_a_rigid_obstacle(formulation, kinematics):
     assert step.contact["plate"].heat_flux == pytest.approx(np.full(len(mesh.points_of(bottom)), flux), rel=1e-8)
     with pytest.raises(fc.ContactError, match="needs the temperature of its obstacle"):
         model.add_obstacle("other", secondary=bottom, obstacle=plate, **options)
+
+
+LAWS = {
+    "cohesion": {"cohesion": {"strength": 2.0, "energy": 0.02}},
+    "adhesion": {"adhesion": {"strength": 2.0, "work": 0.02}},
+    "fluid": {},
+}
+
+
+@pytest.mark.parametrize("formulation", ["mortar", "continuous", "node_to_segment"])
+@pytest.mark.parametrize("law", LAWS)
+def test_a_layer_conducts_until_it_breaks_and_a_seal_until_a_fluid_opens_it(law, formulation):
+    mesh = fc.generate.block_on_block(divisions_lower=(4, 2), divisions_upper=(4, 2))
+    model = fc.Model(mesh, kinematics="plane_strain")
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.0, conductivity=10.0))
+    model.fix("LOWER_BOTTOM", "xy")
+    model.prescribe("UPPER_TOP", x=0.0)
+    pulled = [(0, 0), (1, 1e-4), (2, 0.1)] if law != "fluid" else [(0, 0), (1, -0.01), (2, -0.01)]
+    model.prescribe("UPPER_TOP", y=1.0, ramp=pulled)
+    model.fix_temperature("UPPER_TOP", 100.0, ramp=[(0, 1), (2, 1)])
+    model.fix_temperature("LOWER_BOTTOM", 0.0)
+    options = {**LAWS[law], "formulation": formulation, "conductance": 5.0}
+    model.add_contact("joint", secondary="CONT_UPPER", primary="CONT_LOWER", **options)
+    if law == "fluid":  # against a pressure of 1
+        model.add_fluid_pressure("joint", 2.0, source="UPPER_BOTTOM_LEFT", ramp=[(0, 0), (1, 0.25), (2, 1)])
+    closed, opened = fc.solve(model, [1.0, 2.0])
+    flux = 100.0 / (5.0 / 10.0 + 1.0 / 5.0 + 5.0 / 10.0)
+    assert closed.contact["joint"].heat_flux == pytest.approx(flux, rel=1e-9)
+    assert closed.heat["contacts"]["joint"] == pytest.approx(10.0 * flux, rel=1e-9)
+    assert not opened.contact["joint"].active.any()
+    assert abs(opened.heat["contacts"]["joint"]) < 1e-12
