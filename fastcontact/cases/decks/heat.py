@@ -317,11 +317,11 @@ class HeatConditions:
                     on_faces.add((flux.keyword, cell), table, rows)
                 for cell, rows in rows_by_type(flux.elements).items():
                     sources.add(cell, table, rows)
-        for cell, members, value, table in sources:
-            found.groups[group := f"heat source {len(made)}"] = {cell: members.tolist()}
+        for cell, indices, value, table in sources:
+            found.groups[group := f"heat source {len(made)}"] = {cell: indices.tolist()}
             made.append(partial(Model.add_heat_source, value=value, groups=group, ramp=table))
-        for (keyword, cell), members, value, table in on_faces:
-            found.groups[group := f"{keyword.lower()} {len(made)}"] = {cell: members.tolist()}
+        for (keyword, cell), indices, value, table in on_faces:
+            found.groups[group := f"{keyword.lower()} {len(made)}"] = {cell: indices.tolist()}
             made.append(partial(Model.add_heat_flux, group=group, value=value, ramp=table))
         blown: dict[tuple[Table, float, tuple[float, float]], list[Face]] = {}
         for table, films in self.films.alike():
