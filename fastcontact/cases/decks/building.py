@@ -221,7 +221,8 @@ class Building:
         temporary = conditions.temporary()
         self._temporary_supports(conditions, temporary)
         at_times = {name for name, _ in temporary}
-        alone = {e.points[1] for e in self.made.discrete if e.cell.type == "GAPUNI"} - self.made.of_solids
+        ends = {e.points[1] for e in self.made.discrete if e.cell.type == "GAPUNI"}
+        alone = ends - self.made.of_solids if ends else ends
         for table, names in conditions.supports.alike():
             for name in (name for name in names if name not in at_times):
                 point, axis, local = name
