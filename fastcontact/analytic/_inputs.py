@@ -49,6 +49,8 @@ def positive(name: str, value: object, *, infinite: bool = False) -> float:
     checked = number(name, value)
     if checked <= 0.0:
         raise ModelError(f"{name} is {checked:g}: it must be positive")
+    if checked < 1.0 / LARGEST:
+        raise ModelError(f"{name} is out of range: it must be at least {1.0 / LARGEST:g}, in any unit")
     return checked
 
 

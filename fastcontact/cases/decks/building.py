@@ -201,8 +201,8 @@ class Building:
         """Make groups of the facets whose pressures change alike; return them with their values and histories."""
         alike = ByShape[tuple[str, str]]()
         for table, names in conditions.loads.alike():
-            for name in (name for name in names if name.face is not None):
-                for cell, rows in self.found.facet_rows([name.face]).items():
+            for name in names:
+                for cell, rows in self.found.facet_rows([name.face] if name.face else []).items():
                     alike.add((name.keyword, cell), table, rows)
         loads = [(f"pressure {number}", *load) for number, load in enumerate(alike, start=1)]
         self.found.groups |= {group: {cell: rows.tolist()} for group, (_, cell), rows, _, _ in loads}
@@ -221,7 +221,8 @@ class Building:
         temporary = conditions.temporary()
         self._temporary_supports(conditions, temporary)
         at_times = {name for name, _ in temporary}
-        alone = {e.points[1] for e in self.made.discrete if e.cell.type == "GAPUNI"} - self.made.of_solids
+        ends = {e.points[1] for e in self.made.discrete if e.cell.type == "GAPUNI"}
+        alone = ends - self.made.of_solids if ends else ends
         for table, names in conditions.supports.alike():
             for name in (name for name in names if name not in at_times):
                 point, axis, local = name
@@ -281,9 +282,9 @@ class Building:
             for (k, cosine), points in along.items():
                 scaled = tuple((t, v * cosine / self.thickness) for t, v in table)
                 alike.add(k, scaled, points)
-        for axis, points, value, table in alike:
+        for axis, nodes, value, table in alike:
             if any(factor for _, factor in table):
-                group = self._point_group("force", points)
+                group = self._point_group("force", nodes)
                 self.model.add_force(group, distribute=False, ramp=table, **{"xyz"[axis]: value})
 
     def _pressures(self, groups: list[tuple[str, Any, Table]]) -> None:

@@ -301,12 +301,12 @@ class HeatConditions:
             for span, points in self.fixed.of(names).items():
                 spans += [span] * (span not in spans)
                 risen.add(spans.index(span), self._risen(table), points)
-        for number, points, value, table in risen:
-            group = found.add_points(f"temperature {len(made)}", points)
+        for number, nodes, value, table in risen:
+            group = found.add_points(f"temperature {len(made)}", nodes)
             fixed = {"value": _above(value, self.reference), "ramp": table, **_between(spans[number])}
             made.append(partial(Model.fix_temperature, group=group, **fixed))
-        for _, points, value, table in ByShape.of(self.powers.alike()):
-            group = found.add_points(f"heat {len(made)}", points)
+        for _, nodes, value, table in ByShape.of(self.powers.alike()):
+            group = found.add_points(f"heat {len(made)}", nodes)
             powers = tuple((time, power / thickness) for time, power in table)
             made.append(partial(Model.add_nodal_heat, group=group, value=value, ramp=powers))
         sources = ByShape[str]()
@@ -317,11 +317,11 @@ class HeatConditions:
                     on_faces.add((flux.keyword, cell), table, rows)
                 for cell, rows in rows_by_type(flux.elements).items():
                     sources.add(cell, table, rows)
-        for cell, rows, value, table in sources:
-            found.groups[group := f"heat source {len(made)}"] = {cell: rows.tolist()}
+        for cell, indices, value, table in sources:
+            found.groups[group := f"heat source {len(made)}"] = {cell: indices.tolist()}
             made.append(partial(Model.add_heat_source, value=value, groups=group, ramp=table))
-        for (keyword, cell), rows, value, table in on_faces:
-            found.groups[group := f"{keyword.lower()} {len(made)}"] = {cell: rows.tolist()}
+        for (keyword, cell), indices, value, table in on_faces:
+            found.groups[group := f"{keyword.lower()} {len(made)}"] = {cell: indices.tolist()}
             made.append(partial(Model.add_heat_flux, group=group, value=value, ramp=table))
         blown: dict[tuple[Table, float, tuple[float, float]], list[Face]] = {}
         for table, films in self.films.alike():

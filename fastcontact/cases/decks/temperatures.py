@@ -100,7 +100,8 @@ def add_temperatures(model: Model, histories: Histories[int]) -> None:
         around = sorted({times[0], *times[max(k - 1, 0) : k + 2], times[-1]})
         rises = np.zeros(model.mesh.n_points)
         for _, points, sizes, table in fields:
-            factor = np.interp(time, *zip(*table, strict=True))
+            instants, factors = zip(*table, strict=True)
+            factor = np.interp(time, instants, factors)
             rises[points] = factor * (sizes(points) if callable(sizes) else sizes)
         _add(model, rises, tuple((other, float(other == time)) for other in around))
 
