@@ -6,6 +6,7 @@ import numpy as np
 
 from fastcontact.arrays import Array, Mask, Numbers
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
+from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements
@@ -34,6 +35,8 @@ def check_sides(mesh: Mesh, name: str, secondary: Surface, primary: Surface, exc
             "duplicate the nodes of the interface, one set for each side, or name the nodes where two surfaces of one body "
             "meet in `excluded`"
         )
+    for side in (secondary, primary):
+        _check_normals(mesh, name, side)
     ours, theirs = _facet_frames(mesh, secondary), _facet_frames(mesh, primary)
     apart = theirs[0][None] - ours[0][:, None]
     facing = np.einsum("id,jd->ij", ours[1], theirs[1]) < 0
@@ -51,6 +54,7 @@ def check_sides(mesh: Mesh, name: str, secondary: Surface, primary: Surface, exc
 
 def check_obstacle(mesh: Mesh, name: str, secondary: Surface, obstacle: RigidSide) -> None:
     """Raise ContactError for an obstacle of contact `name` that no facet of the secondary side faces."""
+    _check_normals(mesh, name, secondary)
     centres, outward, _ = _facet_frames(mesh, secondary)
     _, normal, paired, _ = obstacle.facing(centres, Pose(np.zeros(mesh.dim)))
     along = np.einsum("id,id->i", outward, normal)[paired]
@@ -58,6 +62,18 @@ def check_obstacle(mesh: Mesh, name: str, secondary: Surface, obstacle: RigidSid
         raise ContactError(
             f"the rigid obstacle of contact '{name}' looks the same way as '{secondary.group}', so that they cannot "
             "touch: turn its normal or its facets round, or name another face of the body"
+        )
+
+
+def _check_normals(mesh: Mesh, name: str, side: Surface) -> None:
+    """Raise ContactError for a side of contact `name` with a node where it has no normal."""
+    with np.errstate(invalid="ignore"):
+        without = np.flatnonzero(~np.isfinite(nodal_normals(side, mesh.points)).all(axis=1))
+    if len(without):
+        point = side.points[without[0]]
+        raise ContactError(
+            f"the facets of '{side.group}' in contact '{name}' meet back to back at point {point}, {mesh.points[point]}: "
+            "they have no normal there; bodies that touch at a point, which merge_points may have made one, need a point each"
         )
 
 

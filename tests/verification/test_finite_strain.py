@@ -250,6 +250,22 @@ def test_two_balls_squeezed_flat(formulation: str | None) -> None:
     assert np.abs(residual).max() <= 1e-6 * abs(force)
 
 
+@pytest.mark.parametrize(("element", "error"), [("quad4", 4e-3), ("quad8", 1e-4)])
+def test_two_balls_squeezed_until_contact_is_two_thirds_as_wide(element: str, error: float) -> None:
+    """Against quad8 half as large, of which coarser ones differ by 6e-5; the deformed radius is 33 of 50."""
+    mesh = fc.generate.half_spheres(element=element, segments=8, arc_sizes=(1.6, 1.6))
+    model = fc.Model(mesh, "axisymmetric", strain="finite")
+    model.add_material(fc.NeoHookean(E=20_000.0, nu=0.3))
+    model.fix("A1A2", "x")
+    model.fix("A1B1", "y")
+    model.prescribe("A2B2", y=-36.0)
+    model.add_contact("pair", secondary="CONT1", primary="CONT2")
+    contact = fc.solve(model, 4)[-1].contact["pair"]
+    assert abs(contact.force[1]) == pytest.approx(25_878_235.0, rel=error)
+    assert contact.pressure_max == pytest.approx(12_159.25, rel=error)
+    assert 32.5 < contact.radius[0] < 33.5 < contact.radius[1] < 34.5
+
+
 def test_small_loads_agree_with_linear_elasticity() -> None:
     small, _ = balls(fc.LinearElastic(E=20_000.0, nu=0.3), "small", 0.004)
     for law in (fc.LinearElastic(E=20_000.0, nu=0.3), fc.NeoHookean(E=20_000.0, nu=0.3)):

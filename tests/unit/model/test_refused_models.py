@@ -8,7 +8,7 @@ from models import elastic_model
 from test_result_files import MESH, step_result
 
 import fastcontact as fc
-from fastcontact.mesh.generate import block, box
+from fastcontact.mesh.generate import block, box, merge_points, renamed, union
 
 WALL = fc.obstacles.HalfSpace(point=(0.0, 1.0), normal=(0.0, -1.0))
 
@@ -62,7 +62,18 @@ NO_PLACE, NO_CENTRE = (
     "centre .* must be 2 finite numbers, not",
 )
 NO_RAMP, NO_TURN = "the ramp must be a number of steps, load factors", ".* have no mean rotation"
+
+
+def touching_corners():
+    """Two squares that share a corner, with an obstacle for all of their sides."""
+    squares = [block((1.0, 1.0), (1, 1), origin=(at, at)) for at in (0.0, 1.0)]
+    sides = dict.fromkeys(("LEFT", "RIGHT", "BOTTOM", "TOP"), "SIDES")
+    mesh = merge_points(union(*(renamed(square, sides) for square in squares)), 1e-6)
+    elastic_model(mesh).add_obstacle("wall", secondary="SIDES", obstacle=WALL)
+
+
 REFUSED = [
+    (touching_corners, fc.ContactError, "meet back to back at point 3"),
     (isotropic_across(-1.0), fc.ModelError, "nu_across = -1.0 must be above -1"),
     *((at(place), fc.MeshError, NO_PLACE) for place in [(0.5,), (0.5, 0.5, 0.5), (np.nan, 0.0)]),
     (
