@@ -91,7 +91,7 @@ def show_box(ax: Any, low: Array, high: Array, view: tuple[float, float]) -> Non
         margin = (NEAR_END if name == "y" else -1e-9) * (end - begin)
         ticks = ticks[(ticks >= begin + margin) & (ticks <= end - margin)]
         getattr(ax, f"set_{name}lim")(begin, end)
-        getattr(ax, f"set_{name}ticks")(ticks)
+        getattr(ax, f"set_{name}ticks")(ticks[-1:] if TICKS * along < 1.5 else ticks)
     ax.set_box_aspect(size, zoom=ROOM * min(1.0, WIDEST / widest))
 
 
