@@ -25,8 +25,8 @@ from fastcontact._jit import compiling
 from fastcontact._jit.cache import KernelFiles
 
 # Entries of all arguments of a call, and seconds in all calls of a kernel, up to which it runs as Python: that takes 1 to 8
-# microseconds an entry, and Numba 0.2 to 3 seconds a kernel.
-ENTRIES, SECONDS = 200_000, 0.5
+# microseconds an entry, and Numba 0.2 to 3 seconds a kernel. With the seconds of earlier runs it is what most kernels cost.
+ENTRIES, SECONDS, SECONDS_OF_RUNS = 200_000, 0.5, 1.0
 # File beside the compiled kernels: seconds that Python has spent on others, by their versions.
 SPENT = "interpreted.json"
 # NumPy computes with smaller types in other ones than Numba; those of a byte are compared only.
@@ -73,8 +73,13 @@ class Interpretable:
 
     def _is_small(self, arguments: tuple[Any, ...]) -> bool:
         """Return whether Python may run a call: what it has spent on others is less than compiling costs."""
-        before = _spent_before(self._files.folder).get(self._files.version, 0.0) if self._files is not None else 0.0
-        return before + self._spent <= SECONDS and entries(arguments) <= ENTRIES
+        if self._spent > SECONDS or entries(arguments) > ENTRIES:
+            return False
+        if _due or self._files is None:
+            return True
+        before = _spent_before(self._files.folder).get(self._files.version, 0.0)
+        _due.extend([self] if before + self._spent > SECONDS_OF_RUNS else [])
+        return not _due
 
     @property
     def spent(self) -> tuple[Path, str, float] | None:
@@ -82,8 +87,10 @@ class Interpretable:
         return None if self._files is None else (self._files.folder, self._files.version, self._spent)
 
 
-# Kernels that Python has run in this process.
+# Kernels that Python has run in this process, and the one that is compiled for the time of earlier runs: no run has to
+# compile all of them at once.
 _interpreted: list[Interpretable] = []
+_due: list[Interpretable] = []
 
 
 @functools.cache

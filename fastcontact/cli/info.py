@@ -9,7 +9,7 @@ from typing import Any
 from fastcontact.cli._outputs import check_outputs, save
 from fastcontact.cli._terminal import say
 
-HELP = "show what a mesh, deck or result file holds: groups, sizes, steps, iterations, versions"
+HELP = "show what a mesh, case, deck or result file holds: groups, sizes, steps, iterations, versions"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

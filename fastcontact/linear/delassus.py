@@ -34,7 +34,7 @@ class TooManyColumnsError(ConvergenceError):
     def __init__(self, count: int) -> None:
         super().__init__(
             f"the contact needs {count} columns of the inverse stiffness, a solution each, since its constraints cannot be "
-            f"eliminated: use {CHEAP}, or the direct solver"
+            f"eliminated: use {CHEAP} and pairs that share no nodes, or the direct solver"
         )
 
 

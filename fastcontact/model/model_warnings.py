@@ -5,6 +5,7 @@ They are sentences for the screen and the result file. The model may be right al
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -57,7 +58,9 @@ def model_warnings(model: Model, ramp: Ramp) -> list[str]:
     warnings = _moduli(model) + _named_units(model) + _proportions(model, pushed)
     warnings += [text for text in (poorest_cell(model.mesh), hanging_nodes_warning(model)) if text] + _coincident(model)
     warnings += _friction(model) + _penetrating(model, pairs, pushed) + _unramped(model, ramp)
-    warnings += _prescribed_overlaps(pairs, supports) + _lost_loads(model) + _split_sides(model, pairs)
+    warnings += (
+        _prescribed_overlaps(pairs, supports) + _lost_loads(model) + _split_sides(model, pairs) + _wetted_twice(model)
+    )
     return warnings + _stiffness(model.mesh) + [text for load in model.loads for text in _load_integral(model, load)]
 
 
@@ -191,6 +194,21 @@ def _coincident(model: Model) -> list[str]:
     return [
         f"{count} nodes lie {where}, and no contact joins them (first: points {first[0]} and {first[1]} at ({point})): merge "
         "them in the mesher or with generate.transform.merge_points, or define the contact"
+    ]
+
+
+def _wetted_twice(model: Model) -> list[str]:
+    """Return a warning for two pairs with a fluid each that have secondary facets in common."""
+    groups, wet = model.mesh.cell_groups, [pair for pair in model.contact if pair.fluid is not None]
+    shared = {
+        (one.name, other.name): len(np.intersect1d(groups.get(one.secondary, []), groups.get(other.secondary, [])))
+        for one, other in itertools.combinations(wet, 2)
+    }
+    return [
+        f"the fluids of contacts '{one}' and '{other}' both press on {count} secondary facets, and each runs round where the "
+        "other contact seals: give each pair facets of its own"
+        for (one, other), count in shared.items()
+        if count
     ]
 
 

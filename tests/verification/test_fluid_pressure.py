@@ -151,6 +151,18 @@ def test_fluid_round_a_disc_comes_as_far_as_the_contact_presses_less(element):
     assert abs(last.reaction[mesh.points_of("A1B1"), 1].sum() + contact.force[1]) < 1e-9 * abs(contact.force[1])
 
 
+def test_facets_that_two_fluids_press_on_are_told():
+    model = elastic_model(fc.generate.block((2.0, 1.0), (4, 2)), "plane_strain", E=1.0, nu=0.3)
+    model.fix("TOP", "xy")
+    for name, height in (("near", -0.1), ("far", -0.2)):
+        plane = fc.obstacles.HalfSpace((0.0, height), (0.0, 1.0))
+        model.add_obstacle(name, secondary="BOTTOM", obstacle=plane)
+        model.add_fluid_pressure(name, 1e-3, source="BOTTOM_LEFT")
+    with pytest.warns(fc.FastcontactWarning) as told:
+        fc.solve(model, 1)
+    assert any("'near' and 'far' both press on 4 secondary facets" in str(warning.message) for warning in told)
+
+
 def test_a_squeezed_o_ring_is_pressed_against_the_wall_of_its_groove():
     """Fluid on the height of the groove balances the wall, but for hoop stress, and what the cord seals by grows with it."""
     half = fc.generate.quarter_disc("tri6", R=2.5, size=0.5, contact_size=0.2)

@@ -28,7 +28,7 @@ WIDEST = 0.8
 VIEWS = [(height, direction) for height in (25.0, -25.0) for direction in (-60.0, 30.0, 120.0, -150.0)]
 # Ticks on an axis that is seen as long as the diagonal of the box; how near an end of y, relative to it, its numbers stand
 # on those of other axes.
-TICKS, NEAR_END = 10, 0.1
+TICKS, NEAR_END = 14, 0.1
 
 
 def draw_solid(
@@ -86,11 +86,12 @@ def show_box(ax: Any, low: Array, high: Array, view: tuple[float, float]) -> Non
     widest = float((np.abs([level, np.cross(eye, level)]) @ size).max()) / diagonal
     fraction = size * np.sqrt(1.0 - eye**2) / diagonal
     for name, begin, end, along in zip("xyz", low, high, fraction):
-        ticks = MaxNLocator(int(np.clip(TICKS * along, 1, 9)), steps=[1, 2, 5, 10]).tick_values(begin, end)
+        count = int(np.clip(TICKS * along, 3 if name == "y" else 1, 9))
+        ticks = MaxNLocator(count, steps=[1, 2, 5, 10]).tick_values(begin, end)
         margin = (NEAR_END if name == "y" else -1e-9) * (end - begin)
         ticks = ticks[(ticks >= begin + margin) & (ticks <= end - margin)]
         getattr(ax, f"set_{name}lim")(begin, end)
-        getattr(ax, f"set_{name}ticks")(ticks)
+        getattr(ax, f"set_{name}ticks")(ticks[-1:] if TICKS * along < 1.5 else ticks)
     ax.set_box_aspect(size, zoom=ROOM * min(1.0, WIDEST / widest))
 
 

@@ -157,7 +157,7 @@ def test_python_runs_a_kernel_until_it_has_taken_its_time_and_never_one_that_is_
 
 def test_the_time_of_earlier_runs_counts(tmp_path):
     """In the first run Python has spent nothing yet; in the second one more than it may."""
-    short = ASK.replace("answers = [", "interpreting.SECONDS = 1e-9\nanswers = [", 1)
+    short = ASK.replace("answers = [", "interpreting.SECONDS_OF_RUNS = 1e-9\nanswers = [", 1)
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "NUMBA_DISABLE_JIT": "0"}
 
     def ask():

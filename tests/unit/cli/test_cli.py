@@ -307,6 +307,39 @@ def test_nothing_but_warnings_is_printed_when_quiet(solved, tmp_path, capsys):
     assert captured.err.count("\n") == 1
 
 
+TIP = """
+title = "a tip"
+kinematics = "axisymmetric"
+mesh = {generator = "block", divisions = [8, 8]}
+material = [{E = 1.0, nu = 0.3}]
+support = [{group = "BOTTOM", y = 0.0}]
+[obstacle.tip]
+secondary = "TOP"
+shape = {kind = "cone", slope = 0.1, tip = 1.0}
+motion = {y = -0.02}
+[theory.tip]
+kind = "cone_punch"
+E = 1.0
+nu = 0.3
+slope = 0.1
+approach = 0.02
+[ramp]
+steps = 1
+"""
+
+
+def test_a_theory_without_bound_is_not_compared(tmp_path, capsys):
+    (tmp_path / "tip.toml").write_text(TIP)
+    assert (
+        main(["run", str(tmp_path / "tip.toml"), "-o", str(tmp_path / "tip.vtkhdf"), "--json", str(tmp_path / "t")])
+        == 0
+    )
+    (line,) = [line for line in capsys.readouterr().out.splitlines() if "equal force" in line]
+    assert line.startswith("  contact 'tip' against theory at equal force: force +0.000%, radius ")
+    found = json.loads((tmp_path / "t").read_text())["theory"]["tip"]["equal_force"]
+    assert found["pressure_max"] is found["deviation"]["pressure_max"] is None
+
+
 def test_environment_is_shown(capsys):
     assert main(["env"]) == 0
     assert "numba" in capsys.readouterr().out
