@@ -10,6 +10,9 @@ import numpy as np
 from fastcontact.arrays import Array
 from fastcontact.errors import ContactError
 
+# Rows of the table that stands for an exponential law, and the least pressure of one, over that at a gap of zero.
+ROWS, LEAST = 129, 0.01
+
 
 class OverclosureLaw:
     """A piecewise linear pressure, zero up to the first overclosure, and going on beyond the last with its slope.
@@ -20,11 +23,11 @@ class OverclosureLaw:
     ----------
     name : str
         Of the contact pair, for messages.
-    table : sequence of (float, float)
+    table : array_like (n, 2)
         Overclosures, ascending, negative ones being gaps [length], and pressures, ascending from zero [pressure].
     """
 
-    def __init__(self, name: str, table: Sequence[Any]) -> None:
+    def __init__(self, name: str, table: Sequence[Any] | Array) -> None:
         try:
             rows = np.array([[float(value) for value in row] for row in table]).reshape(-1, 2)
         except (TypeError, ValueError):
@@ -51,3 +54,14 @@ class OverclosureLaw:
         interval = np.clip(np.searchsorted(self.table[:, 1], p, side="right") - 1, 0, len(self._slopes) - 1)
         start = self.table[interval, 1]
         return np.asarray(before[interval] + 0.5 * (p**2 - start**2) / self._slopes[interval])
+
+
+def exponential(clearance: float, pressure: float) -> list[tuple[float, float]]:
+    """Return a table of ``p0 exp(h ln(100) / c0)``: p0 at a gap of zero [pressure], a hundredth of it at the gap c0 [length].
+
+    That is the exponential law of CalculiX, up to an overclosure of 3 c0.
+    """
+    overclosures = clearance * np.linspace(-1.0, 3.0, ROWS)
+    pressures = pressure * LEAST ** (-overclosures / clearance)
+    pressures[0] = 0.0
+    return list(zip(overclosures.tolist(), pressures.tolist(), strict=True))

@@ -37,7 +37,7 @@ class SharedOptions(TypedDict, total=False):
     excluded: str | Sequence[str] | None
     frictionless: str | Sequence[str] | None
     frictionless_along: ArrayLike | None
-    penalty: float | Sequence[tuple[float, float]] | None
+    penalty: float | Sequence[tuple[float, float]] | Mapping[str, float] | None
     tangential_penalty: Value | None
     cohesion: Mapping[str, float | str] | None
     adhesion: Mapping[str, float] | None

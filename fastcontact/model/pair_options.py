@@ -12,7 +12,7 @@ from fastcontact._tools.argument_types import finite_vector
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.cohesion import CohesiveLaw, cohesive_law
 from fastcontact.contact.conductance import Conductance
-from fastcontact.contact.overclosure import OverclosureLaw
+from fastcontact.contact.overclosure import OverclosureLaw, exponential
 from fastcontact.contact.pair_options import KINDS, Field, PairOptions
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity.loads import check_number, check_value, evaluated
@@ -44,9 +44,7 @@ def pair_options(
         frictionless=_nodes(name, "frictionless", options, mesh, side),
         frictionless_along=_vector(name, "frictionless_along", options, mesh.dim),
         kind=_kind(name, options, against_obstacle),
-        penalty=OverclosureLaw(name, options["penalty"])
-        if isinstance(options.get("penalty"), (Sequence, np.ndarray)) and not isinstance(options["penalty"], str)
-        else _positive(name, "penalty", options, "no penetration"),
+        penalty=_penalty(name, options),
         tangential_penalty=_tangential_penalty(name, options.get("tangential_penalty")),
         search_distance=_positive(name, "search_distance", options, "any distance"),
         wear=_positive(name, "wear", options, "none"),
@@ -183,6 +181,22 @@ def _vector(name: str, option: str, options: Mapping[str, Any], dim: int) -> Arr
     if vector is None or not vector.any():
         raise ContactError(f"{option} = {value!r} of contact '{name}' must be a vector of {dim} numbers, not all zero")
     return vector
+
+
+def _penalty(name: str, options: Mapping[str, Any]) -> float | OverclosureLaw | None:
+    """Return a stiffness per area, or the law of a table or of the constants of an exponential law."""
+    penalty = options.get("penalty")
+    if isinstance(penalty, Mapping):
+        if set(penalty) != {"clearance", "pressure"}:
+            raise ContactError(
+                f"an exponential penalty of contact '{name}' has the pressure at a gap of zero, and the clearance at which a "
+                "hundredth of it is left: {'clearance': 0.001, 'pressure': 5.0}"
+            )
+        constants = (_positive(name, key, penalty, "exact contact") or 0.0 for key in ("clearance", "pressure"))
+        return OverclosureLaw(name, exponential(*constants))
+    if isinstance(penalty, (Sequence, np.ndarray)) and not isinstance(penalty, str):
+        return OverclosureLaw(name, penalty)
+    return _positive(name, "penalty", options, "no penetration")
 
 
 def _tangential_penalty(name: str, value: Any) -> Field | None:

@@ -102,14 +102,14 @@ def test_a_penalty_is_a_positive_number(penalty):
 TABLE = [(-0.002, 0.0), (0.0, 1.0), (0.002, 4.0), (0.004, 12.0)]
 
 
-def layered(formulation, element, approach, matching=True):
+def layered(formulation, element, approach, matching=True, penalty=TABLE):
     """Press two blocks with a soft layer between them; return the last step."""
     low = fc.generate.block((1.0, 1.0), (4, 4), element=element)
     up = fc.generate.block((1.0, 1.0), (4 if matching else 3, 3), element=element, origin=(0.0, 1.0), name="UP")
     up = fc.generate.renamed(up, {name: "U" + name for name in ("BOTTOM", "TOP", "LEFT", "RIGHT")})
     model = elastic_model(fc.generate.union(low, up), "plane_strain", nu=0.0, BOTTOM="xy", UTOP="x")
     model.prescribe("UTOP", y=-approach)
-    model.add_contact("pair", secondary="UBOTTOM", primary="TOP", formulation=formulation, penalty=TABLE)
+    model.add_contact("pair", secondary="UBOTTOM", primary="TOP", formulation=formulation, penalty=penalty)
     return fc.solve(model, 3)[-1]
 
 
@@ -143,3 +143,21 @@ def test_a_wrong_table_is_refused(table):
     wall = fc.obstacles.HalfSpace((0.0, 1.0), (0.0, -1.0))
     with pytest.raises(fc.ContactError, match="a number, or a table of overclosures and pressures that both ascend"):
         model.add_obstacle("wall", secondary="TOP", obstacle=wall, penalty=table)
+
+
+@pytest.mark.filterwarnings("ignore:contact 'pair' penetrates", "ignore:the works of these load steps")
+def test_an_exponential_law():
+    """Pressure p0 exp(h ln(100) / c0) at the overclosure h, within (ln(100) / 32)^2 / 8 of which chords of the table lie."""
+    step = layered("mortar", "quad4", 0.004, penalty={"clearance": 0.002, "pressure": 1.0})
+    p = step.contact["pair"].pressure
+    assert p == pytest.approx(np.exp(-step.contact["pair"].gap * np.log(100.0) / 0.002), rel=2.6e-3)
+    assert p == pytest.approx((0.004 + step.contact["pair"].gap) * 1000.0 / 2.0, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("penalty", "message"),
+    [({"clearance": 0.1}, "an exponential penalty of"), ({"clearance": 0.1, "pressure": -1.0}, "pressure = -1.0 of")],
+)
+def test_a_wrong_exponential_law_is_refused(penalty, message):
+    with pytest.raises(fc.ContactError, match=message):
+        layered("mortar", "quad4", 0.004, penalty=penalty)

@@ -11,13 +11,11 @@ from fastcontact.arrays import Array
 from fastcontact.cases.decks.blocks import Block, Row, folded, unquoted
 from fastcontact.cases.decks.content import Amplitude, Axes, Content, Interaction, Material, Part, Section
 from fastcontact.cases.decks.refusals import check_new, defined, refusing
-from fastcontact.contact.overclosure import OverclosureLaw
+from fastcontact.contact.overclosure import OverclosureLaw, exponential
 from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.errors import ContactError
 
-# Points of the table that stands for an exponential law.
-EXPONENTIAL = 129
 # Numbers of the constants of elastic materials.
 CONSTANTS = {"ISOTROPIC": 2, "ENGINEERING CONSTANTS": 9, "ORTHOTROPIC": 9, "ANISOTROPIC": 21}
 
@@ -179,7 +177,7 @@ def behaviour(content: Content, current: Interaction, block: Block) -> None:
     if law == "LINEAR":
         current.penalty = block.only().positive(0, "slope")
     elif law == "EXPONENTIAL":
-        current.penalty = _exponential(block.only().positive(0, "clearance"), block.only().positive(1, "pressure"))
+        current.penalty = exponential(block.only().positive(0, "clearance"), block.only().positive(1, "pressure"))
     elif law == "TABULAR":
         current.penalty = _table(block)
     elif law == "TIED":
@@ -198,14 +196,6 @@ def _table(block: Block) -> float | list[tuple[float, float]]:
             "TABULAR needs pressures and overclosures that both ascend, the first pressure zero"
         ) from None
     return points[1][1] / points[1][0] if len(points) == 2 and points[0][0] == 0.0 else points
-
-
-def _exponential(clearance: float, pressure: float) -> list[tuple[float, float]]:
-    """Return a table of ``p0 exp(h ln(100) / c0)``, as in CalculiX, from the clearance at which it is a hundredth of p0."""
-    overclosures = clearance * np.linspace(-1.0, 3.0, EXPONENTIAL)
-    pressures = pressure * np.exp(np.log(100.0) * overclosures / clearance)
-    pressures[0] = 0.0
-    return list(zip(overclosures.tolist(), pressures.tolist(), strict=True))
 
 
 def friction(content: Content, current: Interaction, block: Block) -> None:
