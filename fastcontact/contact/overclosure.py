@@ -1,4 +1,4 @@
-"""Tabular pressure-overclosure relations."""
+"""Pressure-overclosure relations: tables, and exponential laws."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ import numpy as np
 from fastcontact.arrays import Array
 from fastcontact.errors import ContactError
 
-# Rows of the table that stands for an exponential law, and the least pressure of one, over that at a gap of zero.
-ROWS, LEAST = 129, 0.01
+# Of an exponential law: the part of the pressure at a gap of zero that is left at its clearance, and the overclosure, in units
+# of that, from which on it goes straight on.
+LEFT, FARTHEST = 0.01, 3.0
 
 
 class OverclosureLaw:
@@ -56,12 +57,29 @@ class OverclosureLaw:
         return np.asarray(before[interval] + 0.5 * (p**2 - start**2) / self._slopes[interval])
 
 
-def exponential(clearance: float, pressure: float) -> list[tuple[float, float]]:
-    """Return a table of ``p0 exp(h ln(100) / c0)``: p0 at a gap of zero [pressure], a hundredth of it at the gap c0 [length].
+class ExponentialLaw(OverclosureLaw):
+    """The pressure ``p0 exp(h ln(100) / c0)``, as in CalculiX; it goes straight on below the overclosure -c0 and beyond 3 c0.
 
-    That is the exponential law of CalculiX, up to an overclosure of 3 c0.
+    Parameters
+    ----------
+    clearance : float
+        Gap c0 at which the pressure is a hundredth of p0 [length].
+    pressure : float
+        p0, at a gap of zero [pressure].
     """
-    overclosures = clearance * np.linspace(-1.0, 3.0, ROWS)
-    pressures = pressure * LEAST ** (-overclosures / clearance)
-    pressures[0] = 0.0
-    return list(zip(overclosures.tolist(), pressures.tolist(), strict=True))
+
+    def __init__(self, clearance: float, pressure: float) -> None:
+        self._clearance, self._pressure, self._rate = clearance, pressure, -np.log(LEFT) / clearance
+
+    def line(self, overclosure: Array) -> tuple[Array, Array]:
+        """See `OverclosureLaw.line`."""
+        at = np.clip(overclosure, -self._clearance, FARTHEST * self._clearance)
+        return self._rate * self._pressure * np.exp(self._rate * at), at - 1.0 / self._rate
+
+    def energy(self, pressure: Array) -> Array:
+        """See `OverclosureLaw.energy`."""
+        ends = self._pressure * np.exp(self._rate * self._clearance * np.array([-1.0, FARTHEST]))
+        p, along = np.maximum(pressure, 0.0), np.clip(pressure, *ends)
+        below, beyond = np.minimum(p, ends[0]), np.maximum(p, ends[1])
+        straight = 0.5 * below**2 / ends[0] + 0.5 * (beyond**2 - ends[1] ** 2) / ends[1]
+        return np.asarray((straight + along - ends[0]) / self._rate)

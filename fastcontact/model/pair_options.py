@@ -12,7 +12,7 @@ from fastcontact._tools.argument_types import finite_vector
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.cohesion import CohesiveLaw, cohesive_law
 from fastcontact.contact.conductance import Conductance
-from fastcontact.contact.overclosure import OverclosureLaw, exponential
+from fastcontact.contact.overclosure import ExponentialLaw, OverclosureLaw
 from fastcontact.contact.pair_options import KINDS, Field, PairOptions
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity.loads import check_number, check_value, evaluated
@@ -193,7 +193,7 @@ def _penalty(name: str, options: Mapping[str, Any]) -> float | OverclosureLaw | 
                 "hundredth of it is left: {'clearance': 0.001, 'pressure': 5.0}"
             )
         constants = (_positive(name, key, penalty, "exact contact") or 0.0 for key in ("clearance", "pressure"))
-        return OverclosureLaw(name, exponential(*constants))
+        return ExponentialLaw(*constants)
     if isinstance(penalty, (Sequence, np.ndarray)) and not isinstance(penalty, str):
         return OverclosureLaw(name, penalty)
     return _positive(name, "penalty", options, "no penetration")

@@ -146,12 +146,19 @@ def test_a_wrong_table_is_refused(table):
 
 
 @pytest.mark.filterwarnings("ignore:contact 'pair' penetrates", "ignore:the works of these load steps")
-def test_an_exponential_law():
-    """Pressure p0 exp(h ln(100) / c0) at the overclosure h, within (ln(100) / 32)^2 / 8 of which chords of the table lie."""
-    step = layered("mortar", "quad4", 0.004, penalty={"clearance": 0.002, "pressure": 1.0})
-    p = step.contact["pair"].pressure
-    assert p == pytest.approx(np.exp(-step.contact["pair"].gap * np.log(100.0) / 0.002), rel=2.6e-3)
-    assert p == pytest.approx((0.004 + step.contact["pair"].gap) * 1000.0 / 2.0, rel=1e-9)
+@pytest.mark.parametrize(("clearance", "p0", "at"), [(0.002, 1.0, 0.5), (0.002, 1.0, -0.5), (0.0005, 1e-5, 3.2)])
+def test_an_exponential_law(clearance, p0, at):
+    """Pressure p0 exp(h ln(100) / c0) at the overclosure h up to 3 c0, straight on from there."""
+    rate, h = np.log(100.0) / clearance, at * clearance
+    end = min(h, 3.0 * clearance)
+    there = p0 * np.exp(rate * end)
+    pressure = there * (1.0 + rate * (h - end))
+    step = layered("mortar", "quad4", h + 2.0 * pressure / 1000.0, penalty={"clearance": clearance, "pressure": p0})
+    assert step.contact["pair"].pressure == pytest.approx(pressure, rel=1e-8)
+    assert step.contact["pair"].gap == pytest.approx(-h, rel=1e-6)
+    # A straight line up to a hundredth of the pressure, the exponential, and a straight line again.
+    energy = (there - 0.005 * p0) / rate + 0.5 * (h - end) * (pressure + there)
+    assert step.work["penalty_energy"] == pytest.approx(energy, rel=1e-8)
 
 
 @pytest.mark.parametrize(

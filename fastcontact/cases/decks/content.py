@@ -135,7 +135,7 @@ class Interaction:
 
     name: str
     location: Location
-    penalty: float | list[tuple[float, float]] | None = None
+    penalty: float | list[tuple[float, float]] | dict[str, float] | None = None
     friction: float = 0.0
     stick: float | None = None
     kind: str = "unilateral"

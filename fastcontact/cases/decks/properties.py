@@ -11,7 +11,7 @@ from fastcontact.arrays import Array
 from fastcontact.cases.decks.blocks import Block, Row, folded, unquoted
 from fastcontact.cases.decks.content import Amplitude, Axes, Content, Interaction, Material, Part, Section
 from fastcontact.cases.decks.refusals import check_new, defined, refusing
-from fastcontact.contact.overclosure import OverclosureLaw, exponential
+from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.errors import ContactError
@@ -177,7 +177,8 @@ def behaviour(content: Content, current: Interaction, block: Block) -> None:
     if law == "LINEAR":
         current.penalty = block.only().positive(0, "slope")
     elif law == "EXPONENTIAL":
-        current.penalty = exponential(block.only().positive(0, "clearance"), block.only().positive(1, "pressure"))
+        row = block.only()
+        current.penalty = {"clearance": row.positive(0, "clearance"), "pressure": row.positive(1, "pressure")}
     elif law == "TABULAR":
         current.penalty = _table(block)
     elif law == "TIED":
