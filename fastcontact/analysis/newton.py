@@ -114,7 +114,7 @@ class _Newton:
         self._iterate = Iterate.of(begin.state) if settled is None else settled.iterate
         self._settled: SettledContact | None = None
         self._kept: Problem | None = None  # the last tangent, where another iteration may use it
-        self._held = 0.0  # stiffness of the springs along closed gaps that the last tangent needed
+        self._held = False  # whether the last tangent needed springs along closed gaps
 
     def iterated(self, origin: Array) -> StepEquilibrium:
         """Return the equilibrium by iterations that begin at displacements `origin` (n_dofs,) [length]."""
@@ -203,7 +203,7 @@ class _Newton:
             return self._prepared_contact(u)
         failed: Exception | None = None
         for by in self._regularisations():
-            if by.geometric == WHOLE and by.held < self._held:
+            if self._held and by.geometric == WHOLE and not by.held:
                 continue  # it failed an iteration ago
             try:
                 solution = self._linearised_contact(u, changes, by)
@@ -211,7 +211,7 @@ class _Newton:
                 log.info("the tangent fails with %s: %s", by, error)
                 failed = error
             else:
-                self._held = by.held
+                self._held = by.held > 0.0
                 return solution
         if isinstance(failed, ConvergenceError):
             raise failed

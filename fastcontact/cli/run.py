@@ -65,14 +65,10 @@ def run(options: argparse.Namespace) -> int:
     check_outputs(files_of_case(options.case), [output, options.json, options.modes], [options.plot])
     with warnings_shown() as early:
         case = read_case(options.case)
-        if case.deck is None and "study" in case.text:
-            from fastcontact.studies.checks import check_study
-
-            with in_file(case_path(options.case)):
-                check_study(case)
     read = time.perf_counter()
     with in_file(case_path(options.case)):
         case.model.check(case.ramp)  # a wrong model must not replace the results of a right one
+        early += _checked_study(case)
     with warnings_shown() as caught:
         caught += early
         n_done, earlier, last, steps = _solved(options, case, output)
@@ -96,6 +92,17 @@ def run(options: argparse.Namespace) -> int:
         say(f"{len(failed)} of {len(numbers['checks'])} checks of the case failed: {', '.join(failed)}", error=True)
         return 3
     return 0
+
+
+def _checked_study(case: Case) -> list[str]:
+    """Return the warnings of a check of the study of a case, if it has one."""
+    if case.deck is not None or "study" not in case.text:
+        return []
+    from fastcontact.studies.checks import check_study
+
+    with warnings_shown() as caught:
+        check_study(case)
+    return caught
 
 
 def _modes(options: argparse.Namespace, case: Case, last: StepResult) -> Any:

@@ -10,8 +10,8 @@ import numpy as np
 from fastcontact.arrays import Array
 from fastcontact.errors import ContactError
 
-# Of an exponential law: the part of the pressure at a gap of zero that is left at its clearance, and the overclosure, in units
-# of that, from which on it goes straight on.
+# Of an exponential law: the part of the pressure at a gap of zero that is left at its clearance; the overclosure, in units of
+# the clearance, from which on it is a line.
 LEFT, FARTHEST = 0.01, 3.0
 
 

@@ -25,8 +25,9 @@ def check_study(case: Case) -> None:
     _check_finite("study", study)
     check_names(case, chosen.quantities)
     linked = study.get("parameters", {})
-    for name in linked:
-        substituted(chosen.data, name, 1.0, linked)
+    with in_file("[study.parameters]"):
+        for name in linked:
+            substituted(chosen.data, name, 1.0, linked)
     for member in chosen.combinations if study else ():
         with in_file(f"[study], {member}"):
             job = job_of(case, chosen, member, 0, label="", marks={}, size=0.0)

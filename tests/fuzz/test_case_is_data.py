@@ -167,7 +167,7 @@ def test_the_name_of_a_pair_does_not_become_a_path(tmp_path):
         data[table] = {name: data[table]["hertz"]}
     data["probes"] = {name: "C1"}
     data["title"] = name
-    del data["check"], data["couple"]
+    del data["check"], data["couple"], data["study"]
     inner = tmp_path / "a" / "b"
     inner.mkdir(parents=True)
     (inner / "case.toml").write_text(text_of(data), encoding="utf-8")
