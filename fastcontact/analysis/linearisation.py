@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from scipy.sparse import bsr_array, csr_array
 
@@ -17,29 +17,10 @@ from fastcontact.analysis.problem import (
     near_nullspace,
     prepare_solver,
 )  # fmt: skip
-from fastcontact.analysis.terms import Terms, added
+from fastcontact.analysis.terms import Terms
 from fastcontact.arrays import Array
 from fastcontact.elasticity.constrained_system import System
-from fastcontact.elasticity.nonlinear_bodies import WHOLE
-
-
-@dataclass(frozen=True)
-class Regularisation:
-    """How a tangent is made positive definite.
-
-    Attributes
-    ----------
-    geometric : int
-        How much of the geometric stiffness it has, see `NonlinearBodies.at`.
-    held : float
-        Stiffness of springs along closed gaps, beside the largest of the bodies [-].
-    stiff : bool
-        Whether those of floating bodies are.
-    """
-
-    geometric: int = WHOLE
-    held: float = 0.0
-    stiff: bool = False
+from fastcontact.linear.sparse_rows import sum_of_blocks
 
 
 def linearised(
@@ -58,10 +39,10 @@ def linearised(
     contact : csr_array (n_dofs, n_dofs), optional
         Stiffness of forces of contact that vanish or are known at u [force / length].
     stiff : bool
-        See `Regularisation`.
+        Whether springs of floating bodies are as stiff as these.
     """
     K = problem.force_driven.stiffness(K)
-    system = problem.system.renewed(added(K, contact))
+    system = problem.system.renewed(K if contact is None else sum_of_blocks(K, contact))
     floating = _floating(problem, system, u, rigid, stiff)
     solver = copy.copy(problem.solver)
     involved = system.involved(problem.contact_dofs)

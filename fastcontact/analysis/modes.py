@@ -29,6 +29,7 @@ from fastcontact.elasticity.springs import stiffened
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.errors import ModelError, warn
 from fastcontact.linear import choice
+from fastcontact.linear.sparse_rows import sum_of_blocks
 from fastcontact.model.model import Model
 from fastcontact.results.step import StepResult
 
@@ -206,7 +207,7 @@ def _stiffness(model: Model, step: StepResult | None, field: MaterialField) -> b
         rise = model.expanding_rise(step.iterations.get("temperature_factors", ()), step.temperature)
         K = stiffened(bodies.at(step.displacement, bodies.beginning, rise=rise).K, model.springs)
         for factor, (pressure, _) in zip(step.iterations.get("pressure_factors", ()), model.following_pressures()):
-            K = bsr_array(K + factor * pressure.at(step.displacement)[1])
+            K = sum_of_blocks(K, factor * pressure.at(step.displacement)[1])
         return K
     K = stiffened(stiffness(mesh, kinematics, field.moduli, field.loops, None, field.treatment), model.springs)
     if step is None:

@@ -22,7 +22,7 @@ from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
 from fastcontact.analysis.inequalities import StepContext
 from fastcontact.analysis.iterate import Iterate
-from fastcontact.analysis.linearisation import Regularisation, linearised, load_about
+from fastcontact.analysis.linearisation import linearised, load_about
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
 from fastcontact.analysis.step_equilibrium import StepEquilibrium
@@ -100,6 +100,25 @@ def newton(
             log.info("the step starts anew, not from an expected displacement: %s", error)
             before = None
     return _Newton(problem, begin, load, before).iterated(start.u)
+
+
+@dataclass(frozen=True)
+class Regularisation:
+    """How a tangent is made positive definite.
+
+    Attributes
+    ----------
+    geometric : int
+        How much of the geometric stiffness it has, see `NonlinearBodies.at`.
+    held : float
+        Stiffness of springs along closed gaps, beside the largest of the bodies [-].
+    stiff : bool
+        Whether those of floating bodies are.
+    """
+
+    geometric: int = WHOLE
+    held: float = 0.0
+    stiff: bool = False
 
 
 class _Newton:

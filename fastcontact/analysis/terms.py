@@ -25,6 +25,7 @@ from fastcontact.elasticity.constrained_system import Stiffness
 from fastcontact.elasticity.following_pressure import FollowingPressure
 from fastcontact.elasticity.nonlinear_bodies import WHOLE, DeformedBodies
 from fastcontact.elasticity.springs import Springs, spring_force, spring_stiffness
+from fastcontact.linear.sparse_rows import sum_of_blocks
 
 # Elastic energy and plastic work [energy].
 Energies = tuple[float, float]
@@ -121,6 +122,7 @@ class SpringForces(_WithoutHistory):
 
     def __init__(self, springs: Sequence[Springs], n: int) -> None:
         self._springs, self._n = springs, n
+        self._K = spring_stiffness(springs, n)
 
     def residual(self, u: Array) -> tuple[Array, Energies]:
         """See `Term`."""
@@ -130,7 +132,7 @@ class SpringForces(_WithoutHistory):
 
     def tangent(self, u: Array, geometric: int = WHOLE) -> csr_array:
         """See `Term`."""
-        return spring_stiffness(self._springs, self._n)
+        return self._K
 
 
 class FollowerLoad(_WithoutHistory):
@@ -138,12 +140,12 @@ class FollowerLoad(_WithoutHistory):
 
     def __init__(self, problem: Problem, pressure: FollowingPressure, factor: float) -> None:
         self._problem, self._pressure, self._factor = problem, pressure, factor
+        self._before = pressure.at(np.zeros_like(problem.model.mesh.points))[0]
 
     def residual(self, u: Array) -> tuple[Array, Energies]:
         """See `Term`."""
-        force, displacement = np.zeros_like(u), self._problem.displacement(u)
-        here, before = self._pressure.at(displacement)[0], self._pressure.at(np.zeros_like(displacement))[0]
-        force[: here.size] = -self._factor * (here - before).ravel()
+        force, here = np.zeros_like(u), self._pressure.at(self._problem.displacement(u))[0]
+        force[: here.size] = -self._factor * (here - self._before).ravel()
         return force, (0.0, 0.0)
 
     def tangent(self, u: Array, geometric: int = WHOLE) -> csr_array:
@@ -155,13 +157,13 @@ class Fluid(_WithoutHistory):
     """By how much fluid in contact pushes less than at the displacements `at` (n_dofs,) where contact was linearised."""
 
     def __init__(self, problem: Problem, wetted: Wetted, at: Array) -> None:
-        self._problem, self._wetted, self._at = problem, wetted, at
+        self._problem, self._wetted = problem, wetted
+        self._before = wetted.force(problem.displacement(at))
 
     def residual(self, u: Array) -> tuple[Array, Energies]:
         """See `Term`."""
-        force = np.zeros_like(u)
-        here, before = (self._wetted.force(self._problem.displacement(each)) for each in (u, self._at))
-        force[: here.size] = (before - here).ravel()
+        force, here = np.zeros_like(u), self._wetted.force(self._problem.displacement(u))
+        force[: here.size] = (self._before - here).ravel()
         return force, (0.0, 0.0)
 
     def tangent(self, u: Array, geometric: int = WHOLE) -> csr_array:
@@ -212,7 +214,8 @@ class Terms:
         assert self.bodies is not None
         K = self.bodies.tangent(u, geometric)
         for term in self._parts[1:]:
-            K = added(K, term.tangent(u))
+            if (more := term.tangent(u)) is not None:
+                K = sum_of_blocks(K, more)
         return K
 
     def commit(self, u: Array, state: State) -> State:
@@ -220,12 +223,3 @@ class Terms:
         for term in self._parts:
             state = term.commit(u, state)
         return state
-
-
-def added(K: bsr_array, more: csr_array | bsr_array | None) -> bsr_array:
-    """Return the sum of two tangents, blocks sorted."""
-    if more is None:
-        return K
-    total = bsr_array(K + more.tobsr(K.blocksize))
-    total.sort_indices()
-    return total

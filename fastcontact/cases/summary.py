@@ -286,7 +286,7 @@ def _contact_lines(name: str, contact: Mapping[str, Any], unit: Mapping[str, str
     if contact["penalty"] is not None:
         rows.append(
             f"  contact '{name}' penetrates by up to {valued(contact['penetration'], unit, 'length')}, with a penalty of "
-            + (valued(soft, unit, "penalty") if isinstance(soft := contact["penalty"], float) else "its table")
+            + (valued(soft, unit, "penalty") if isinstance(soft := contact["penalty"], float) else "its law")
         )
     return rows
 

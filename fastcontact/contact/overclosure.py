@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import Any
 
@@ -15,7 +16,19 @@ from fastcontact.errors import ContactError
 LEFT, FARTHEST = 0.01, 3.0
 
 
-class OverclosureLaw:
+class OverclosureLaw(ABC):
+    """How the pressure of a contact grows with its overclosure, negative ones being gaps."""
+
+    @abstractmethod
+    def line(self, overclosure: Array) -> tuple[Array, Array]:
+        """Return slopes (m,) [pressure / length] at overclosures (m,) [length], and where their lines have no pressure."""
+
+    @abstractmethod
+    def energy(self, pressure: Array) -> Array:
+        """Return the energy by area (m,) [pressure length] at pressures (m,) [pressure]."""
+
+
+class TabularLaw(OverclosureLaw):
     """A piecewise linear pressure, zero up to the first overclosure, and going on beyond the last with its slope.
 
     ContactError if it is not such a table.
@@ -42,12 +55,12 @@ class OverclosureLaw:
         self._slopes = np.diff(rows[:, 1]) / np.diff(rows[:, 0])
 
     def line(self, overclosure: Array) -> tuple[Array, Array]:
-        """Return slopes (m,) [pressure / length] at overclosures (m,) [length], and where their lines have no pressure."""
+        """See `OverclosureLaw.line`."""
         interval = np.clip(np.searchsorted(self.table[:, 0], overclosure, side="right") - 1, 0, len(self._slopes) - 1)
         return self._slopes[interval], self.table[interval, 0] - self.table[interval, 1] / self._slopes[interval]
 
     def energy(self, pressure: Array) -> Array:
-        """Return the energy by area (m,) [pressure length] at pressures (m,) [pressure]."""
+        """See `OverclosureLaw.energy`."""
         p = np.maximum(pressure, 0.0)
         before = np.concatenate(
             [[0.0], np.cumsum(0.5 * (self.table[1:, 1] + self.table[:-1, 1]) * np.diff(self.table[:, 0]))]

@@ -15,7 +15,7 @@ from scipy.sparse import bsr_array, csr_array, diags_array, vstack
 
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
-from fastcontact.linear.sparse_rows import nodal_rows
+from fastcontact.linear.sparse_rows import nodal_rows, sum_of_blocks
 from fastcontact.round_off import ROUND_OFF
 
 # Ratio of the stiffness of a spring between nodes to that of the bodies there: warned about, and refused.
@@ -131,9 +131,7 @@ def stiffened(K: bsr_array, springs: Sequence[Springs]) -> bsr_array:
     """Return the stiffness matrix `K` (n, n) [force / length] with the springs added, (n, n) [force / length]."""
     if not springs:
         return K
-    total = bsr_array(K + spring_stiffness(springs, K.shape[0]).tobsr(K.blocksize))
-    total.sort_indices()
-    return total
+    return sum_of_blocks(K, spring_stiffness(springs, K.shape[0]))
 
 
 def spring_stiffness(springs: Sequence[Springs], n: int) -> csr_array:

@@ -1,10 +1,10 @@
-"""Sparse matrices from cells or nodal values; their rows scaled and selected without matrix products."""
+"""Sparse matrices from cells or nodal values, and their sums; rows scaled and selected without matrix products."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import bsr_array, coo_array, csr_array
 
 from fastcontact.arrays import AnyArray, Array, Indices, Numbers
 
@@ -36,6 +36,13 @@ def shapes_at(shape: Array, local: NDArray[np.integer], n_nodes: int) -> csr_arr
     """Return the shape functions (m, n_nodes) of all nodes at points, from those (m, n) of the nodes `local` (m, n)."""
     row = np.broadcast_to(np.arange(len(shape))[:, None], shape.shape)
     return coo_array((shape.ravel(), (row.ravel(), local.ravel())), shape=(len(shape), n_nodes)).tocsr()
+
+
+def sum_of_blocks(K: bsr_array, more: csr_array | bsr_array) -> bsr_array:
+    """Return the sum of two matrices (n, n) in the blocks of the first, which are sorted."""
+    total = bsr_array(K + more.tobsr(K.blocksize))
+    total.sort_indices()
+    return total
 
 
 def rows_of(mean: csr_array, direction: Array) -> csr_array:

@@ -12,7 +12,7 @@ from fastcontact._tools.argument_types import finite_vector
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.cohesion import CohesiveLaw, cohesive_law
 from fastcontact.contact.conductance import Conductance
-from fastcontact.contact.overclosure import ExponentialLaw, OverclosureLaw
+from fastcontact.contact.overclosure import ExponentialLaw, OverclosureLaw, TabularLaw
 from fastcontact.contact.pair_options import KINDS, Field, PairOptions
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity.loads import check_number, check_value, evaluated
@@ -187,15 +187,16 @@ def _penalty(name: str, options: Mapping[str, Any]) -> float | OverclosureLaw | 
     """Return a stiffness per area, or the law of a table or of the constants of an exponential law."""
     penalty = options.get("penalty")
     if isinstance(penalty, Mapping):
-        if set(penalty) != {"clearance", "pressure"}:
+        for key, value in penalty.items():
+            check_number(f"the {key} in the penalty of contact '{name}'", value)
+        if set(penalty) != {"clearance", "pressure"} or min(penalty.values()) <= 0.0:
             raise ContactError(
-                f"an exponential penalty of contact '{name}' has the pressure at a gap of zero, and the clearance at which a "
-                "hundredth of it is left: {'clearance': 0.001, 'pressure': 5.0}"
+                f"an exponential penalty of contact '{name}' has two positive numbers, the pressure at a gap of zero and the "
+                "clearance at which a hundredth of it is left: {'clearance': 0.001, 'pressure': 5.0}"
             )
-        constants = (_positive(name, key, penalty, "exact contact") or 0.0 for key in ("clearance", "pressure"))
-        return ExponentialLaw(*constants)
+        return ExponentialLaw(**penalty)
     if isinstance(penalty, (Sequence, np.ndarray)) and not isinstance(penalty, str):
-        return OverclosureLaw(name, penalty)
+        return TabularLaw(name, penalty)
     return _positive(name, "penalty", options, "no penetration")
 
 

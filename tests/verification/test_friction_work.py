@@ -1,5 +1,7 @@
 """Work of friction: a block just below and just above its limit, and the energy balance when the load turns round."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from models import elastic_model
@@ -256,6 +258,9 @@ def test_steps_as_a_whole_have_the_work_of_slip_before_nodes_touch():
     ):
         fc.contact_history(ball_on_block(), whole, "ball")
     assert len(fc.contact_history(ball_on_block(), few, "ball")) == 5
+    # Of a pair that does none of that work nothing is to be told.
+    idle = [replace(s, contact={"ball": replace(s.contact["ball"], dissipation=0.0)}) for s in whole]
+    assert not fc.contact_history(ball_on_block(), idle, "ball")["friction_work"].any()
 
 
 def test_fraction_while_touching_is_checked():

@@ -163,8 +163,12 @@ def test_an_exponential_law(clearance, p0, at):
 
 @pytest.mark.parametrize(
     ("penalty", "message"),
-    [({"clearance": 0.1}, "an exponential penalty of"), ({"clearance": 0.1, "pressure": -1.0}, "pressure = -1.0 of")],
+    [
+        ({"clearance": 0.1}, "an exponential penalty of contact 'pair' has two positive numbers"),
+        ({"clearance": 0.1, "pressure": -1.0}, "an exponential penalty of contact 'pair' has two positive numbers"),
+        ({"clearance": 0.1, "pressure": np.nan}, "the pressure in the penalty of contact 'pair'"),
+    ],
 )
 def test_a_wrong_exponential_law_is_refused(penalty, message):
-    with pytest.raises(fc.ContactError, match=message):
+    with pytest.raises(fc.FastcontactError, match=message):
         layered("mortar", "quad4", 0.004, penalty=penalty)

@@ -11,7 +11,7 @@ from fastcontact.arrays import Array
 from fastcontact.cases.decks.blocks import Block, Row, folded, unquoted
 from fastcontact.cases.decks.content import Amplitude, Axes, Content, Interaction, Material, Part, Section
 from fastcontact.cases.decks.refusals import check_new, defined, refusing
-from fastcontact.contact.overclosure import OverclosureLaw
+from fastcontact.contact.overclosure import TabularLaw
 from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.errors import ContactError
@@ -191,7 +191,7 @@ def _table(block: Block) -> float | list[tuple[float, float]]:
     """Return a table of overclosures and pressures; the slope of one straight line through no pressure at zero."""
     points = [(row.number(1), row.number(0)) for row in block.rows]
     try:
-        OverclosureLaw("", points)
+        TabularLaw("", points)
     except ContactError:
         raise block.location.refuse(
             "TABULAR needs pressures and overclosures that both ascend, the first pressure zero"
