@@ -19,8 +19,8 @@ from fastcontact.errors import ContactError, unknown, warn
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
 
-# Part of the work of friction, done by nodes in the step in which they close, that is worth a warning, where that work is more
-# than a part of the strain energy: where friction 0.6 sticks under a ball, 2e-4 to 3e-4 in long steps, 1e-5 along their path.
+# Part of the work of friction, done by nodes in the step in which they close, that is worth a warning where that work is more
+# than a part of the strain energy: under a ball that sticks by friction 0.6, 2e-4 in long steps and 1e-5 along their path.
 WHILE_TOUCHING, NOTABLE_WORK = 0.1, 1e-4
 
 
