@@ -68,7 +68,7 @@ class Criteria:
     max_geometry_updates: int = 60
     max_active_set_iterations: int = 200
     max_halvings: int = 4
-    friction_while_touching: float | None = None
+    friction_while_touching: float | None = 0.01
 
     def __post_init__(self) -> None:
         for name in ("relative", "geometry"):

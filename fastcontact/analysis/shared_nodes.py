@@ -128,12 +128,17 @@ class SharedNodes:
         return np.einsum("md,mkd->mk", self.summed(vectors), self.frame)
 
     def gathered(
-        self, constraints: Constraints, gap: Array, normal: Array, traction: Array
-    ) -> tuple[Array, Array, Array]:
-        """Return gaps (m,) [length], normal (m,) and tangential (m, dim) forces of places, from those of constraints."""
+        self, constraints: Constraints, gap: Array, normal: Array, traction: Array, closing: Array
+    ) -> tuple[Array, Array, Array, Array]:
+        """Return gaps (m,) [length], normal (m,) and tangential (m, dim) forces of places, from those of constraints.
+
+        And the slips (m, dim) of `closing` the gaps [length].
+        """
         tangents = np.stack(constraints.directions, axis=1)
-        forces = self._mean(np.einsum("md,mkd->mk", traction, tangents), np.ones(len(gap)))
-        return self._at_places(self.part) @ gap, self.summed(normal), np.einsum("mk,mkd->md", forces, tangents)
+        weighted = (traction, np.ones(len(gap))), (closing, self.along)
+        parts = (self._mean(np.einsum("md,mkd->mk", vectors, tangents), weight) for vectors, weight in weighted)
+        forces, slips = (np.einsum("mk,mkd->md", along, tangents) for along in parts)
+        return self._at_places(self.part) @ gap, self.summed(normal), forces, slips
 
     def shared(self, solution: Solution, constraints: StackedConstraints, u: Array) -> Solution:
         """Return a solution of `once` at displacements `u` (n_dofs,) [length] with forces that all constraints share."""

@@ -95,6 +95,8 @@ class Path:
         Gaps [length], zero where forces act, and normal forces [force].
     traction : ndarray (m, dim)
         Tangential forces [force].
+    closing : ndarray (m, dim)
+        What is not to count as slip where all of the gap closes [length].
     parts : int
         Increments to solve in.
     """
@@ -102,6 +104,7 @@ class Path:
     gap: Array
     normal: Array
     traction: Array
+    closing: Array
     parts: int
 
     @property
@@ -113,6 +116,11 @@ class Path:
         """Return the forces (1 + k, r) of constraints `rows` (r,) along tangents (m, dim)."""
         along = [(self.traction[rows] * tangent[rows]).sum(axis=1) for tangent in directions]
         return np.vstack([self.normal[rows], *along])
+
+    def closed(self, directions: tuple[Array, ...], rows: Indices) -> Array:
+        """Return gaps and `closing` (1 + k, r) of constraints `rows` (r,) along tangents (m, dim) [length]."""
+        along = [(self.closing[rows] * tangent[rows]).sum(axis=1) for tangent in directions]
+        return np.vstack([self.gap[rows], *along])
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,7 @@ from fastcontact.analysis.shared_nodes import SharedNodes
 from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium, Path
 from fastcontact.arrays import Array
 from fastcontact.contact.constraints import StackedConstraints
+from fastcontact.contact.surface import Surface
 from fastcontact.errors import ConvergenceError
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
@@ -75,9 +76,24 @@ def _path(step: StepContext, settled: SettledContact, nodes: SharedNodes | None)
     closing &= gap > LENGTH_ROUND_OFF * size
     if not (slid := float(shear[closing].sum())) > limit:
         return None
-    if nodes is not None:
-        gap, normal, traction = nodes.gathered(constraints, gap, normal, traction)
-    return Path(gap, normal, traction, min(math.ceil(slid / limit), MOST))
+    begin = gap, normal, traction, _closing(step, constraints, gap)
+    begin = begin if nodes is None else nodes.gathered(constraints, *begin)
+    return Path(*begin, min(math.ceil(slid / limit), MOST))
+
+
+def _closing(step: StepContext, constraints: StackedConstraints, gap: Array) -> Array:
+    """Return the slips (m, dim) of closing the gaps (m,) between bodies, where normals lean [length].
+
+    The constraints leave out those of the gaps that their own geometry, of the end of the step, has at its beginning.
+    """
+    closing = np.zeros_like(constraints.positions)
+    for name, rows in constraints.rows().items():
+        if constraints.slip0 is not None and isinstance(step.problem.pairs[name].primary, Surface):
+            tangents = np.stack([tangent[rows] for tangent in constraints.directions])
+            now = constraints.parts[name].gaps(step.state.u)
+            more = np.divide(gap[rows], now, out=np.ones_like(now), where=now > 0.0)
+            closing[rows] = np.einsum("km,kmd->md", more * constraints.slip0[:, rows], tangents)
+    return closing
 
 
 def _forces(step: StepContext, constraints: StackedConstraints) -> tuple[Array, Array] | None:

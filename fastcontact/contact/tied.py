@@ -39,6 +39,8 @@ class TiedPair:
         The secondary nodes that the gaps belong to, see `Constraints`.
     areas : ndarray (q,), optional
         Integrals of the functions that the equations are tested with [area].
+    reduction : csr_array (q dim, q dim), optional
+        All multipliers by those that are left where supports hold both sides, see `tied_at_supports`.
     """
 
     moments: csr_array
@@ -48,6 +50,7 @@ class TiedPair:
     nodal: NodalField
     nodes: Indices | None = None
     areas: Array | None = None
+    reduction: csr_array | None = None
 
     def constraints(self) -> Constraints:
         """Return the equations."""
@@ -61,18 +64,24 @@ class TiedPair:
 
     def forces(self, multiplier: Array) -> tuple[Array, Array]:
         """Return normal (m,) and tangential (m, k) forces at the places of the formulation."""
+        multiplier = multiplier if self.reduction is None else self.reduction @ multiplier
         parts = [self.moments.T @ part for part in multiplier.reshape(len(self.rows), -1)]
         return parts[0], np.column_stack(parts[1:])
 
 
-def tied(constraints: Constraints) -> TiedPair:
-    """Return the tying equations of the constraints `constraints`, which have tangents."""
-    moments, areas = moments_of(constraints)
+def tied(constraints: Constraints, moments: csr_array, areas: Array | None, reduction: csr_array | None) -> TiedPair:
+    """Return the tying equations of the constraints `constraints`, which have tangents; see `moments_of`, `TiedPair`."""
     size = np.maximum(np.asarray(abs(moments).sum(axis=1)).ravel(), TINY)
     positions = abs(moments) @ constraints.positions / size[:, None]
-    rows = tuple(_cleaned(csr_array(moments @ along)) for along in (constraints.B, *constraints.tangents))
+    rows = [csr_array(moments @ along) for along in (constraints.B, *constraints.tangents)]
+    if reduction is not None:
+        whole, q = csr_array(reduction.T @ vstack(rows, format="csr")), len(size)
+        rows = [csr_array(whole[first : first + q]) for first in range(0, whole.shape[0], q)]
     assert constraints.nodal is not None
-    return TiedPair(moments, rows, constraints.directions, positions, constraints.nodal, constraints.nodes, areas)
+    return TiedPair(
+        moments, tuple(map(_cleaned, rows)), constraints.directions, positions, constraints.nodal, constraints.nodes, areas,
+        reduction,
+    )  # fmt: skip
 
 
 def moments_of(constraints: Constraints) -> tuple[csr_array, Array | None]:

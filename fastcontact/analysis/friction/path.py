@@ -3,7 +3,8 @@
 A step that is solved at once counts the slip of a constraint from its beginning, although one that closes within it slides
 from where it touches only. Here the forces that the step changes are applied in equal parts, the geometry and the Delassus
 operator F being those of its end. With gaps and slips ``(g, s) = free + F y`` at the end, and gaps g0 and forces y0 at the
-beginning, where s = 0, those at a part p of the step are ``free + (1 - p) ((g0, 0) - free - F y0) + F y``.
+beginning, where s = 0, those at a part p of the step are ``free + (1 - p) ((g0, 0) - free - F y0) + F y``. In s closing is no
+slip, however normals lean: a correction for all of g0 is part of `free`, and each increment has that for the gap it closes.
 
 The last increment depends on the others by the slips before it alone. They stay as they are while the geometry settles.
 """
@@ -22,7 +23,7 @@ from fastcontact.contact.constraints import Constraints
 
 
 def along(
-    lag: Array, y: Array, parts: int, solve: Callable[[Array, Mask, Array | None], Forces]
+    lag: Array, begin: Array, y: Array, parts: int, solve: Callable[[Array, Mask, Array | None], Forces]
 ) -> tuple[Forces, tuple[Array, Array, Array]]:
     """Return the forces at the end of a step, and `Slid.slip` along tangents (k, m), `work` and `normal` there.
 
@@ -30,24 +31,32 @@ def along(
     ----------
     lag : ndarray (1 + k, m)
         What gaps and slips at the beginning are above those at the end under the forces of the beginning [length].
+    begin : ndarray (1 + k, m)
+        Gaps at the beginning, and by how much slips are corrected for closing them, see `Path.closed` [length].
+    begin : ndarray (1 + k, m)
+        Gaps at the beginning, and what slips at the end contain for closing them, see `Path.closed` [length].
     y : ndarray (1 + k, m)
-        These forces [force].
+        Forces at the beginning [force].
     parts : int
     solve : callable
         Returns the forces for gaps and slips beside those of the end, closed constraints and forces to start from.
     """
     closed, slip, work, iterations, settled = y[0] > 0.0, np.zeros_like(lag[1:]), np.zeros((2, lag.shape[1])), 0, True
+    gap, closing = begin[0], np.where(begin[0] > 0.0, begin[1:], 0.0)
+    lag = lag + np.vstack([np.zeros_like(gap), closing])
     for part in range(1, parts + 1):
         beside = (1.0 - part / parts) * lag
         beside[1:] -= slip
-        before = slip.copy(), work.copy(), y[0]
+        before = slip, work.copy(), y[0]
         forces = solve(beside, closed, y if y.any() else None)
         work += friction_work(y[0], forces.y[0], forces.y[1:], np.where(forces.closed, forces.gaps[1:], 0.0))
-        slip += forces.gaps[1:]
+        whole = slip + forces.gaps[1:]
+        left = np.divide(np.maximum(forces.gaps[0], 0.0), gap, out=np.zeros_like(gap), where=gap > 0.0)
+        slip = whole - left * closing
         y, closed = forces.y, forces.closed
         iterations += forces.iterations
         settled &= forces.settled
-    gaps = np.vstack([forces.gaps[:1], slip])
+    gaps = np.vstack([forces.gaps[:1], whole])
     return replace(forces, gaps=gaps, iterations=iterations, settled=settled), before
 
 

@@ -105,7 +105,8 @@ def _eliminated(
             cone = solved(constraints, closed, accuracy, forces)
         else:
             y = path.forces(constraints.directions, np.arange(len(constraints)))
-            cone, before = along(_lag(loaded, constraints, path, y), y, path.parts, beside)
+            begin = path.closed(constraints.directions, np.arange(len(constraints)))
+            cone, before = along(_lag(loaded, constraints, path, y), begin, y, path.parts, beside)
     except ConvergenceError:
         return None
     return FrictionalEquilibrium(
@@ -144,16 +145,19 @@ def _among(
     _add_compliance(F, constraints, rows)
     free = free.reshape(1 + k, -1) + at_rest[:, rows]
     start = None if forces is None else forces[:, rows]
-    begin = np.zeros_like(free) if path is None else path.forces(constraints.directions, rows)
+    begin, closing = np.zeros_like(free), np.zeros_like(free)
+    if path is not None:
+        begin, closing = path.forces(constraints.directions, rows), path.closed(constraints.directions, rows)
     if Q is not None:
-        F, free, begin = np.asarray(Q @ (Q @ F).T), *((Q @ own.ravel()).reshape(free.shape) for own in (free, begin))
+        F = np.asarray(Q @ (Q @ F).T)
+        free, begin, closing = ((Q @ own.ravel()).reshape(free.shape) for own in (free, begin, closing))
         start = None if start is None else (Q @ start.ravel()).reshape(free.shape)
     if len(still):
         moved = idle_slips & constraints.moved_past(rows, Q)
         F[still], F[:, still] = 0.0, 0.0
         F[still, still] = np.where(moved, GIVING * own[0, 0], np.diag(F).max())[idle_slips]
         free[1:][idle_slips & ~moved] = 0.0
-        begin[1:][idle_slips] = 0.0
+        begin[1:][idle_slips], closing[1:][idle_slips] = 0.0, 0.0
     equations = np.zeros(len(rows), bool) if constraints.equality is None else constraints.equality[rows]
 
     def solved(beside: Array, closed: Mask, start: Array | None) -> dense.Forces:
@@ -163,8 +167,8 @@ def _among(
         result, before = solved(np.zeros_like(free), closed[rows], start), None
     else:
         lag = -free - (F @ begin.ravel()).reshape(free.shape)
-        lag[0] += path.gap[rows]
-        result, before = along(lag, begin, path.parts, solved)
+        lag[0] += closing[0]
+        result, before = along(lag, closing, begin, path.parts, solved)
     y, relative = result.y, result.gaps
     if Q is not None:
         y, relative = (Q.T @ y.ravel()).reshape(y.shape), (Q.T @ relative.ravel()).reshape(y.shape)

@@ -18,7 +18,6 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations import Formulation
-from fastcontact.contact.formulations._pressure_field import PressureField
 from fastcontact.contact.held_motions import HeldMotions
 from fastcontact.contact.tied import TiedPair, moments_of
 from fastcontact.errors import ModelError
@@ -118,7 +117,7 @@ def _conditions(
     """
     tied = part.tied if isinstance(part.tied, TiedPair) else None
     moments, areas = moments_of(part) if tied is None else (tied.moments, tied.areas)
-    node = _nodes(pair, part, moments)
+    node = pair.nodes_of(part, moments)
     owners, n = pair.secondary.points[node].astype(np.intp), len(node)
     areas = np.ones(n) if areas is None else areas
     along = part.directions if tied is None else tied.directions
@@ -162,17 +161,3 @@ def _compliance(tested: csr_array, softness: Array | None) -> csr_array | None:
     if softness is None or not (tested @ softness).any():
         return None
     return csr_array(tested @ diags_array(softness) @ tested.T)
-
-
-def _nodes(pair: Formulation, constraints: Constraints, moments: csr_array) -> Indices:
-    """Return the secondary node (q,), as an index on its side, of each row of the moments (q, m)."""
-    if isinstance(constraints.nodal, PressureField):
-        field = constraints.nodal
-        alone = moments.indices[moments.indptr[len(field.independent) : -1]]  # points on an axis
-        nearest = field.around[alone, field.shape[alone].argmax(axis=1)]
-        return np.concatenate([field.independent, nearest])
-    points = pair.secondary.points
-    if constraints.nodes is None:
-        return np.arange(len(points))
-    order = np.argsort(points)
-    return np.asarray(order[np.searchsorted(points, constraints.nodes[: moments.shape[0]], sorter=order)])

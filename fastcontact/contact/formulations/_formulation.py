@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 from scipy.sparse import csr_array
 
-from fastcontact.arrays import AnyArray, Array, Mask
+from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.contact.cohesive_layer import bonded
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Compliance, Constraints
@@ -20,12 +20,13 @@ from fastcontact.contact.linearised_geometry import Geometry, PointForces, faced
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.contact.pair_options import PairOptions
-from fastcontact.contact.pairing import Candidates, Pairing, gap_rows, pair, rows_along, tangents
+from fastcontact.contact.pairing import Candidates, Pairing, gap_rows, normals, pair, rows_along, tangents
 from fastcontact.contact.prescribed_normals import Normals, checked_normals, opposed
 from fastcontact.contact.projection import at_nodes_of_facets, interpolated, nodal_normals, places, smooth_normals
 from fastcontact.contact.surface import Surface
 from fastcontact.contact.surface_smoothing import Smoothing, frames
-from fastcontact.contact.tied import TiedPair, tied
+from fastcontact.contact.tied import TiedPair, moments_of, tied
+from fastcontact.contact.tied_at_supports import reduction
 from fastcontact.contact.tied_offset import with_arms
 from fastcontact.errors import ContactError, unknown
 from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
@@ -232,7 +233,30 @@ class Formulation(ABC):
             smooth = self.normals if self.normals != "secondary" and self.normals is not None else "facet"
             pairing = pair(constraints.positions, self.primary, self.points, np.inf, smooth)
             constraints = with_arms(constraints, pairing, self.primary, self.points)
-        return tied(constraints)
+        moments, areas = moments_of(constraints)
+        return tied(constraints, moments, areas, self._tied_at_supports(constraints, moments, areas))
+
+    def _tied_at_supports(self, constraints: Constraints, moments: csr_array, areas: Array | None) -> csr_array | None:
+        """Return the `reduction` of the multipliers of a tied pair; None where supports hold no node on both sides."""
+        held = self._held_on_both_sides(Configuration.undeformed(self.points))
+        if held is None or not constraints.tangents:
+            return None
+        nodes = self.nodes_of(constraints, moments)
+        frames = [moments @ direction for direction in (normals(constraints.directions), *constraints.directions)]
+        axes = np.stack(frames, axis=1)
+        axes /= np.maximum(np.linalg.norm(axes, axis=2, keepdims=True), TINY)
+        sizes = np.ones(len(nodes)) if areas is None else np.where(np.isfinite(areas), areas, 0.0)
+        return reduction(
+            axes, np.where(sizes[:, None, None] > 0.0, held[nodes], 0.0), nodes, sizes, self.secondary.beside
+        )
+
+    def nodes_of(self, constraints: Constraints, moments: csr_array) -> Indices:
+        """Return the secondary node (q,), as an index on its side, of each row of the `moments_of` constraints (q, m)."""
+        points = self.secondary.points
+        if constraints.nodes is None:
+            return np.arange(len(points))
+        order = np.argsort(points)
+        return np.asarray(order[np.searchsorted(points, constraints.nodes[: moments.shape[0]], sorter=order)])
 
     def never_opening(self, positions: Array, at: Configuration) -> Mask | None:
         """Return which constraints, by reference position (m, dim) [length], do not separate (m,); None if all may."""
@@ -348,28 +372,57 @@ class Formulation(ABC):
         now, before = (candidates.positions(self.points + u) for u in (at.displacement, at.start))
         return self.primary.turning(now, before, at.pose, at.pose_start)
 
+    @cached_property
+    def _held_nodes(self) -> Indices:
+        """The secondary nodes that supports hold, as indices on the side."""
+        return np.flatnonzero(np.isin(self.secondary.points, () if self.held is None else self.held.nodes))
+
+    def _opposite_held(self, nodes: Indices, at: Configuration) -> tuple[Pairing, Array]:
+        """Return what secondary `nodes` (n,) face, and the mean projectors (n, dim, dim) on what is held there."""
+        assert self.held is not None
+        candidates = Candidates(self.secondary.points[nodes][:, None], np.ones((len(nodes), 1)))
+        pairing = self.facing(candidates, at, max(self.projection_tolerance or 0.0, ON_SYMMETRY))
+        theirs = np.zeros((len(nodes), *2 * self.points.shape[1:]))
+        if isinstance(self.primary, Surface):
+            rows = np.flatnonzero(pairing.paired)
+            facing = places(self.primary, pairing.facet[rows], pairing.xi[rows])
+            theirs[rows] = np.einsum("nk,nkde->nde", facing.shape, self.held.at(facing.nodes))
+        return pairing, theirs
+
+    def _held_on_both_sides(self, at: Configuration) -> Array | None:
+        """Return projectors (n_nodes, dim, dim) on directions in which both sides are held; None without any.
+
+        Facets all of whose nodes are held are left out.
+        """
+        nodes = self._held_nodes
+        if not len(nodes) or self.held is None:
+            return None
+        ours, (_, theirs) = self.held.at(self.secondary.points[nodes]), self._opposite_held(nodes, at)
+        held = np.zeros((len(self.secondary.points), *ours.shape[1:]))
+        held[nodes] = spanned(ours @ theirs @ ours, 0.5)
+        held = _without_whole_facets(held, self.secondary)
+        return held if held.any() else None
+
     def without_slip(self, at: Configuration) -> list[tuple[Array, Mask]]:
         """Return directions (n_nodes, dim) in which both sides are held, and do not move apart, with the nodes (n_nodes,).
 
         So it is in a plane of symmetry and on an axis: slip is zero there whatever the traction, which nothing determines.
         Where one side is free, or driven past the other, there is friction. Facets all of whose nodes are held are left out.
         """
-        nodes = np.flatnonzero(np.isin(self.secondary.points, () if self.held is None else self.held.nodes))
+        nodes = self._held_nodes
         if not len(nodes) or self.held is None:
             return []
+        pairing, theirs = self._opposite_held(nodes, at)
         points = self.secondary.points[nodes]
         both, moved = self.held.at(points), (at.displacement - at.start)[points]
-        candidates = Candidates(points[:, None], np.ones((len(nodes), 1)))
-        pairing = self.facing(candidates, at, max(self.projection_tolerance or 0.0, ON_SYMMETRY))
         if isinstance(self.primary, RigidSide):
             moved = moved - (at.obstacle - at.obstacle_start)
-            turning = self.turning(candidates, at)
+            turning = self.turning(Candidates(points[:, None], np.ones((len(nodes), 1))), at)
             moved = moved if turning is None else moved - turning
         else:
             rows = np.flatnonzero(pairing.paired)
-            facing, theirs = places(self.primary, pairing.facet[rows], pairing.xi[rows]), np.zeros_like(both)
+            facing = places(self.primary, pairing.facet[rows], pairing.xi[rows])
             held, motion = self.held.at(facing.nodes), (at.displacement - at.start)[facing.nodes]
-            theirs[rows] = np.einsum("nk,nkde->nde", facing.shape, held)
             mean = np.einsum("nk,nkd->nd", facing.shape, motion)
             # Where a leaning normal leads a little past a held node, what moves beside it does not count.
             beside = np.einsum("nk,nkde,nkd->ne", facing.shape, held, motion - mean[:, None])

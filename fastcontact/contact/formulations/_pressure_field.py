@@ -206,6 +206,13 @@ class PressureFieldFormulation(Formulation):
         independent[column] = nodes
         return csr_array(values @ csr_array((np.ones(len(nodes)), (np.arange(len(nodes)), column)))), independent
 
+    def nodes_of(self, constraints: Constraints, moments: csr_array) -> Indices:
+        """See `Formulation`: those of the field, and those nearest to points on an axis."""
+        field = constraints.nodal
+        assert isinstance(field, PressureField)
+        alone = moments.indices[moments.indptr[len(field.independent) : -1]]
+        return np.concatenate([field.independent, field.around[alone, field.shape[alone].argmax(axis=1)]])
+
     def of_points(
         self, candidates: Candidates, pairing: Pairing, field: PressureField, at: Configuration
     ) -> Constraints:
