@@ -47,8 +47,8 @@ class Criteria:
         Solve friction along the path of load steps in which nodes slide while they close: with the geometry of their end, in
         increments on one Delassus operator, so many that in each the shear at such nodes is at most this fraction of what
         friction can carry in all. Nodes then slide from where they touch on only, so that work of friction and shear are
-        those of many steps: 0.01 leaves errors of a per cent or two, for up to twice the time of the step with factors, up to
-        four times the iterations with multigrid, whose increments are less accurate. Nonlinear bodies have no increments:
+        those of many steps: 0.01 leaves errors of a few per cent, for up to twice the time of the step with factors, up to
+        six times the iterations with multigrid. Nonlinear bodies have no increments:
         their steps are halved instead, at most `max_halvings` times, while such nodes do more than this fraction of the
         frictional work so far. By default slip counts from the beginning of each step [-].
 
@@ -68,7 +68,7 @@ class Criteria:
     max_geometry_updates: int = 60
     max_active_set_iterations: int = 200
     max_halvings: int = 4
-    friction_while_touching: float | None = 0.01
+    friction_while_touching: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("relative", "geometry"):

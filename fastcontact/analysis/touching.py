@@ -40,12 +40,13 @@ def along_path(step: StepContext, settled: SettledContact, expected: float) -> S
     constraints, active = settled.constraints, settled.solution.active
     once, closed = (constraints, active) if nodes is None else (nodes.once(constraints), nodes.closed(active))
     try:
-        solution, _ = solve_inequalities(
+        solution, there = solve_inequalities(
             replace(step, path=path), once, replace(begun), closed & once.usable, Accuracy(0.0)
         )
         assert isinstance(solution, FrictionalEquilibrium)
         if not solution.settled:
             return settled
+        begun.u = step.dofs.put(begun.u, there)
         along = settle_geometry(replace(step, path=solution.slid), Extrapolation(), expected, begun)
         if not Plan.of(step.problem).until_settled:  # their number is given
             del begun.history[: len(old.history)]
@@ -78,7 +79,7 @@ def _path(step: StepContext, settled: SettledContact, nodes: SharedNodes | None)
         return None
     begin = gap, normal, traction, _closing(step, constraints, gap)
     begin = begin if nodes is None else nodes.gathered(constraints, *begin)
-    return Path(*begin, min(math.ceil(slid / limit), MOST))
+    return Path(*begin, min(math.ceil(slid / limit - LENGTH_ROUND_OFF), MOST))
 
 
 def _closing(step: StepContext, constraints: StackedConstraints, gap: Array) -> Array:
@@ -121,7 +122,7 @@ def _gaps(step: StepContext, constraints: StackedConstraints, iterate: Iterate) 
     gaps = []
     for name, part in there.parts.items():
         now = constraints.parts[name]
-        then = part if len(part) == len(now) else now
+        then = part if np.array_equal(part.positions, now.positions) else now
         known = np.isfinite(then.gap0) & then.usable
         gaps.append(np.where(known, then.gap0 + then.B @ state.u, now.gap0 + now.B @ state.u))
     return np.maximum(np.concatenate(gaps), 0.0)

@@ -29,10 +29,10 @@ def spheres(element):
     return model
 
 
-def pressed(element, formulation, steps=1, friction=0.3, **options):
+def pressed(element, formulation, steps=1, friction=0.3, criteria=None, **options):
     model = spheres(element)
     model.add_contact("pair", secondary="CONT1", primary="CONT2", formulation=formulation, friction=friction, **options)
-    return fc.solve(model, fc.linear_ramp(steps), linear_solver="direct")
+    return fc.solve(model, fc.linear_ramp(steps), criteria=criteria, linear_solver="direct")
 
 
 @functools.cache
@@ -64,6 +64,14 @@ def test_node_to_segment_with_friction_is_each_body_on_a_smooth_plane(element, f
         contact = step.contact["pair"]
         assert contact.sticking[contact.active].all()
         assert abs(contact.dissipation) < 1e-9 * np.abs(contact.force[1])  # times a slip of 1
+
+
+def test_increments_along_the_path_keep_mirrored_bodies_mirrored():
+    """What closing a gap adds to the slip where the normal leans belongs to the increment that closes it."""
+    along = fc.Criteria(friction_while_touching=0.01)
+    step = pressed("tri6", "node_to_segment", 2, criteria=along, normals="averaged")[-1]
+    assert apart(step, on_a_plane("tri6", "node_to_segment")) < 1e-8
+    assert step.contact["pair"].sticking[step.contact["pair"].active].all()
 
 
 @pytest.mark.parametrize(("element", "exact"), [("tri3", 1e-2), ("quad4", 1e-3)])

@@ -15,8 +15,11 @@ ONCE = fc.linear_ramp(1)
 SKEW = np.array([[2e-3, 1e-3, -4e-4], [3e-3, -1e-3, 7e-4], [5e-4, -2e-3, 1e-3]])
 
 
-def stretched(mesh, **options):
-    """The outside of both bodies moves as a linear function of position: so must everything."""
+def stretched(mesh, prescribed=(), **options):
+    """The outside of both bodies moves as a linear function of position: so must everything.
+
+    Tractions act at sides whose displacement is not `prescribed`.
+    """
     dim = mesh.dim
     model = elastic_model(mesh, "3d" if dim == 3 else "plane_strain")
     ends = ("L_ZMIN", "U_ZMAX") if dim == 3 else ("LOWER_BOTTOM", "UPPER_TOP")
@@ -24,7 +27,9 @@ def stretched(mesh, **options):
         model.prescribe(group, **{axis: linear(k, dim) for k, axis in enumerate("xyz"[:dim])})
     sides = ("XMIN", "XMAX", "YMIN", "YMAX") if dim == 3 else ("LEFT", "RIGHT")
     for body in ("L", "U") if dim == 3 else ("LOWER", "UPPER"):
-        for side in sides:
+        for side in prescribed:
+            model.prescribe(f"{body}_{side}", **{axis: linear(k, dim) for k, axis in enumerate("xyz"[:dim])})
+        for side in set(sides).difference(prescribed):
             traction = stress(dim) @ outward(side, dim)
             model.add_traction(f"{body}_{side}", **dict(zip("xyz", traction, strict=False)))
     return touching(model, **{"kind": "tied", **options})
@@ -68,6 +73,50 @@ def test_mortar_ties_meshes_that_do_not_match_exactly(element, swap):
     assert contact.shear == pytest.approx(np.tile(along, (len(contact.shear), 1)), rel=1e-9, abs=1e-9)
     area = 10.0 ** (dim - 1)
     assert contact.force == pytest.approx(sigma @ normal * area, rel=1e-10, abs=1e-9)
+
+
+@pytest.mark.parametrize("multipliers", ["standard", "dual"])
+@pytest.mark.parametrize("element", ["quad4", "quad8", "hex8", "tet4"])
+def test_uniform_tractions_pass_beside_edges_that_supports_hold_on_both_sides(element, multipliers):
+    flat = element.startswith("quad")
+    mesh = blocks(element, upper=(4, 3)) if flat else boxes(element, lower=(2, 3, 1), upper=(3, 2, 1))
+    # Of the triangle in a corner all nodes are held: nothing determines what it transmits.
+    prescribed = ("LEFT", "RIGHT") if flat else ("XMIN", "YMAX") if element == "hex8" else ("XMIN",)
+    model = stretched(mesh, prescribed, formulation="mortar", multipliers=multipliers)
+    contact, sigma = fc.solve(model, ONCE)[-1].contact["pair"], stress(mesh.dim)
+    assert contact.pressure == pytest.approx(-sigma[-1, -1], rel=1e-9)
+    along = np.append(-sigma[:-1, -1], 0.0)
+    assert contact.shear == pytest.approx(np.tile(along, (len(contact.shear), 1)), rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("said", ["x", "normal", "axes", "relation"])
+@pytest.mark.parametrize(
+    ("formulation", "options"), [("continuous", {}), ("mortar", {}), ("mortar", {"multipliers": "dual"})]
+)
+@pytest.mark.parametrize("element", ["quad4", "quad8", "hex8"])
+def test_ties_are_determined_where_supports_hold_both_sides(element, formulation, options, said):
+    """Multipliers that alternate from node to node do no work where the first displacement is held: 107 for 1.3."""
+    flat = element.startswith("quad")
+    mesh = blocks(element, upper=(6, 3)) if flat else boxes(element, lower=(4, 2, 2), upper=(2, 2, 2))
+    bottom, top, *left = (
+        ("LOWER_BOTTOM", "UPPER_TOP", "LOWER_LEFT", "UPPER_LEFT") if flat else ("L_ZMIN", "U_ZMAX", "L_XMIN", "U_XMIN")
+    )
+    for kinematics in ["plane_strain", *["axisymmetric"] * (said == "x")] if flat else ["3d"]:
+        for swap in (False, True):
+            model = elastic_model(mesh, kinematics)
+            model.fix(bottom, "xyz"[: mesh.dim])
+            for side in left:
+                if said == "relation":
+                    for point in set(mesh.points_of(side)).difference(mesh.points_of(bottom)):
+                        model.relate([(int(point), "x", 1.0)])
+                elif said == "axes":
+                    model.fix(side, "x", axes=(1.0, 0.0) if flat else [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0)])
+                else:
+                    model.fix(side, said)
+            model.add_traction(top, **{"xyz"[mesh.dim - 1]: -1.0, "x": 0.3})
+            touching(model, formulation, kind="tied", swap=swap, **options)
+            contact = fc.solve(model, ONCE)[-1].contact["pair"]
+            assert np.linalg.norm(contact.shear, axis=1).max() < 2.0
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)

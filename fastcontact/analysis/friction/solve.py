@@ -29,7 +29,7 @@ from fastcontact.linear.protocol import Loaded, LoadedNonsymmetric
 
 log = logging.getLogger("fastcontact")
 # Of increments of a step where constraints are eliminated: the last one is solved again as accurately as the step is.
-ROUGH = Accuracy(0.0, residual=1e-3)
+ROUGH = Accuracy(0.0, residual=1e-4)
 
 
 def solve(

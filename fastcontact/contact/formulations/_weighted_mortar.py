@@ -157,7 +157,7 @@ class WeightedMortar(Formulation):
         if not self.slides:
             return constraints
         candidates = Candidates(points[:, None], np.ones((len(constraints), 1)))
-        held = self.without_slip(at)
+        held = [] if self.options.tied else self.without_slip(at)  # ties have equations of their own there
         projectors = np.zeros((*normal.shape, normal.shape[1]))
         for along, where in held:
             projectors[where] += along[where, :, None] * along[where, None, :]
