@@ -13,7 +13,7 @@ from fastcontact.elasticity.material_sides import MaterialSides
 
 @dataclass(frozen=True, eq=False)
 class MaterialStress:
-    """Stress at the nodes where materials meet, on the side of each.
+    """Stress at the nodes of material interfaces, on the side of each material.
 
     Attributes
     ----------
@@ -21,7 +21,7 @@ class MaterialStress:
         Material of every solid cell, in the order of ``mesh.solids``: its number in the order in which materials were added
         to the model, from 0; equal materials have the first one's.
     points, material : ndarray of int (k,)
-        Where materials meet, a row for each node and each of its materials, ordered by node.
+        At interfaces, a row for each node and each of its materials, ordered by node.
     stress : ndarray (k, 4) or (k, 6)
         Average over the cells of that material at the node, components as of `StepResult.stress` [pressure].
     """
@@ -39,7 +39,7 @@ class MaterialStress:
 def by_largest_von_mises(
     sides: MaterialSides, cells: Numbers, at_places: Array, n_points: int
 ) -> tuple[Array, MaterialStress | None]:
-    """Return the nodal stress (n_points, n_components), and that of each side where materials meet [pressure].
+    """Return the nodal stress (n_points, n_components), and that of each side of material interfaces [pressure].
 
     Parameters
     ----------
@@ -47,10 +47,10 @@ def by_largest_von_mises(
     cells : ndarray of int (n_solids,)
         Material of every solid cell.
     at_places : ndarray (n_places, n_components)
-        Stress at the places of `sides` [pressure].
+        Stress at the slots of `sides` [pressure].
     n_points : int
 
-    Where materials meet, the nodal stress is that of the side with the largest von Mises stress.
+    At interfaces the nodal stress is that of the side with the largest von Mises stress.
     """
     stress = at_places[:n_points].copy() if len(sides.points) else at_places
     if not len(sides.points):

@@ -14,22 +14,22 @@ from fastcontact.errors import FastcontactError, unknown
 from fastcontact.results.material_stress import MaterialStress
 from fastcontact.results.units import with_unit
 
-# Part of the normal forces below which their resultant tells nothing.
+# Fraction of the normal forces below which their resultant is negligible.
 CANCELLED = 1e-3
 
 
 def half_width(place: Array, closed: Mask, across: Array | None = None) -> tuple[float, float]:
     """Return the bracket of the half-width of a contact [length]: (NaN, NaN) where nothing is closed.
 
-    From `place` (n,) from the middle, with a sign where they lie on both sides of it [length], and which are `closed`: half
-    the width up to the outermost closed places, and up to the next ones beyond, measured in `across` (n,), by default the
-    places themselves [length]. Where all places lie on one side, the other half is the mirror image.
+    `place` (n,) are coordinates of nodes relative to the middle, signed if they lie on both sides of it [length]. The
+    bracket is half the width of the outermost `closed` nodes, and that of the next ones beyond, measured in `across`
+    (n,), by default `place` [length]. If all nodes lie on one side, the other half is the mirror image.
     """
     if not closed.any():
         return float("nan"), float("nan")
     across, one_sided = place if across is None else across, bool(place.min() >= 0.0)
     beyond = place == place[place > place[closed].max()].min(initial=np.inf)
-    if not one_sided:  # where the surface ends on one side, it is no wider there
+    if not one_sided:  # the contact cannot extend beyond an end of the surface
         beyond |= place == place[place < place[closed].min()].max(initial=-np.inf)
 
     def half(nodes: Mask) -> float:
@@ -174,7 +174,7 @@ class ContactResult:
                 f"coordinates of a ContactResult must be an array (m, dim), not {type(self.coordinates).__name__}"
             )
         dim = self.coordinates.shape[1]
-        defaults = {  # places are those of a file from before they were measured from the middle
+        defaults = {  # for files of versions that did not measure from the middle
             "middle": lambda: np.zeros(dim),
             "place": lambda: np.abs(self.coordinates[:, 0]) if dim == 2 else np.array(self.abscissa),
             "primary_points": lambda: np.empty(0, np.int32),
@@ -189,7 +189,7 @@ class ContactResult:
 
     @property
     def shown(self) -> dict[str, str]:
-        """What reprs and tables tell, as texts: force, largest pressure, closed nodes, contact radius."""
+        """Contents of reprs and tables as texts: force, largest pressure, closed nodes, contact radius."""
         low, high = self.radius
         inside, outside = (with_unit(f"{end:.4g}", self.units, "length") for end in (low, high))
         radius = f"{low:.4g} to {outside}" if np.isfinite(high) else f"{inside}, to its end"
@@ -214,13 +214,13 @@ class ContactResult:
 
     @property
     def measured_from_axis(self) -> bool:
-        """Whether places are radii, in axisymmetry, rather than lengths along a surface or distances in space."""
-        flat = self.coordinates.shape[1] == 2 and self.tangent is None  # plane problems have one, but for rings
+        """Whether `place` are radii, in axisymmetry, rather than arc lengths or distances in space."""
+        flat = self.coordinates.shape[1] == 2 and self.tangent is None  # plane problems have one, except for rings
         return flat and bool(self.middle[0] == 0.0) and bool(np.array_equal(self.place, np.abs(self.coordinates[:, 0])))
 
     @property
     def per_thickness(self) -> bool:
-        """Whether forces are seen to be those of a plane model: not of a solid, nor of a circle, where radial ones cancel."""
+        """Whether forces are recognisable as those of a plane model: not in space, nor over a circle, where they cancel."""
         if self.coordinates.shape[1] == 3 or self.measured_from_axis:
             return False
         across, size = float(self.force_vectors[:, 0].sum()), float(np.abs(self.force_vectors).sum())
@@ -348,7 +348,7 @@ class StepResult:
 
     @property
     def shown(self) -> dict[str, str]:
-        """What reprs and tables tell, as texts: load factor, largest displacement and stress, iterations."""
+        """Contents of reprs and tables as texts: load factor, largest displacement and stress, iterations."""
         moved, stressed = (float(np.abs(field).max(initial=0.0)) for field in (self.displacement, self.von_mises))
         shown = {
             "load factor": f"{self.load_factor:.6g}",

@@ -1,4 +1,4 @@
-"""Conduction of heat in a model: prescribed temperatures, fluxes, films, sources, and what its checks ask.
+"""Heat conduction in a model: prescribed temperatures, fluxes, films, sources, and checks.
 
 A `Value` is a number, or a function from reference positions (n, dim) [length] to numbers (n,) [unit of the quantity].
 """
@@ -29,7 +29,7 @@ HEAT_FLUX = ("heat_flux_x", "heat_flux_y", "heat_flux_z")
 
 @typed(ModelError)
 class ModelHeat(ModelMaterials):
-    """A model that may conduct heat; steps then tell temperatures and fluxes, and materials with an expansion expand."""
+    """A model with optional heat conduction; steps then contain temperatures and fluxes, and materials expand."""
 
     def fix_temperature(
         self, group: str, value: Value, *, ramp: History = None, begins: float | None = None, ends: float | None = None
@@ -147,12 +147,12 @@ class ModelHeat(ModelMaterials):
 
     @property
     def conducts(self) -> bool:
-        """Whether heat is conducted: by a load of heat, a prescribed temperature, or a contact with a conductance."""
+        """Whether heat is conducted: with a heat load, a prescribed temperature, or a contact conductance."""
         return bool(self.heat_loads) or any("conductance" in pair.options for pair in self.contact)
 
     @property
     def cell_fields(self) -> tuple[str, ...]:
-        """Names of the `StepResult.cell_fields` that steps of this model have: of nonlinear bodies, and of heat."""
+        """Names of the `StepResult.cell_fields` in steps of this model: those of nonlinear bodies, and of heat."""
         return (*super().cell_fields, *(HEAT_FLUX[: self.mesh.dim] if self.conducts else ()))
 
     @property
@@ -165,15 +165,15 @@ class ModelHeat(ModelMaterials):
         return Conduction(self.mesh, self.kinematics, [m for m, _ in self.materials], self.material_of_cells())
 
     def same_temperature(self) -> Indices:
-        """Return for each node (n_points,) the first one of the same temperature: ends of periods, sides of sections."""
+        """Return for each node (n_points,) the first one of equal temperature: at ends of periods and sides of sections."""
         cuts = [(cut.nodes, cut.opposite) for cut in self.pretensions]
         representative = same_place([*self.periodic_interfaces, *cuts], self.mesh.n_points)  # type: ignore[list-item]
         return np.arange(self.mesh.n_points) if representative is None else representative
 
     def fixed_temperatures(self) -> tuple[Mask, dict[Table | None, Array]]:
-        """Return which nodes (n_points,) have a prescribed temperature, and by history their rises at multiplier 1.
+        """Return which nodes (n_points,) have a prescribed temperature, and their rises at multiplier 1 by history.
 
-        Of nodes that have the same temperature the first one of `same_temperature`. ModelError if two differ at a node.
+        Nodes of equal temperature are represented by that of `same_temperature`. ModelError if two values differ at a node.
         """
         fixed, given = np.zeros(self.mesh.n_points, bool), np.zeros(self.mesh.n_points)
         by_ramp: dict[Table | None, Array] = {}
@@ -198,7 +198,7 @@ class ModelHeat(ModelMaterials):
         return fixed, by_ramp
 
     def check_heat(self) -> None:
-        """Raise ModelError if the conduction of heat is not determined, or what it needs is not there."""
+        """Raise ModelError if heat conduction is undetermined, or data are missing."""
         for pair in self.contact:
             if "friction_heat" in pair.options and not self.conducts:
                 raise ModelError(
@@ -241,11 +241,11 @@ class ModelHeat(ModelMaterials):
             )
 
     def conductances(self) -> dict[str, Conductance]:
-        """Return the laws of conductance by contact pair."""
+        """Return the conductances by contact pair."""
         given = {pair.name: pair.options.get("conductance") for pair in self.contact}
         return {name: Conductance(name, value) for name, value in given.items() if value is not None}
 
 
 def _span(begins: float | None, ends: float | None) -> tuple[float, float]:
-    """Return the instants between which a load acts, always where they are not given."""
+    """Return the instants between which a load acts, always if they are not given."""
     return -np.inf if begins is None else float(begins), np.inf if ends is None else float(ends)

@@ -221,9 +221,10 @@ class ModelInitialStates(ModelLoads):
         )
 
     def temperature_rise(self, factors: Sequence[float]) -> Array | None:
-        """Return the rise of the temperature (n_points,) [temperature], None without temperatures.
+        """Return the temperature rise (n_points,) [temperature], None without temperatures.
 
-        `factors` has a multiplier for each that was added, as ``step.iterations["temperature_factors"]`` of a step result.
+        `factors` are the multipliers of all added temperatures, as ``step.iterations["temperature_factors"]`` of a step
+        result.
         """
         if not self.temperatures or not len(factors):
             return None
@@ -233,7 +234,7 @@ class ModelInitialStates(ModelLoads):
         return np.asarray(np.sum(rises, axis=0))
 
     def expanding_rise(self, temperature_factors: Sequence[float], temperature: Array | None) -> Array | None:
-        """Return the rise of the temperature (n_points,) by which cells expand [temperature]; None where none does.
+        """Return the temperature rise (n_points,) for thermal expansion [temperature]; None without any.
 
         `temperature_factors` and `temperature` (n_points,) [temperature] are those of `stress_offset`.
         """
@@ -245,10 +246,10 @@ class ModelInitialStates(ModelLoads):
         self, temperature_factors: Sequence[float] = (), initial_factors: Sequence[float] = (),
         field: MaterialField | None = None, temperature: Array | None = None,
     ) -> StressOffset | None:  # fmt: skip
-        """Return what stresses have beside those of the displacements, by temperatures and initial states; None without any.
+        """Return the stress due to temperatures and initial states, in addition to that of displacements; None without any.
 
-        The factors are those of a step result, `StepResult.iterations`; `field` is the `material_field`, where it is known;
-        `temperature` (n_points,) [temperature] that of the step result, where heat is conducted.
+        The factors are those of a step result, `StepResult.iterations`; `field` is the `material_field`, if known;
+        `temperature` (n_points,) [temperature] is that of the step result, if heat is conducted.
         """
         rise, states = self.expanding_rise(temperature_factors, temperature), []
         if len(initial_factors):
@@ -258,9 +259,9 @@ class ModelInitialStates(ModelLoads):
         return (field or self.material_field()).offset(rise, states, self.mesh.n_points)
 
     def thermal_forces_by_ramp(self) -> dict[Table | None, Array]:
-        """Return by history the nodal forces (n_points, dim) at multiplier 1 by which temperatures load the cells [force].
+        """Return the nodal forces (n_points, dim) of thermal expansion at multiplier 1 by history [force].
 
-        ModelError if a material that is heated has no expansion.
+        Raises ModelError if a heated material has no expansion.
         """
         by_ramp: dict[Table | None, Array] = {}
         if not self.temperatures:
@@ -279,14 +280,14 @@ class ModelInitialStates(ModelLoads):
         return by_ramp
 
     def expansion_forces(self, field: MaterialField, rise: Array) -> Array:
-        """Return the nodal forces (n_points, dim) [force] by which a rise of the temperature expands the cells.
+        """Return the nodal forces (n_points, dim) [force] of the thermal expansion by a temperature rise.
 
-        `rise` (n_points,) [temperature] is over the reference.
+        `rise` (n_points,) [temperature] is the rise over the reference.
         """
         return self._forces_of(field, field.offset(rise))
 
     def initial_forces_by_ramp(self) -> dict[Table | None, Array]:
-        """Return by history the nodal forces (n_points, dim) of initial stresses and strains at multiplier 1 [force]."""
+        """Return the nodal forces (n_points, dim) of initial stresses and strains at multiplier 1, by history [force]."""
         by_ramp: dict[Table | None, Array] = {}
         field = self.material_field() if self.initial_states else None
         for state in self.initial_states:
@@ -296,7 +297,7 @@ class ModelInitialStates(ModelLoads):
         return by_ramp
 
     def _forces_of(self, field: MaterialField, offset: StressOffset | None) -> Array:
-        """Return the nodal forces (n_points, dim) [force] of what stresses have beside those of the displacements."""
+        """Return the nodal forces (n_points, dim) [force] of a stress offset."""
         held = stress_at_points(
             self.mesh,
             self.kinematics,

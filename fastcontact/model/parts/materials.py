@@ -45,7 +45,7 @@ class ModelMaterials(ModelBase):
 
     @property
     def cell_fields(self) -> tuple[str, ...]:
-        """Names of the `StepResult.cell_fields` that steps of this model have: none for linear elasticity."""
+        """Names of the `StepResult.cell_fields` in steps of this model: none for linear elasticity."""
         return field_names([material for material, _ in self.materials], self.strain)
 
     @property
@@ -54,20 +54,20 @@ class ModelMaterials(ModelBase):
         return self.strain != "small" or any(isinstance(law, NonlinearElastic) for law, _ in self.materials)
 
     def nonlinear_bodies(self, field: MaterialField) -> NonlinearBodies | None:
-        """Return the solid cells as nonlinear bodies; None where they are linear."""
+        """Return the solid cells as nonlinear bodies; None if they are linear."""
         return nonlinear_bodies(self.mesh, self.kinematics, self.strain, field)
 
     def refuse_nonlinear(self, feature: str) -> None:
-        """Raise ModelError if bodies are nonlinear, for `feature` is there for linear elasticity alone."""
+        """Raise ModelError if bodies are nonlinear, because `feature` only supports linear elasticity."""
         nonlinear = [type(law).__name__ for law, _ in self.materials if isinstance(law, NonlinearElastic)]
         if self.nonlinear:
             named = nonlinear[0] if nonlinear else f"strain='{self.strain}'"
             raise ModelError(f"{feature} there for linear elasticity alone, not with {named}")
 
     def material_numbers(self) -> tuple[Array, dict[str, Numbers]]:
-        """Return moduli (n_moduli, 4, 4), in 3D (n_moduli, 6, 6) [pressure], and by element every solid cell's number there.
+        """Return moduli (n_moduli, 4, 4), in 3D (n_moduli, 6, 6) [pressure], and the row of every solid cell by element.
 
-        The first are those of the materials; materials that vary have further ones, for the middle of each cell.
+        The first rows are those of the materials; varying materials have additional ones, for the middle of each cell.
         """
         field = self.material_field()
         return field.moduli, field.rows
@@ -79,7 +79,7 @@ class ModelMaterials(ModelBase):
         )
 
     def material_of_cells(self) -> dict[str, Numbers]:
-        """Return by element every solid cell's material (n_cells,)."""
+        """Return the material of every solid cell (n_cells,), by element."""
         if not self.materials:
             raise ModelError("no material: call add_material(LinearElastic(E=..., nu=...)) for the solid cells")
         numbers = {name: np.full(len(block), -1, np.int32) for name, block in self.mesh.solids.items()}
@@ -96,11 +96,11 @@ class ModelMaterials(ModelBase):
         return numbers
 
     def averaged_materials(self) -> Mask:
-        """Return which moduli (n_moduli,) have a mean dilatation; none in plane stress, where none locks."""
+        """Return which moduli (n_moduli,) have a mean dilatation; none in plane stress, where elements do not lock."""
         return self.material_field().averaged
 
     def _check_material(self, index: int, group: str | None, given: Numbers) -> None:
-        """Refuse a material for cells that have another one already, which was not given to all cells."""
+        """Refuse a material for cells that already have another one, unless that was assigned to all cells."""
         new = self.materials[index][0]
         for number in np.unique(given[given >= 0]):
             old, groups = self.materials[number]
