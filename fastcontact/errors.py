@@ -118,10 +118,12 @@ def names_of(module: str, known: list[str]) -> tuple[Callable[[str], object], Ca
     return missing, lambda: known
 
 
-def check_known(kind: str, name: object, known: Collection[str], error: type[FastcontactError]) -> None:
-    """Raise `error` for a name that is not among the `known` ones, with the nearest of them."""
-    if name not in known:
-        raise error(unknown(kind, str(name), known))
+def check_known(
+    kind: str, name: object, known: Collection[str], error: type[FastcontactError], about: str = ""
+) -> None:
+    """Raise `error` for a name that is not among the `known` ones, with the nearest of them, and `about` before its text."""
+    if not isinstance(name, str) or name not in known:
+        raise error(about + unknown(kind, str(name), known))
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> str:

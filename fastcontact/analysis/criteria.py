@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from fastcontact._tools.argument_types import typed
 from fastcontact.errors import ModelError
 
-# Criteria beyond this are none: a state that misses them has nothing to do with the solution.
+# Upper bound of the criteria: beyond it a state need not resemble the solution.
 LOOSEST = 1e-2
-# Part of the largest displacement that is worth a warning.
+# Fraction of the largest displacement above which a warning is given.
 NOTABLE = 1e-2
 
 

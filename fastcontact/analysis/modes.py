@@ -1,4 +1,4 @@
-"""Modes: frequencies and shapes of small vibrations about a settled load step."""
+"""Modes: frequencies and shapes of small vibrations about a converged load step."""
 
 from __future__ import annotations
 
@@ -33,7 +33,8 @@ from fastcontact.linear.sparse_rows import sum_of_blocks
 from fastcontact.model.model import Model
 from fastcontact.results.step import StepResult
 
-# The shift that makes free bodies regular, by the eigenvalue of a uniform deformation: below those of all but thin bodies.
+# Shift that regularises free bodies, over the eigenvalue of a uniform deformation: below the eigenvalues of all but thin
+# bodies.
 SHIFT = 1e-4
 
 
@@ -120,7 +121,7 @@ def modes(
 def _asked(
     model: Model, sectors: Sectors | None, nodal_diameters: int | str | Sequence[int] | None
 ) -> list[int] | None:
-    """Return the nodal diameters asked for; ModelError where there can be none."""
+    """Return the requested nodal diameters; ModelError for a model without any."""
     if nodal_diameters is None:
         if sectors is not None:
             warn(
@@ -154,7 +155,7 @@ class _Vibration:
     def of(
         cls, model: Model, sectors: Sectors | None, stressed: StepResult | None, step: StepResult | None, hold_sliding: bool
     ) -> _Vibration:  # fmt: skip
-        """Return those about a step, without the ends of sectors, whose stresses stiffen as `stressed` has them."""
+        """Return the vibration about a step, without the ends of sectors; the stresses of `stressed` add stiffness."""
         density = Densities([material for material, _ in model.materials], model.material_of_cells())
         field = model.material_field()
         K = _stiffness(model, stressed, field)
@@ -219,7 +220,7 @@ def _stiffness(model: Model, step: StepResult | None, field: MaterialField) -> b
 
 
 def _uniform(model: Model, K: bsr_array, M: bsr_array) -> float:
-    """Return the least quotient of energies [1 / time^2] of uniform deformations, which grow with one coordinate each."""
+    """Return the least Rayleigh quotient [1 / time^2] of uniform deformations, each linear in one coordinate."""
     points, densities = model.mesh.points - model.mesh.points.mean(axis=0), []
     for component in range(model.mesh.dim):
         for axis in range(model.mesh.dim):
@@ -276,7 +277,7 @@ def _momentum(vibration: _Vibration) -> Array:
     dim = vibration.model.mesh.dim
     along = np.tile(np.eye(dim), (vibration.M.shape[0] // dim, 1))
     if vibration.model.kinematics == "axisymmetric":
-        along[:, 0] = 0.0  # around the circle it has every direction
+        along[:, 0] = 0.0  # cancels over the full circle
     return np.asarray(vibration.M @ along)
 
 

@@ -1,9 +1,9 @@
 """Attainable accuracy of the geometry loop: it ends where further changes are round-off.
 
-How much round-off there is depends on the condition of the stiffness and of the constraints, which nothing tells beforehand;
-the last displacements show it. An iteration that still converges, however slowly, goes on in one direction: over a window
-its displacements lie as far apart as all changes together. Round-off oscillates: they lie hardly farther apart than one
-change. So does what iterative linear solutions leave, of which is known how large it may be.
+The level of round-off depends on the condition of the stiffness and of the constraints, which is unknown beforehand; the last
+displacements reveal it. An iteration that still converges, however slowly, proceeds in one direction: over a window the
+distance of its displacements is the sum of all changes. Round-off oscillates: the distance is hardly larger than one change.
+The same holds for residuals of iterative linear solutions, whose size is known.
 """
 
 from __future__ import annotations
@@ -15,26 +15,26 @@ import numpy as np
 from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.arrays import Array
 
-# Updates to look at, and how far apart their displacements may lie in units of the typical change: WINDOW in one direction.
+# Number of updates in the window, and largest distance of their displacements over the typical change (WINDOW if collinear).
 WINDOW, APART = 8, 4.0
-# Where changes may be what linear solutions leave, fewer will do, closer together: 3 in one direction.
+# The same where changes may be residuals of linear solutions: fewer and closer (3 if collinear).
 SHORT_WINDOW, CLOSE = 4, 2.0
-# What may scatter at most: displacements relative to the largest one, nodal contact forces relative to the largest one.
+# Largest accepted scatter: displacements over the largest one, nodal contact forces over the largest one.
 DISPLACEMENT, FORCE = 1e-6, 1e-5
-# Changes that become smaller than this part of those at the beginning of the window still converge.
+# Changes below this fraction of those at the beginning of the window still converge.
 DECLINE = 0.5
 
 
 @dataclass(frozen=True)
 class Scatter:
-    """How far the last geometries of a load step lie apart.
+    """Scatter of the last geometries of a load step.
 
     Attributes
     ----------
     displacement : float
-        In units of the largest displacement [-].
+        Scatter of displacements over the largest one [-].
     force : float
-        Nodal contact forces, in units of the largest one [-].
+        Scatter of nodal contact forces over the largest one [-].
     """
 
     displacement: float
@@ -42,7 +42,7 @@ class Scatter:
 
 
 class Watch:
-    """Keeps the last displacements and contact forces, and says when they only scatter."""
+    """Monitor of the last displacements and contact forces that detects when they only scatter."""
 
     def __init__(self) -> None:
         self._parts: list[Array] = []
@@ -50,22 +50,22 @@ class Watch:
         self._changes: list[float] = []
 
     def seen(self, unknowns: Array, force: Array, change: float, size: float, noise: float = 0.0) -> Scatter | None:
-        """Take the displacements `unknowns` (k,) [length] and contact forces (n,) [force] of an update; return their scatter.
+        """Add the displacements `unknowns` (k,) [length] and contact forces (n,) [force] of an update; return their scatter.
 
         Parameters
         ----------
         part, force : ndarray
         change : float
-            By how much the displacements differ from those before [length].
+            Change of the displacements from the previous ones [length].
         size : float
-            Of the displacements [length].
+            Size of the displacements [length].
         noise : float
-            Changes up to this may be what an iterative linear solver leaves [length].
+            Changes up to this may be residuals of an iterative linear solver [length].
 
         Returns
         -------
         Scatter or None
-            None as long as the updates may still converge, or scatter by more than what is of no consequence.
+            None while the updates may still converge, or scatter by more than is acceptable.
         """
         if not change <= DISPLACEMENT * size:
             self.forget()
@@ -88,7 +88,7 @@ class Watch:
         return scatter if scatter.displacement <= DISPLACEMENT and scatter.force <= FORCE else None
 
     def forget(self) -> None:
-        """Begin anew."""
+        """Discard the window."""
         self._parts.clear()
         self._forces.clear()
         self._changes.clear()

@@ -1,9 +1,9 @@
 """Sensitivities: derivatives of one quantity with respect to many parameters from one adjoint solution.
 
-Where a load step has settled, ``K u = f + B.T multiplier`` and ``gap0 + B u + C multiplier = 0`` of the active constraints
-are smooth equations as long as the active set stands. The adjoint solution for a quantity, with the transposed matrix of
-these equations, gives its derivative by every parameter as a scalar product with what the parameter changes in them (Haftka
-and Gürdal, Elements of Structural Optimization, 1992, chapter 7).
+At the end of a load step, ``K u = f + B.T multiplier`` and ``gap0 + B u + C multiplier = 0`` of the active constraints are
+smooth equations as long as the active set does not change. The adjoint solution for a quantity, with the transposed matrix of
+these equations, gives its derivative with respect to every parameter as a scalar product with the derivative of the residual
+(Haftka and Gürdal, Elements of Structural Optimization, 1992, chapter 7).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from fastcontact.model.ramp import RampLike, ramp_of
 from fastcontact.results.step import StepResult
 from fastcontact.round_off import TINY
 
-# What points between two facets may make of a derivative, relative to it.
+# Largest effect of points between two facets on a derivative, relative to it.
 BETWEEN = 1e-6
 
 
@@ -158,7 +158,7 @@ def check_asked(model: Model, quantity: Sequence[str | int], parameters: Sequenc
 
 
 def _derivatives(contact: MovingContact, gradient: Gradient, changes: Sequence[Change]) -> tuple[Array, int]:
-    """Return the derivatives of a quantity by parameters, and the linear solutions that they took."""
+    """Return the derivatives of a quantity with respect to parameters, and the number of linear solutions."""
     forward, backward = contact.derivatives()
     adjoint = Adjoint(contact, gradient, csr_array(0.5 * (forward + backward)))
     values = np.array([adjoint.derivative(change) for change in changes])

@@ -33,7 +33,7 @@ def recover(
     ----------
     problem : Problem
     end : State
-        At the end of the step.
+        State at the end of the step.
     contact : dict of str to ContactResult
     reaction : ndarray (n_dofs of the mesh,)
         [force]
@@ -42,7 +42,7 @@ def recover(
     instant : (int, float)
         Number of the step, and its pseudo-time.
     bodies : DeformedBodies, optional
-        Where they are nonlinear.
+        The bodies, if they are nonlinear.
     """
     mesh, u = problem.model.mesh, problem.displacement(end.u)
     temperature, initial = (
@@ -87,7 +87,7 @@ def contact_results(
     load : StepLoad
     settled : SettledContact
     end : State
-        At the end of the step; of it the displacements and the places of first contact are needed.
+        State at the end of the step, of which displacements and points of first contact are used.
     """
     displacement = problem.displacement(end.u)
     paired_at = np.zeros_like(displacement) if problem.criteria.keep_pairing else displacement

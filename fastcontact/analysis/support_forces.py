@@ -58,7 +58,7 @@ def support_forces(model: Model, step: StepResult) -> dict[str, Array]:
     coupling = [relation for relation in model.relations if not any(relation is other for other in related)]
     reaction = step.reaction.ravel() - ground_force(model.springs, step.displacement.ravel())
     rows = [relation.rows for relation in (*related, *coupling)]
-    rows += [section.row(n) for section in model.pretensions]  # which may be locked
+    rows += [section.row(n) for section in model.pretensions]  # possibly locked
     forces = multipliers(reaction, rows, held.ravel())
     reaction = reaction - sum((R.T @ force for R, force in zip(rows, forces, strict=True)), np.zeros(n))
     by_support: dict[str, Array] = {}
@@ -74,9 +74,10 @@ def support_forces(model: Model, step: StepResult) -> dict[str, Array]:
 
 
 def multipliers(reaction: Array, rows: Sequence[csr_array], held: Mask) -> list[Array]:
-    """Return the forces (m,) of relations with rows (m, n_dofs), found where no support acts [force].
+    """Return the forces (m,) of constraints with rows (m, n_dofs), from components without supports [force].
 
-    `reaction` (n_dofs,) are those of supports and relations [force]; `held` (n_dofs,) is where supports act.
+    `reaction` (n_dofs,) are the forces of supports and constraints [force]; `held` (n_dofs,) are the components with
+    supports.
     """
     if not rows:
         return []

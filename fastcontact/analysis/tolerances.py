@@ -6,18 +6,18 @@ from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.solution import Accuracy
 from fastcontact.linear.protocol import LinearSolver
 
-# Relative residual of the first solution of a step by an iterative solver, and of later ones in units of the relative
-# change of the displacement and of the last residual: more accuracy than the pairing itself has is lost.
+# Relative residual of the first solution of a step by an iterative solver, and of later ones relative to the last change of
+# the displacement and to the last residual: more accuracy than that of the pairing is useless.
 FIRST_RESIDUAL, RESIDUAL = 1e-2, 0.03
-# With friction the residual falls at least to this part of the last one, unless that of the friction law did not fall to
-# CONTRACTS of its last one so many times: loose solutions may be what keeps it.
+# With friction the residual decreases at least to this fraction of the last one, unless the residual of the friction law
+# failed this many times to decrease to the fraction CONTRACTS: loose solutions may then be the reason.
 LEAST_FALL, CONTRACTS, STILL = 0.2, 0.7, 2
-# Newton iterations with friction as long as the residual is larger than the last one: errors reverse slips.
+# Number of Newton iterations with friction while the residual is larger than the last one: errors reverse slips.
 INEXACT_NEWTON_STEPS = 3
-# Pairings after which errors of whole solutions are taken for what they are.
+# Number of pairings after which errors of full solutions are assumed.
 PATIENT_UPDATES = 25
-# Changes of the displacement, in units of an iterative solver's tolerance, that its solutions alone may make beside what is
-# much stiffer.
+# Changes of the displacement, over an iterative solver's tolerance, that its errors alone may cause beside much stiffer
+# parts.
 LEFT = 1e3
 
 
@@ -31,9 +31,9 @@ class Tolerances:
     begin_inexact : bool
         Whether the first solutions may have a larger residual than the last one.
     round_off : float
-        Gaps are no more accurate than this [length].
+        Accuracy of gaps [length].
     expected : float
-        Displacement to expect in the first step, if forces alone act [length].
+        Expected displacement in the first step, if only forces act [length].
     """
 
     def __init__(
@@ -45,14 +45,14 @@ class Tolerances:
 
     @property
     def inexact(self) -> bool:
-        """Whether a solution to the present residual is not the last one of a step."""
+        """Whether a solution to the current residual cannot be the last one of a step."""
         return self._solver.iterative and self._residual > self._solver.tolerance
 
     def tighten(self, relative_change: float, law_residual: float = 0.0) -> None:
         """Lower the residual to the forcing term of the last relative change of the displacement.
 
-        Where the friction law is off by more (`law_residual`, over the largest force) and Newton's method goes down, to what
-        that is worth: its next step is no more accurate.
+        Where the residual of the friction law (`law_residual`, over the largest force) is larger and Newton's method
+        converges, the forcing term follows from it: the next Newton step is no more accurate.
         """
         worth = RESIDUAL * min(self._residual, relative_change)
         self._still = 0 if law_residual < CONTRACTS * self._law_residual else self._still + 1
@@ -81,12 +81,12 @@ class Tolerances:
         )
 
     def noise(self, size: float) -> float:
-        """Return which changes of the displacement, whose size is given, linear solutions alone may make [length]."""
+        """Return the change of a displacement of given size that errors of linear solutions may cause [length]."""
         return LEFT * self._solver.tolerance * size if self._solver.iterative else 0.0
 
     def enough(self, update: int, size: float) -> float:
-        """Return the change of the displacement, whose size is given, below which the geometry has settled [length]."""
-        # Iterative solvers leave a noise of their tolerance, times the contrast of cells; asking for less would never end.
+        """Return the change of a displacement of given size below which the geometry has converged [length]."""
+        # Iterative solvers leave noise of their tolerance times the contrast of cells; a smaller tolerance is not attainable.
         least = self._solver.tolerance * (self._solver.contrast if self._solver.iterative else 1.0)
         accuracy = max(self._criteria.geometry, least)
         if update >= PATIENT_UPDATES:

@@ -16,7 +16,7 @@ from fastcontact.cases.input_files import files_named
 from fastcontact.cases.keys import NUMBER, RAMP, SENSITIVITY, TOP, at, called, check_keys, check_settings, tables
 from fastcontact.cases.model_tables import LISTS, build_model, points
 from fastcontact.cases.shipped import case_path, shipped_cases
-from fastcontact.errors import CaseError, in_file, unknown
+from fastcontact.errors import CaseError, check_known, in_file, unknown
 from fastcontact.linear.choice import check_tolerance
 from fastcontact.linear.protocol import TOLERANCE
 from fastcontact.mesh import generate
@@ -280,8 +280,7 @@ def _mesh(folder: Path, data: dict[str, Any]) -> Mesh:
     if "generator" not in data:
         raise CaseError("'mesh' needs either the key 'file' or the key 'generator'")
     name = data["generator"]
-    if not isinstance(name, str) or name not in generate.GENERATORS:
-        raise CaseError(unknown("mesh.generator", str(name), generate.GENERATORS))
+    check_known("mesh.generator", name, generate.GENERATORS, CaseError)
     arguments = {key: tuple(v) if isinstance(v, list) else v for key, v in data.items() if key != "generator"}
     return called("mesh", generate.GENERATORS[name], arguments)
 
@@ -349,8 +348,7 @@ def _theory(where: str, data: dict[str, Any]) -> Any:
     if not isinstance(data, dict) or "kind" not in data:
         raise CaseError(f"'{where}' needs the key 'kind', one of {', '.join(analytic.THEORIES)}")
     kind, arguments = data["kind"], {key: value for key, value in data.items() if key != "kind"}
-    if not isinstance(kind, str) or kind not in analytic.THEORIES:
-        raise CaseError(unknown(f"{where}.kind", str(kind), analytic.THEORIES))
+    check_known(f"{where}.kind", kind, analytic.THEORIES, CaseError)
     return called(where, analytic.THEORIES[kind], arguments)
 
 

@@ -21,7 +21,7 @@ from fastcontact.elasticity.material_axes import CylindricalAxes
 from fastcontact.elasticity.materials import CONSTANTS, LinearElastic, Material, check_conductivity, check_expansion
 from fastcontact.elasticity.nonlinear_materials import ElasticPlastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
 from fastcontact.elasticity.varying_constants import Tabulated
-from fastcontact.errors import CaseError, unknown
+from fastcontact.errors import CaseError, check_known, unknown
 from fastcontact.mesh.companion_groups import OPPOSITE
 from fastcontact.mesh.files.mesh_fields import read_field
 from fastcontact.mesh.files.mesh_files import read_mesh
@@ -72,8 +72,7 @@ def _add_coupling(model: Model, place: Any = None, **given: Any) -> None:
 def _material_law(entry: dict[str, Any]) -> type[Material]:
     """Return the `law` of a material; without one isotropic, orthotropic where E, nu or G are lists, anisotropic with D."""
     law = entry.get("law", "elastic_plastic" if "yield_stress" in entry else "linear_elastic")
-    if law not in NONLINEAR and law != "linear_elastic":
-        raise CaseError(unknown("law", law, ["linear_elastic", *NONLINEAR]))
+    check_known("law", law, ["linear_elastic", *NONLINEAR], CaseError)
     if law in NONLINEAR:
         return NONLINEAR[law]
     if "D" in entry:

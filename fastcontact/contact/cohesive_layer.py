@@ -1,7 +1,8 @@
 """A cohesive layer between the sides of a contact pair: equations whose compliance follows its law.
 
-In each pairing the traction is a line: through zero where the layer has not been stretched as far before, and level where it
-falls. Matrices so stay positive definite, and pairings approach every state that is stable under prescribed displacements.
+In each pairing the traction is linearised: by the secant where the layer unloads or reloads, and by a nearly constant
+traction where it softens. Matrices then stay positive definite, and the pairings converge to every state that is stable under
+prescribed displacements.
 """
 
 from __future__ import annotations

@@ -29,9 +29,9 @@ from fastcontact.contact.surface import Surface
 from fastcontact.mesh import elements
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# How far beyond both facets at a node a point may lie and still face it, in facet lengths.
+# Largest distance beyond both facets at a node at which a point still faces it, in facet lengths.
 FOLDED = 0.5
-# Part of either facet at an edge over which rounded edges turn.
+# Fraction of either facet at an edge over which the normals of rounded edges vary.
 ROUNDED = 0.1
 
 
@@ -106,10 +106,10 @@ class Pairing:
     paired : ndarray of bool (n,)
         False where a candidate stands out beyond the end of the primary surface.
     offset : ndarray (n,), optional
-        What the gap is besides ``normal . x`` where the primary side is a rigid obstacle [length]; None for facets.
+        Gap minus ``normal . x`` where the primary side is a rigid obstacle [length]; None for facets.
     beyond : ndarray (n, dim - 1), optional
-        How far beyond the end of the primary surface candidates stand, in reference coordinates of the facet, which goes
-        on straight there; None where none does.
+        Distance of candidates beyond the end of the primary surface, in reference coordinates of the facet, which is extended
+        straight there; None if all are within.
     """
 
     facet: Indices
@@ -120,7 +120,7 @@ class Pairing:
     beyond: Array | None = None
 
     def places(self, primary: Surface, rows: Indices) -> Places:
-        """Return the points of `primary` that candidates `rows` (n,) face, facets going on straight beyond their ends."""
+        """Return the points of `primary` that candidates `rows` (n,) face, on facets extended straight beyond their ends."""
         points = places(primary, self.facet[rows], self.xi[rows])
         if self.beyond is None:
             return points
@@ -139,11 +139,11 @@ def pair(
     """Project candidate positions (n, dim) on the closest facet of `primary` at nodal `coordinates` [length].
 
     A candidate farther out than `projection_tolerance` facet lengths beyond the end of its facet is not paired
-    (TOLE_PROJ_EXT of code_aster). One that is paired there faces the facet gone on straight, so that the forces on both
-    sides have one line of action; they balance in moment. Unless `normals` is ``"facet"``, the normal is interpolated
-    between nodal means of the facets' normals, so that it does not jump where facets meet but for corners, and the
-    candidates are projected along it; a unit vector (dim,) is the normal everywhere. A rigid obstacle stands
-    as `obstacle` says. Edges between facets are `rounded` or not.
+    (TOLE_PROJ_EXT of code_aster). A candidate paired there faces the straight extension of the facet, so that the forces
+    on both sides have one line of action and balance in moment. Unless `normals` is ``"facet"``, the normal is
+    interpolated between nodal means of the facets' normals, so that it is continuous across facets except at corners,
+    and the candidates are projected along it; a unit vector (dim,) is the normal everywhere. A rigid obstacle has the
+    pose `obstacle`. With `rounded`, facet normals vary continuously across edges.
 
     Raises
     ------
@@ -180,11 +180,11 @@ def pair(
 
 
 def _round_edges(primary: Surface, coordinates: Array, facet: Indices, xi: Array, mean: Array) -> Array:
-    """Return the normals (n, dim) of facets that turn to the `mean` (n, dim) at their edges over `ROUNDED` of each.
+    """Return facet normals (n, dim) that pass to the `mean` (n, dim) at their edges, over `ROUNDED` of each facet.
 
-    Where facets meet in an edge, contact forces of a node may have any direction between their normals, and the edge is where
-    equilibrium puts the node: with the normal of one or the other it flips between them. Here the direction follows from
-    where it stands on the rounded edge.
+    Where facets meet in an edge, the contact force of a node may have any direction between their normals, and
+    equilibrium may place the node at the edge: with the normal of either facet the pairing alternates between them. Here
+    the direction follows from the position on the rounded edge.
     """
     normals = at_nodes_of_facets([facet_normals(block, coordinates) for block in primary.blocks])[facet]
     normals = interpolated(normals, places(primary, facet, xi))
@@ -250,10 +250,10 @@ def gap_rows(
 def tangents(normal: Array, held: Array | None = None) -> list[Array]:
     """Return unit tangents (n, dim) that complete `normal` (n, dim): one in 2D, two in 3D.
 
-    In 3D one pair of axes at right angles to the mean normal is turned to every point by the smallest rotation. Tangents
-    then change no faster than normals, so that components of tractions along them can be taken for fields, and the choice
-    of the first axis makes no difference. Where motions are held, by projectors `held` (n, 3, 3), they are turned so that one
-    of them is held as far as any tangent is.
+    In 3D one pair of axes perpendicular to the mean normal is rotated to every point by the smallest rotation. Tangents then
+    vary no faster than normals, so that components of tractions along them can be interpolated as fields, and the choice
+    of the first axis does not matter. Where displacements are held, by projectors `held` (n, 3, 3), the tangents are
+    rotated so that one of them is held as far as any tangent is.
     """
     if normal.shape[1] == 2:
         return [np.column_stack([normal[:, 1], -normal[:, 0]])]
@@ -262,7 +262,7 @@ def tangents(normal: Array, held: Array | None = None) -> list[Array]:
     mean = mean / length if length > LENGTH_ROUND_OFF * len(normal) else np.array([0.0, 0.0, 1.0])
     axis = np.cross(np.eye(3)[np.argmin(np.abs(mean))], mean)
     axis /= np.linalg.norm(axis)
-    # What a rotation of the mean normal to the normal does to the axis; where they are opposite, a half turn about it.
+    # Rotation of the axis by the rotation of the mean normal to the normal; a half turn about it where they are opposite.
     both = 1.0 + normal @ mean
     slope = np.divide(normal @ axis, both, out=np.zeros(len(normal)), where=both > LENGTH_ROUND_OFF)
     first = axis - slope[:, None] * (mean + normal)

@@ -1,8 +1,8 @@
 """Projection along averaged normals: continuous across facets, unlike closest-point projection.
 
-On a surface of facets the closest point jumps where an edge folds inward, by a distance in proportion to the gap; a
-pairing that is renewed in a loop may then flip for ever. Along normals interpolated between nodal means the projection
-moves on smoothly (Puso and Laursen, 2004, section 3; Popp, Gitterle, Gee and Wall, 2010, section 4.2).
+On a faceted surface the closest point jumps at concave edges, by a distance proportional to the gap; iterated pairings may
+then not converge. Along normals interpolated between nodal means the projection varies continuously (Puso and Laursen, 2004,
+section 3; Popp, Gitterle, Gee and Wall, 2010, section 4.2).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import area_vectors
 
-# What the projection of a point takes, in nodes of a cell: see `portions`.
+# Cost of the projection of a point relative to a node of a cell, see `portions`.
 EFFORT = 16
 # Facets that meet at a smaller angle than this approximate a smooth surface; others form a corner [degrees].
 CORNER = 45.0
@@ -36,7 +36,7 @@ class Places:
     nodes, local : ndarray of int (n, k)
         Point numbers, and positions in the points of the surface; of facets with fewer nodes some are repeated.
     shape : ndarray (n, k)
-        Shape functions; zero for what is repeated.
+        Shape functions; zero for repeated nodes.
     gradient : ndarray (n, k, dim - 1)
         Their derivatives.
     """
@@ -78,7 +78,7 @@ def _of_block(block: FacetBlock, rows: Indices, xi: Array) -> Places:
 def nodal_normals(side: Surface, coordinates: Array) -> Array:
     """Return the mean of the facets' unit normals at each node (m, dim), weighted by their angles there, normalised.
 
-    The angles make it depend on the surface alone, not on how it is cut into facets (Thuermer and Wuethrich, 1998).
+    With these weights it depends on the surface alone, not on its division into facets (Thuermer and Wuethrich, 1998).
     """
     normals = [facet_normals(block, coordinates) for block in side.blocks]
     return _nodal_means(
@@ -97,16 +97,16 @@ def _nodal_means(side: Surface, values: Sequence[Array], angles: Sequence[Array]
 
 
 def smooth_normals(side: Surface, coordinates: Array) -> list[Array]:
-    """Return by block the unit normals (n_facets, n_nodes, dim) that facets have at their nodes as parts of a smooth surface.
+    """Return, for each block, unit normals (n_facets, n_nodes, dim) at the nodes of facets as parts of a smooth surface.
 
-    The nodal means of `nodal_normals`; at corners the mean of those facets alone that meet the facet smoothly, so that a
-    punch is flat up to its corner, also where its flanks belong to the surface.
+    These are the nodal means of `nodal_normals`; at corners only the facets that meet the facet smoothly enter the mean, so
+    that a punch is flat up to its corner, also where its flanks belong to the surface.
     """
     facet_normals_of_blocks = [facet_normals(block, coordinates) for block in side.blocks]
     angles = [facet_angles(elements.get(block.element), coordinates[block.facets]) for block in side.blocks]
     means = _nodal_means(side, facet_normals_of_blocks, angles)
     smooth = [means[block.local] for block in side.blocks]
-    # A node is at a corner where a facet leans from the mean by more than half the angle between two that form one.
+    # A node is at a corner where a facet deviates from the mean by more than half the angle between two that form one.
     flat, corner = np.cos(np.radians(0.5 * CORNER)), np.zeros(len(side.points), bool)
     for block, normals, mean in zip(side.blocks, facet_normals_of_blocks, smooth, strict=True):
         corner[block.local[np.einsum("fad,fad->fa", normals, mean) < flat]] = True
@@ -189,12 +189,12 @@ def along_normals(
     xi : ndarray (n, 2)
         Inside the facet.
     overhang : ndarray (n,)
-        How far the projection lies beyond the end of its facet, in facet lengths.
+        Distance of the projection beyond the end of its facet, in facet lengths.
     normal : ndarray (n, 3)
         Interpolated unit normals there.
     """
     facet = start.facet.copy(), start.xi.copy(), start.overhang.copy(), np.empty(points.shape)
-    # Seen from the midst of the surface: far from the origin, rounding would be coarser than a converged step.
+    # Relative to the middle of the surface: far from the origin, round-off would exceed a converged step.
     x = coordinates[side.points]
     midst = 0.5 * (x.min(axis=0) + x.max(axis=0))
     heights = np.einsum("nd,nd->n", points - start.position, start.normal)

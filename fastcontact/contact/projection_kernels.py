@@ -15,9 +15,9 @@ from fastcontact.round_off import ROUND_OFF
 MAX_ITERATIONS = 15
 # A point that lies beyond its facet by less than this, in facet lengths, counts as inside.
 INSIDE = 1e-10
-# A projection that ends farther beyond its facet than this, in facet lengths, is not trusted.
+# A projection farther beyond its facet than this, in facet lengths, is rejected.
 BEYOND = 1.0
-# Columns of a Jacobian that span less than this part of the volume of a box are dependent.
+# Columns of a Jacobian are dependent if they span less than this fraction of the volume of a box.
 FLAT = 1e-8
 
 
@@ -94,7 +94,7 @@ def _newton(point, terms, directions, f, s, t, height):
             return s, t, False
         ds, dt = dot(residual, across) / volume, dot(residual, cross(normal, p)) / volume
         dh, size = dot(residual, cross(p, q)) / volume, max(abs(ds), abs(dt))
-        # Far off, a full step may leave the region where the interpolated normals mean anything.
+        # Far off, a full step may leave the region where the interpolated normals are meaningful.
         share = 1.0 if size <= 1.0 else 1.0 / size
         s, t, height = s + share * ds, t + share * dt, height + share * dh
         if share * size <= STEP * (1.0 + max(abs(s), abs(t))):
@@ -121,7 +121,7 @@ def inside(triangle, s, t):
 
 @innermost_kernel
 def _beside(point, terms, directions, triangular, neighbours, f, height):
-    """Return which facet next to `f` the projection leaves least, where on it, and by how much; infinite if on none."""
+    """Return the facet next to `f` with the smallest overhang of the projection, (s, t), and the overhang or infinity."""
     start, numbers = neighbours
     best, best_s, best_t, least = f, 0.0, 0.0, np.inf
     for k in range(start[f], start[f + 1]):
@@ -129,7 +129,7 @@ def _beside(point, terms, directions, triangular, neighbours, f, height):
         middle = 1.0 / 3.0 if triangular[g] else 0.0
         s, t, converged = _newton(point, terms, directions, g, middle, middle, height)
         out = beyond(triangular[g], s, t) if converged else np.inf
-        if converged and max(out, INSIDE) < max(least, INSIDE) - ROUND_OFF:  # of several left alike, the first one
+        if converged and max(out, INSIDE) < max(least, INSIDE) - ROUND_OFF:  # of equal overhangs, the first
             best, best_s, best_t, least = g, s, t, out
     return best, best_s, best_t, least
 

@@ -13,7 +13,7 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import flat_area_vectors
 from fastcontact.mesh.mesh import Mesh
 
-# Facets of each kind that are looked at.
+# Number of sampled facets of each kind.
 SAMPLE = 200
 
 
@@ -78,7 +78,7 @@ def _check_normals(mesh: Mesh, name: str, side: Surface) -> None:
 
 
 def shared_facets(mesh: Mesh, group: str, other: str) -> Numbers:
-    """Return the nodes of the facets that two groups share, ascending; a facet may be in the mesh more than once."""
+    """Return the nodes of the facets that two groups share, ascending; a mesh may contain a facet more than once."""
     ours, theirs = mesh.cells_of(group, dim=mesh.dim - 1), mesh.cells_of(other, dim=mesh.dim - 1)
     nodes = [np.empty(0, np.int32)]
     for name in ours.keys() & theirs.keys():

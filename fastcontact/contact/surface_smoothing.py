@@ -1,12 +1,12 @@
-r"""Geometric correction of contact surfaces: gaps between the smooth surfaces that straight facets stand for.
+r"""Geometric correction of contact surfaces: gaps between the smooth surfaces that straight facets approximate.
 
-Facets of curved sides that do not match leave gaps and overlaps of the size of their sag :math:`h`, and thus pressure errors
+Non-matching facets of curved sides leave gaps and overlaps of the size of their sag :math:`h`, and thus pressure errors
 of the order of :math:`E h / L` for facets of length L, whatever the interference. A surface of constant curvature and a
 polynomial of twice the order of the facet are fitted to the nodes of the facet and of those around it (local surface fitting:
-Jiao and Zha, 2008). The height of this smooth surface P above the facet is what interpolation between the nodes of the facet
-leaves of it, :math:`h = P - \sum_a N_a P(x_a)`. It vanishes at nodes, on flat sides, and where facets follow the surface.
+Jiao and Zha, 2008). The height of this smooth surface P above the facet is its interpolation error on the facet,
+:math:`h = P - \sum_a N_a P(x_a)`. It vanishes at nodes, on flat sides, and where facets follow the surface.
 
-Only the curvature that both sides share is corrected for: facets of a ball on a flat lie flat in the contact, as it does.
+Only the curvature that both sides share is corrected for: facets of a ball on a flat are flat in the contact, as the ball is.
 With the curvature tensors :math:`K_s` and :math:`K_p` of facets that face each other, heights of one side are multiplied by
 :math:`\min(\max(-K_s : K_p / K : K, 0), 1)`, K its own. Fits do not reach across corners, and where the curvature changes
 from one facet to the next, heights are multiplied by the limiter of van Albada, van Leer and Roberts (1982),
@@ -29,10 +29,10 @@ from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import flat_area_vectors
 
-# Heights below this part of the size of a facet, and curvatures below this part of its inverse, are rounding errors.
+# Heights below this fraction of the size of a facet, and curvatures below this fraction of its inverse, are rounding errors.
 FLAT = 1e-10
-# Columns of a fit are scaled by this with each degree, and its squares damped by this part of the least column: where nodes
-# leave terms undetermined, as on a strip one facet wide, those of low degree take all.
+# Columns of a fit are scaled by this factor per degree, and damped by this fraction of the smallest column: where nodes leave
+# terms undetermined, as on a strip one facet wide, the terms of low degree are preferred.
 LOWER, DAMPING = 0.1, 1e-5
 # Circles, spheres and cylinders are matched to (L / R)^(2 PASSES).
 PASSES = 3
@@ -98,7 +98,7 @@ class Smoothing:
         return np.clip(np.divide(common[:, None], squares, out=np.zeros_like(squares), where=squares > 0.0), 0.0, 1.0)
 
     def overlap(self, ours: tuple[Indices, Array], theirs: tuple[Indices, Array], frames: Sequence[Array]) -> Array:
-        """Return by how much (n,) the smooth surfaces are closer to each other than the facets, where these face [length].
+        """Return the distances (n,) by which the smooth surfaces are closer to each other than the facing facets [length].
 
         `ours` and `theirs` are facets (n,) and reference coordinates (n, dim - 1) in them.
         """
@@ -107,10 +107,10 @@ class Smoothing:
 
 
 def frames(side: Surface, points: Array, coordinates: Array) -> Array:
-    """Return tangents (n_facets, dim - 1, dim) in the middles of facets as bodies carry them along, of unit length at rest.
+    """Return convected tangents (n_facets, dim - 1, dim) in the middle of facets, of unit length in the reference.
 
-    At rest, at `points` (n_points, dim), the first one goes towards the first corner; they take part in the mean deformation
-    of a facet to `coordinates` (n_points, dim), so that no corner matters more than others.
+    In the reference, at `points` (n_points, dim), the first one points to the first corner; they follow the mean
+    deformation of a facet to `coordinates` (n_points, dim), so that no corner has more influence than others.
     """
     frames_of_blocks = []
     for block in side.blocks:
@@ -160,10 +160,10 @@ def smooth_side(side: Surface, points: Array) -> SmoothSide | None:
 
 
 def _neighbours(side: Surface, normal: Array) -> tuple[csr_array, Indices, Mask]:
-    """Return which facets share a node and meet at no corner, and the nodes of all these for each facet.
+    """Return which facets share a node without a corner between them, and the nodes of all these for each facet.
 
-    A matrix (n_facets, n_facets), each facet with itself, positions (n_facets, most) in the points of the side, and which of
-    them are taken.
+    A matrix (n_facets, n_facets), including the diagonal, positions (n_facets, most) in the points of the side, and which of
+    these entries are filled.
     """
     size = [block.local.shape[1] for block in side.blocks for _ in block.local]
     nodes = np.concatenate([block.local.ravel() for block in side.blocks])
@@ -186,7 +186,7 @@ def _in_one_plane(points: Array) -> bool:
 
 
 def _flat(around: Array, taken: Mask) -> bool:
-    """Return whether the points `around` (n, m, dim) every facet lie in a plane of their own."""
+    """Return whether the points `around` (n, m, dim) each facet are coplanar."""
     count = taken.sum(axis=1)[:, None]
     away = np.where(taken[:, :, None], around, 0.0)
     away = np.where(taken[:, :, None], away - (away.sum(axis=1) / count)[:, None], 0.0)
@@ -223,7 +223,7 @@ class _Fit:
         rest = np.where(taken, height - _conic(self.curvature, plane), 0.0)
         size = LOWER ** (i + j).max() * np.sqrt(DAMPING * (columns**2).sum(axis=(1, 2)))
         damping = size[:, None, None] * np.eye(len(i), len(i) + 1)
-        # By orthogonal factors: in normal equations what the damping determines would be known to 1e-3 only.
+        # By QR: from normal equations the terms that the damping determines would be accurate to 1e-3 only.
         rows = np.concatenate([np.concatenate([columns, rest[..., None]], axis=2), damping], axis=1)
         R: Array = np.asarray(np.linalg.qr(rows, mode="r"))
         return replace(self, polynomial=lower * np.linalg.solve(R[:, : len(i), :-1], R[:, : len(i), -1:])[..., 0])
@@ -233,9 +233,9 @@ class _Fit:
         return _conic(self.curvature, plane) + np.einsum("nqt,nt->nq", _terms(plane, *self.powers), self.polynomial)
 
     def reaching(self, points: Array, taken: Mask) -> Mask:
-        """Return which surfaces (n,) of constant curvature reach all of those `points` (n, m, dim) that are `taken` (n, m).
+        """Return which surfaces (n,) of constant curvature extend to all `points` (n, m, dim) that are `taken` (n, m).
 
-        Others fit nodes that do not determine them, as of three coarse facets in a row, and amplify round-off.
+        The others are not determined by their nodes, e.g. of three coarse facets in a row, and amplify round-off.
         """
         bent = np.einsum("nqd,nde->nqe", self.in_planes(points)[0], self.curvature)
         return np.asarray((((bent**2).sum(axis=2) < 1.0) | ~taken).all(axis=1))
@@ -253,7 +253,7 @@ class _Fit:
 def _fit(block: FacetBlock, points: Array, around: Array, taken: Mask, degree: int) -> _Fit:
     """Fit surfaces to those of the points `around` (n, m, dim) the facets of a block that are `taken` (n, m).
 
-    From pass to pass, planes turn to be tangent, and what is of constant curvature is taken out of the polynomials.
+    In each pass, planes are rotated towards the tangent, and constant curvature is moved from the polynomials to `curvature`.
     """
     corners = points[block.facets[:, : elements.get(block.element).n_corners]]
     origin, normal = corners.mean(axis=1), _normals(block, points)
@@ -268,7 +268,7 @@ def _fit(block: FacetBlock, points: Array, around: Array, taken: Mask, degree: i
 
 
 def _tilted(axes: Array, slope: Array) -> Array:
-    """Return axes (n, dim, dim) after the smallest rotation to normals of surfaces with a `slope` (n, dim - 1) over them."""
+    """Return axes (n, dim, dim) after the smallest rotation to the normals of surfaces of `slope` (n, dim - 1) over them."""
     normal = axes[:, -1] - np.einsum("nj,njd->nd", slope, axes[:, :-1])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     both = axes[:, -1] + normal

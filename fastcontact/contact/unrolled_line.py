@@ -18,7 +18,7 @@ class UnrolledLine:
     Attributes
     ----------
     nodes : ndarray (k, 2)
-        In order; the first stands also at the end of a closed line [length].
+        In order; the first is repeated at the end of a closed line [length].
     abscissa : ndarray (k,)
         Length along the line to each of them [length].
     closed : bool
@@ -63,7 +63,7 @@ class UnrolledLine:
 def unrolled(surface: Surface, coordinates: Array, middle: Array | None) -> UnrolledLine | None:
     """Return a surface in the plane as one line; None where it is in several pieces or branches.
 
-    A closed line is cut open opposite to `middle` (2,) [length], without one at its lowest place.
+    A closed line is cut open opposite to `middle` (2,) [length], or at its lowest point without one.
     """
     if surface.abscissa.any():
         return UnrolledLine(coordinates[surface.points], surface.abscissa)

@@ -21,7 +21,7 @@ import numpy as np
 from fastcontact._tools.argument_types import values_at
 from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.elasticity.symmetry_axis import axis_nodes
-from fastcontact.errors import ModelError, unknown
+from fastcontact.errors import ModelError, check_known
 from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.area_vectors import area_vectors
 from fastcontact.mesh.mesh import Mesh
@@ -352,8 +352,7 @@ def axes_of(caption: str, components: Mapping[str, Any], dim: int) -> dict[int, 
     if not given:
         raise ModelError(f"{caption} has no component: give for example y=-1.0")
     for name in given:
-        if name not in "xyz"[:dim]:
-            raise ModelError(f"{caption}: {unknown('component', name, 'xyz'[:dim])}")
+        check_known("component", name, "xyz"[:dim], ModelError, f"{caption}: ")
     return {"xyz".index(name): value for name, value in given.items()}
 
 

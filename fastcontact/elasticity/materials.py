@@ -18,7 +18,7 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.loads import LARGEST, Value
 from fastcontact.elasticity.material_axes import PAIRS, Axes, frames, rotations
 from fastcontact.elasticity.varying_constants import Cells, Varying, mapped, varying, wrapped
-from fastcontact.errors import ModelError, unknown
+from fastcontact.errors import ModelError, check_known
 from fastcontact.round_off import ROUND_OFF
 
 AnyMaterial = TypeVar("AnyMaterial", bound="Material")
@@ -261,8 +261,7 @@ class Material:
 
     def _compliance6(self, points: Array, kinematics: str, constants: Any) -> Array:
         """Return the compliance (n, 6, 6) in the mesh's axes; ModelError where kinematics of the plane do not hold."""
-        if kinematics not in KINEMATICS:
-            raise ModelError(unknown("kinematics", kinematics, KINEMATICS))
+        check_known("kinematics", kinematics, KINEMATICS, ModelError)
         of_stress = rotations(self._frames(points, kinematics, constants))
         # Strains turn by the inverse of the transpose, which for stresses in another frame is the rotation back.
         back = np.linalg.inv(of_stress)
@@ -387,8 +386,7 @@ class LinearElastic(Material):
                 "(for an incompressible material take nu = 0.4999, in quadrangles or hexahedra: they have a mean dilatation "
                 "then and do not lock)"
             )
-        if self.volumetric not in VOLUMETRIC:
-            raise ModelError(unknown("volumetric", self.volumetric, VOLUMETRIC))
+        check_known("volumetric", self.volumetric, VOLUMETRIC, ModelError)
         check_density(self.density)
         check_expansion(self.expansion, 1)
         check_conductivity(self.conductivity, 1)
@@ -466,8 +464,7 @@ def isotropic_moduli(E: Array, nu: Array, kinematics: str) -> Array:
 
     Of Young's moduli `E` (n,) [pressure] and Poisson's ratios `nu` (n,) [-].
     """
-    if kinematics not in KINEMATICS:
-        raise ModelError(unknown("kinematics", kinematics, KINEMATICS))
+    check_known("kinematics", kinematics, KINEMATICS, ModelError)
     G = E / (2 * (1 + nu))
     if kinematics == "plane_stress":
         D, normal = np.zeros((len(E), 4, 4)), E / (1 - nu * nu)

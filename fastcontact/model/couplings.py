@@ -15,7 +15,7 @@ from scipy.sparse import csr_array
 from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.loads import Load, Table
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
-from fastcontact.errors import MeshError, ModelError, unknown
+from fastcontact.errors import MeshError, ModelError, check_known
 from fastcontact.mesh.companion_groups import ROTATION
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.spread_forces import Spread, mean_rotation, shares_of, turned
@@ -133,8 +133,7 @@ def coupling(
     MeshError, ModelError if there are no such groups, or they cannot be coupled.
     """
     name = f"the coupling of '{names[0]}' with '{names[1]}'"
-    if kind not in KINDS:
-        raise ModelError(unknown("kind of coupling", kind, KINDS))
+    check_known("kind of coupling", kind, KINDS, ModelError)
     if kinematics == "axisymmetric":
         raise ModelError(
             f"{name}: in axisymmetry nothing can rotate; use couple('{names[1]}', 'y') to move a group as one"

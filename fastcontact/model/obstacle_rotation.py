@@ -9,7 +9,7 @@ from typing import Any
 from fastcontact._tools.argument_types import finite_vector
 from fastcontact.contact.obstacles.rotation import Rotation
 from fastcontact.elasticity.loads import check_number
-from fastcontact.errors import ModelError, unknown
+from fastcontact.errors import ModelError, check_known
 from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.ramp import Ramp, Table, multiplier, table_of
 
@@ -24,8 +24,7 @@ def rotation_of(caption: str, given: Mapping[str, Any], kinematics: str) -> tupl
     ModelError if they are wrong.
     """
     for key in given:
-        if key not in KEYS:
-            raise ModelError(unknown(f"key of {caption}", key, KEYS))
+        check_known(f"key of {caption}", key, KEYS, ModelError)
     if kinematics == "axisymmetric":
         raise ModelError(
             f"{caption}: an axisymmetric model has no displacement round its axis, and tilting is not axisymmetric: make a "

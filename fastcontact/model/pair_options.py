@@ -16,7 +16,7 @@ from fastcontact.contact.overclosure import ExponentialLaw, OverclosureLaw, Tabu
 from fastcontact.contact.pair_options import KINDS, Field, PairOptions
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity.loads import check_number, check_value, evaluated
-from fastcontact.errors import ContactError, unknown
+from fastcontact.errors import ContactError, check_known
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.ramp import Table, table_of
 
@@ -83,11 +83,9 @@ def _cohesion(name: str, options: Mapping[str, Any]) -> CohesiveLaw | None:
             f"the {option} of contact '{name}' must give its {' and its '.join(needed)}, each by its name"
         )
     for key, value in given.items():
-        if key not in needed + allowed:
-            raise ContactError(unknown(f"number of the {option} of contact '{name}'", str(key), needed + allowed))
+        check_known(f"number of the {option} of contact '{name}'", key, needed + allowed, ContactError)
         if key in CHOICES:
-            if value not in CHOICES[key]:
-                raise ContactError(unknown(f"{key} in the {option} of contact '{name}'", str(value), CHOICES[key]))
+            check_known(f"{key} in the {option} of contact '{name}'", value, CHOICES[key], ContactError)
             continue
         check_number(f"the {key} in the {option} of contact '{name}'", value)
         if not value > 0:
@@ -110,8 +108,7 @@ def _cohesion(name: str, options: Mapping[str, Any]) -> CohesiveLaw | None:
 def _kind(name: str, options: Mapping[str, Any], against_obstacle: bool) -> str:
     """Return the kind of contact, which other options must not contradict."""
     kind = options.get("kind", "unilateral")
-    if not isinstance(kind, str) or kind not in KINDS:
-        raise ContactError(unknown(f"kind of contact '{name}'", str(kind), KINDS))
+    check_known(f"kind of contact '{name}'", kind, KINDS, ContactError)
     if kind != "unilateral" and options.get("friction"):
         raise ContactError(f"contact '{name}' is {kind}, which knows no friction: leave out 'friction' or 'kind'")
     if options.get("tangential_penalty") is not None and not options.get("friction"):

@@ -9,7 +9,7 @@ import numpy as np
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.loads import Load, Table, Traction, check_number
-from fastcontact.errors import MeshError, ModelError, unknown
+from fastcontact.errors import MeshError, ModelError, check_known
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.round_off import ROUND_OFF, TINY
 
@@ -46,8 +46,7 @@ class Spread:
             raise ModelError(f"{name}: the place {self.place} it is spread about must be {dim} numbers")
         for number in self.place:
             check_number(f"a coordinate of the place of {name}", number)
-        if self.weighting not in WEIGHTINGS:
-            raise ModelError(f"{name}: {unknown('weighting', self.weighting, WEIGHTINGS)}")
+        check_known("weighting", self.weighting, WEIGHTINGS, ModelError, f"{name}: ")
         if self.radius is not None:
             check_number(f"the radius of {name}", self.radius)
             if not self.radius > 0.0:

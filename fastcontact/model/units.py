@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from fastcontact.errors import ModelError, unknown
+from fastcontact.errors import ModelError, check_known
 
 # What units that are known by name measure, in SI.
 KNOWN: dict[str, dict[str, float]] = {
@@ -34,8 +34,7 @@ def named_units(given: str | Mapping[str, str]) -> dict[str, str]:
             raise ModelError(f"units = '{given}' must be the {EXAMPLE}")
         given = dict(zip(KNOWN, names, strict=True))
     for kind, name in given.items():
-        if kind not in KNOWN:
-            raise ModelError(unknown("kind of unit", kind, KNOWN))
+        check_known("kind of unit", kind, KNOWN, ModelError)
         for other, names_of in KNOWN.items():
             if name in names_of and other != kind:
                 raise ModelError(f"'{name}' is a unit of {other}, not of {kind}: give the {EXAMPLE}")

@@ -1,7 +1,7 @@
-"""The contact of a settled step as linear conditions on small motions about it.
+"""The contact of a converged step as linear conditions on small motions about it.
 
-What is closed stays closed, and what sticks does not slip either; what is open or slides is free (Wriggers, Computational
-Contact Mechanics, 2006, section 5.3: the active set held). Penalties are springs.
+The active set is fixed: closed constraints stay closed, sticking ones do not slip, open and sliding ones are free (Wriggers,
+Computational Contact Mechanics, 2006, section 5.3). Penalties are springs.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ class Conditions:
     nodes : ndarray of int (m,)
         The secondary node of each.
     areas : ndarray (m,)
-        That each stands for, as far as known [area].
+        Area of each condition, where known [area].
     directions : ndarray (m, dim), optional
-        Along tangents, the tangents [-].
+        Tangents, for conditions along them [-].
     compliance : csr_array (m, m), optional
-        Of the conditions themselves [length / force].
+        Compliance of the conditions [length / force].
     """
 
     rows: csr_array
@@ -79,7 +79,7 @@ class HeldContact:
 def joined(
     held: Sequence[Conditions], n_dofs: int, join: Callable[[Conditions], Conditions] = lambda own: own
 ) -> HeldContact:
-    """Return conditions as one, for `n_dofs` displacements, after `join` has made those of a whole ring of each."""
+    """Return all conditions as one, for `n_dofs` displacements; `join` first maps each to conditions of a whole ring."""
     equations, nodes, springs = [csr_array((0, n_dofs))], [np.empty(0, np.intp)], []
     for own in map(join, held):
         kept = np.flatnonzero(np.diff(own.rows.indptr) > 0)
@@ -92,7 +92,7 @@ def joined(
 
 
 def held_contact(model: Model, step: StepResult | None, held: HeldMotions, hold_sliding: bool) -> list[Conditions]:
-    """Return the conditions of all pairs at the end of a step; without one those of tied and bilateral pairs, at rest."""
+    """Return the conditions of all pairs at the end of a step; without a step, those of tied and bilateral pairs."""
     conditions: list[Conditions] = []
     for pair in model.contact:
         bound, contact = model.bind(pair, held, sectors_alike=False), None if step is None else step.contact[pair.name]
@@ -114,7 +114,7 @@ def _conditions(
 ) -> Iterator[Conditions]:
     """Yield conditions along the normals and along the tangents.
 
-    They are tested with the formulation's multipliers, as those of tied pairs are, see `contact.tied`.
+    The test functions are the formulation's multipliers, as for tied pairs, see `contact.tied`.
     """
     tied = part.tied if isinstance(part.tied, TiedPair) else None
     moments, areas = moments_of(part) if tied is None else (tied.moments, tied.areas)
@@ -150,7 +150,7 @@ def _along(
     directions: Sequence[Array], rows: Sequence[csr_array], kept: Indices, owners: Indices, areas: Array,
     compliance: csr_array | None = None,
 ) -> Conditions:  # fmt: skip
-    """Return the conditions along all tangents, of rows (k, n_dofs) that are the `kept` (k,) of owners and areas (q,)."""
+    """Return the conditions along all tangents, of rows (k, n_dofs), the `kept` (k,) of those with owners and areas (q,)."""
     count = len(rows)
     give = None if compliance is None else csr_array(block_diag([compliance] * count, format="csr"))
     stacked = csr_array(vstack(rows, format="csr"))

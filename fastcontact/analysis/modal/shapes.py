@@ -1,4 +1,4 @@
-"""What `fastcontact.modes` returns: frequencies and shapes, of the model and of the whole ring that a sector stands for."""
+"""Result of `fastcontact.modes`: frequencies and shapes, of the model and of the whole ring that a sector represents."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 class Shapes(Sequence[StepResult]):
-    """A sequence of shapes, each a step: its displacement, the stress of that, and the frequency as load factor."""
+    """A sequence of mode shapes, each as a step: displacement, its stress, and the frequency as load factor."""
 
     @abstractmethod
     def _step(self, number: int) -> StepResult: ...
@@ -50,9 +50,9 @@ class Shapes(Sequence[StepResult]):
         Parameters
         ----------
         number : int
-            Of the mode, from 0.
+            Number of the mode, from 0.
         count : int
-            How many steps; their load factors are the phases, from 0 to 1.
+            Number of steps; their load factors are the phases, from 0 to 1.
         """
         return phases(self[number], count)
 
@@ -223,7 +223,7 @@ class RingModes(Shapes):
 
 
 def _turned(stress: Array, turn: Array) -> Array:
-    """Return stresses (n, 4 or 6) of a body that is turned with them by a rotation (dim, dim) [pressure]."""
+    """Return stresses (n, 4 or 6) of a body rotated by a rotation matrix (dim, dim) [pressure]."""
     Q, size = np.eye(3), stress.shape[1]
     Q[: len(turn), : len(turn)] = turn
     return np.asarray(stress @ rotations(Q.T[None])[0, :size, :size].T)

@@ -19,7 +19,7 @@ from fastcontact.errors import ModelError, unknown
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import combined
 
-# Constants, and how the components of an orthotropic material's are called.
+# Constants, and the names of their components for an orthotropic material.
 CONSTANTS = {"E": "123", "nu": NAMES, "G": NAMES, "expansion": "123"}
 
 
@@ -37,18 +37,18 @@ def by_constant(contact: MovingContact, asked: Asked) -> tuple[Array, Array | No
         ]
         return replace(contact, problem=_with_model(contact.problem, made))
 
-    # Of the fourth order: what is left is the step to the fourth power.
+    # Fourth order: the error is proportional to the fourth power of the step.
     parts = [weight * (_inside(at(far * step)) - _inside(at(-far * step))) for far, weight in ((1, 8.0), (2, -1.0))]
     return (parts[0] + parts[1]) / (12.0 * step), contact.along(at, step) if contact.problem.pairs else None
 
 
 def check_constant(model: Model, asked: Asked) -> None:
-    """Raise ModelError if no material has such a constant, or one that varies."""
+    """Raise ModelError if no material has such a constant, or the constant varies."""
     _found(model, asked)
 
 
 def _found(model: Model, asked: Asked) -> tuple[int, Material, int | None]:
-    """Return the number of a material in the model, itself, and which of several components is asked for."""
+    """Return the number of a material in the model, the material, and the requested component."""
     matches = [
         (i, material) for i, (material, groups) in enumerate(model.materials)
         if asked[1] == i or (groups is not None and asked[1] in groups)
@@ -67,7 +67,7 @@ def _found(model: Model, asked: Asked) -> tuple[int, Material, int | None]:
 
 
 def _component(asked: Asked, names: Sequence[str]) -> int | None:
-    """Return the number of the component that is asked for; None where a constant has but one, or all are."""
+    """Return the number of the requested component; None if a constant has only one, or all are requested."""
     if len(asked) == 2 and (not names or asked[0] == "expansion"):
         return None
     if len(asked) == 2:
@@ -78,7 +78,7 @@ def _component(asked: Asked, names: Sequence[str]) -> int | None:
 
 
 def _room(material: Material, name: str, component: int | None) -> float:
-    """Return by how much about a constant may change, all others kept."""
+    """Return the approximate range by which a constant may change, with all others fixed."""
     value = getattr(material, name)
     if name == "expansion":  # forces are linear in it
         return 1.0 / CHANGED
@@ -95,7 +95,7 @@ def _room(material: Material, name: str, component: int | None) -> float:
 
 
 def _changed(material: Material, name: str, component: int | None, by: float) -> Material:
-    """Return the material with a constant, or one of its components, changed by a number."""
+    """Return the material with a constant, or one of its components, changed by `by`."""
     value = getattr(material, name)
     if isinstance(value, tuple):
         value = tuple(v + by * (component in (None, i)) for i, v in enumerate(value))
@@ -116,7 +116,7 @@ def _with_model(problem: Problem, model: Model) -> Problem:
 
 
 def _inside(contact: MovingContact) -> Array:
-    """Return the internal forces of the materials (n_dofs,) less those of heat and initial states [force]."""
+    """Return the internal forces of the materials (n_dofs,) minus those of heat and initial states [force]."""
     problem = contact.problem
     model = problem.model
     force = np.zeros(len(contact.u))

@@ -58,7 +58,7 @@ def check_parameter(model: Model, asked: Asked) -> None:
 
 
 def change_by(contact: MovingContact, asked: Asked) -> Change:
-    """Return the change of the residual by a parameter that `check_parameter` has accepted."""
+    """Return the change of the residual with a parameter that `check_parameter` has accepted."""
     return KINDS[str(asked[0])][1](contact, asked)
 
 
@@ -76,7 +76,7 @@ def _nothing(contact: MovingContact) -> Change:
 
 
 def _on(items: Sequence[Item], group: str) -> list[Item]:
-    """Return the loads or temperatures that act on a group, of those that act on others as well the part on it."""
+    """Return the loads or temperatures that act on a group, restricted to it."""
     return [
         item if len(item.places) == 1 else replace(item, groups=(group,))  # type: ignore[type-var]
         for item in items if group in item.places
@@ -84,7 +84,7 @@ def _on(items: Sequence[Item], group: str) -> list[Item]:
 
 
 def _named(kind: str, items: Sequence[Item], asked: Asked, others: Sequence[str] = ()) -> list[Item]:
-    """Return the loads or temperatures on a group; ModelError if there are none, and no other thing has that name."""
+    """Return the loads or temperatures on a group; ModelError if there are none, and `others` lack the name."""
     items_of_group = _on(items, str(asked[1]))
     if not items_of_group and asked[1] not in others:
         names = [place for item in items for place in item.places]
@@ -93,7 +93,7 @@ def _named(kind: str, items: Sequence[Item], asked: Asked, others: Sequence[str]
 
 
 def _loads(model: Model, asked: Asked) -> list[Load]:
-    """Return the loads on a group; none for a rigid obstacle that a force drives."""
+    """Return the loads on a group; none for a force-driven obstacle."""
     driven = [pair.name for pair in model.force_driven.pairs]
     return _named("group with a load, or obstacle with a force,", model.loads, asked, driven)
 
@@ -108,7 +108,7 @@ def _forces(contact: MovingContact, loads: Sequence[Load]) -> Array:
 
 
 def _of_load(contact: MovingContact, asked: Asked) -> Change:
-    """Return the change by the factor of the loads on a group, or of the force on an obstacle."""
+    """Return the change with the factor of the loads on a group, or of the force on an obstacle."""
     problem = contact.problem
     driven = problem.force_driven.number(str(asked[1]))
     out = -_forces(contact, _loads(problem.model, asked))
@@ -127,7 +127,7 @@ def _speeds(model: Model, asked: Asked) -> list[Centrifugal]:
 
 
 def _of_speed(contact: MovingContact, asked: Asked) -> Change:
-    """Return the change by the angular speed of a group, with whose square its forces grow."""
+    """Return the change with the angular speed of a group; forces are proportional to its square."""
     loads = [load for load in _speeds(contact.problem.model, asked) if load.speed]
     out = [-2.0 / load.speed * _forces(contact, [load]) for load in loads]
     return replace(_nothing(contact), out=np.sum(out, axis=0) if out else np.zeros(len(contact.u)))
@@ -139,7 +139,7 @@ def _temperatures(model: Model, asked: Asked) -> list[Temperature]:
 
 
 def _of_temperature(contact: MovingContact, asked: Asked) -> Change:
-    """Return the change by the factor of the rise of the temperatures of a group."""
+    """Return the change with the factor of the temperature rise of a group."""
     problem, change = contact.problem, _nothing(contact)
     heated = copy.copy(problem.model)
     heated.temperatures = _temperatures(heated, asked)
@@ -155,7 +155,7 @@ def _pretension(model: Model, asked: Asked) -> Pretension:
 
 
 def _of_pretension(contact: MovingContact, asked: Asked) -> Change:
-    """Return the change by the factor of the force of a pretension section, or of its shortening."""
+    """Return the change with the factor of the force of a pretension section, or of its shortening."""
     model = contact.problem.model
     section = _pretension(model, asked)
     if section.shortening is not None:
@@ -166,7 +166,7 @@ def _of_pretension(contact: MovingContact, asked: Asked) -> Change:
 
 
 def _prescribing(model: Model, asked: Asked) -> tuple[list[Support], list[int]]:
-    """Return the supports on a group, and the numbers of relations that prescribe its displacement along normals."""
+    """Return the supports on a group, and the numbers of constraints that prescribe its displacement along normals."""
     group, only = asked[1], "xyz".find(str(asked[2])) if len(asked) == 3 else None
     supports = [s for s in model.supports if s.group == group and only in (None, s.component)]
     kinds = ("normal", "x", "y", "z") if only is None else (str(asked[2]),)
@@ -180,7 +180,7 @@ def _prescribing(model: Model, asked: Asked) -> tuple[list[Support], list[int]]:
 
 
 def _of_prescribed(contact: MovingContact, asked: Asked) -> Change:
-    """Return the change by the load factor of prescribed displacements of a group."""
+    """Return the change with the load factor of prescribed displacements of a group."""
     problem, instant = contact.problem, contact.instant
     model = problem.model
     supports, along = _prescribing(model, asked)
@@ -197,7 +197,7 @@ def _of_prescribed(contact: MovingContact, asked: Asked) -> Change:
 
 
 def _lifted(contact: MovingContact, values: Array, along: Sequence[int]) -> Change:
-    """Return the change by prescribed displacements (n_points, dim) [length] and the values of some relations."""
+    """Return the change with prescribed displacements (n_points, dim) [length] and the values of some constraints."""
     problem = contact.problem
     factors = [
         multiplier(relation.ramp, problem.ramp, contact.instant) if i in along else 0.0
@@ -208,14 +208,14 @@ def _lifted(contact: MovingContact, values: Array, along: Sequence[int]) -> Chan
 
 
 def _moved(model: Model, asked: Asked) -> ContactPair:
-    """Return the pair of a rigid obstacle that is moved."""
+    """Return the pair of a rigid obstacle with a prescribed motion."""
     moved = {pair.name: pair for pair in model.contact if any(pair.motion)}
     obstacle: ContactPair = _one("rigid obstacle with a motion", moved, asked)
     return obstacle
 
 
 def _of_motion(contact: MovingContact, asked: Asked) -> Change:
-    """Return the change by the factor of the motion of a rigid obstacle."""
+    """Return the change with the factor of the motion of a rigid obstacle."""
     problem, name = contact.problem, str(asked[1])
     pair = _moved(problem.model, asked)
     motion = np.array(pair.motion) * multiplier(pair.ramp, problem.ramp, contact.instant)
@@ -237,13 +237,13 @@ def _of_motion(contact: MovingContact, asked: Asked) -> Change:
 
 
 def _opened(model: Model, asked: Asked) -> None:
-    """Refuse clearances of pairs that are not there, or tied."""
+    """Refuse clearances of pairs that do not exist or are tied."""
     if _one("contact pair", {pair.name: pair for pair in model.contact}, asked).options.get("kind") == "tied":
         raise ModelError(f"contact '{asked[1]}' is tied: it keeps its gaps, and has no clearance")
 
 
 def _of_clearance(contact: MovingContact, asked: Asked) -> Change:
-    """Return the change by a length that is added to the gap of a contact pair."""
+    """Return the change with a length added to the gap of a contact pair."""
     name = str(asked[1])
     pair = contact.problem.pairs[name]
     count = len(pair.secondary.points)
@@ -256,13 +256,13 @@ def _of_clearance(contact: MovingContact, asked: Asked) -> Change:
 
 
 def _of_constant(contact: MovingContact, asked: Asked) -> Change:
-    """Return the change by a constant of a material."""
+    """Return the change with a constant of a material."""
     nothing = _nothing(contact)
     out, sample = by_constant(contact, asked)
     return replace(nothing, out=out, sample=nothing.sample if sample is None else sample)
 
 
-# By kind: what raises ModelError if there is no such parameter, and what it changes.
+# By kind: a check that raises ModelError if there is no such parameter, and the change of the residual.
 KINDS: dict[str, tuple[Callable[[Model, Asked], object], Callable[[MovingContact, Asked], Change]]] = {
     **dict.fromkeys(CONSTANTS, (check_constant, _of_constant)),
     "load": (_loads, _of_load),

@@ -44,9 +44,9 @@ def check_quantity(model: Model, asked: Asked) -> None:
 
 
 def with_gradient(contact: MovingContact, step: StepResult, asked: Asked) -> tuple[MovingContact, Gradient]:
-    """Return the gradient of a quantity that `check_quantity` has found, and the contact whose samples it needs.
+    """Return the gradient of a quantity that `check_quantity` has accepted, and the contact whose samples it needs.
 
-    ModelError if it has no sensitivities in this state.
+    Raises ModelError if the quantity has no sensitivities in this state.
     """
     none = Gradient(0.0, np.zeros(len(contact.u)), np.zeros(len(contact.active)))
     if asked[0] == "displacement":
@@ -69,7 +69,7 @@ def _axis(model: Model, asked: Asked) -> int:
 
 
 def _point(model: Model, point: str | int) -> int:
-    """Return a point, by its number or the name of a group that holds it alone."""
+    """Return a point, given by its number or the name of a group of one point."""
     if isinstance(point, str):
         return int(model.mesh.point(point))
     if not 0 <= point < model.mesh.n_points:

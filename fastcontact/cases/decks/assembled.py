@@ -141,7 +141,7 @@ class Assembled:
     def _entry(self, kind: str, scope: str, entry: Members) -> Iterable[Any]:
         scope = entry.instance or scope
         if scope:
-            defined("instance", scope, self.content.instances, entry.location)
+            defined("instance", scope, self.content.instances, entry)
         if entry.name:
             return self._named(kind, scope, entry)
         numbers = entry.numbers
@@ -153,7 +153,7 @@ class Assembled:
         ]
         if len(numbers_there) < len(numbers):
             absent = f"{len(numbers) - len(numbers_there)} of the {len(numbers)} numbers {numbers[0]} to {numbers[-1]}"
-            self.content.note(entry.location, f"{absent} are no {kind}s and left out")
+            self.content.note(entry, f"{absent} are no {kind}s and left out")
         return (there[n] for n in numbers_there)
 
     def _all_existing(self, kind: str, scope: str, entry: Members) -> Iterator[Any]:
@@ -204,7 +204,7 @@ class Assembled:
         if definition.of_nodes:
             whole, _, left = self.faces_of_nodes(definition, scope)
             if left:
-                raise definition.location.refuse(
+                raise definition.refuse(
                     f"the nodes of surface '{definition.name}' make up no whole faces: {len(left)} belong to none "
                     f"(first: node {self.number_of(left[0])}), and *{location.keyword} in line {location.line} "
                     "needs faces, TYPE=ELEMENT"
@@ -232,7 +232,7 @@ class Assembled:
             known = ", ".join(sorted(other.name for other in surfaces.values())) or "none"
             raise location.refuse(f"surface '{name[:80]}' is not defined; surfaces: {known}")
         if not surfaces[rest].faces:
-            raise surfaces[rest].location.refuse(f"surface '{surfaces[rest].name[:80]}' has no faces")
+            raise surfaces[rest].refuse(f"surface '{surfaces[rest].name[:80]}' has no faces")
         return surfaces[rest], scope
 
     def facet(self, element: Element, label: int, location: Location) -> int:
@@ -359,9 +359,7 @@ def assembled(content: Content) -> Assembled:
         for number, cell in part.cells.items():
             points = tuple(index.get(node, -1) for node in cell.nodes)
             if -1 in points:
-                raise cell.location.refuse(
-                    f"element {number} uses node {cell.nodes[points.index(-1)]}, which is not defined"
-                )
+                raise cell.refuse(f"element {number} uses node {cell.nodes[points.index(-1)]}, which is not defined")
             kind = element_type(cell.type)
             row = -1 if kind is None else counts.setdefault(kind.element, 0)
             if kind is not None:

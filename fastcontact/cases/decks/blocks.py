@@ -36,8 +36,22 @@ class Location:
         return f"{self.file}, line {self.line}, *{self.keyword}"
 
 
+class Located:
+    """What stands somewhere in a deck, at its `location`, which messages about it name."""
+
+    __slots__ = ()
+    location: Location
+
+    def refuse(self, text: str) -> CaseError:
+        """Return the error that refuses it."""
+        return self.location.refuse(text)
+
+    def __str__(self) -> str:
+        return str(self.location)
+
+
 @dataclass(frozen=True, slots=True)
-class Row:
+class Row(Located):
     """A data line: its entries without blanks around them, and its place."""
 
     location: Location
@@ -53,7 +67,7 @@ class Row:
         text = self.text(index)
         if not text:
             if default is None:
-                raise self.location.refuse(f"entry {index + 1} is missing: a number is needed")
+                raise self.refuse(f"entry {index + 1} is missing: a number is needed")
             return default
         return as_number(self.location, text)
 
@@ -61,14 +75,14 @@ class Row:
         """Return an entry as a whole number; errors as for `number`."""
         value = self.number(index, default)
         if value != int(value) or abs(value) > LARGEST_WHOLE:
-            raise self.location.refuse(f"'{self.text(index)[:LONGEST_QUOTED]}' is no whole number")
+            raise self.refuse(f"'{self.text(index)[:LONGEST_QUOTED]}' is no whole number")
         return int(value)
 
     def positive(self, index: int, quantity: str) -> float:
         """Return an entry as a positive number; `quantity` it is says the error."""
         value = self.number(index)
         if not value > 0:
-            raise self.location.refuse(f"the {quantity} {value:g} must be positive")
+            raise self.refuse(f"the {quantity} {value:g} must be positive")
         return value
 
 
@@ -88,7 +102,7 @@ class Lines:
 
 
 @dataclass(frozen=True, slots=True)
-class Block:
+class Block(Located):
     """A keyword with its parameters (names in upper case, without values None) and all its data lines."""
 
     location: Location
@@ -109,12 +123,16 @@ class Block:
         """Yield `rows`, one at a time."""
         return (row for row in self.lines if any(row.entries))
 
+    def numbers(self) -> list[float]:
+        """Return the entries of all data lines, which are numbers."""
+        return [row.number(i) for row in self.each() for i, text in enumerate(row.entries) if text]
+
     def only(self, why: str = "") -> Row:
         """Return the only data line; CaseError if there are others: constants that depend on `why`."""
         rows = self.rows
         if len(rows) != 1:
             text = f"{len(rows)} data lines where one is needed"
-            raise self.location.refuse(text + (f": constants that depend on {why} are not supported" if why else ""))
+            raise self.refuse(text + (f": constants that depend on {why} are not supported" if why else ""))
         return rows[0]
 
     def get(self, name: str, default: str = "") -> str:
@@ -127,13 +145,13 @@ class Block:
         for option in known:
             if value.replace(" ", "") == option.replace(" ", ""):
                 return option
-        raise self.location.refuse(f"{name}={value[:LONGEST_QUOTED]} is not supported; known are {', '.join(known)}")
+        raise self.refuse(f"{name}={value[:LONGEST_QUOTED]} is not supported; known are {', '.join(known)}")
 
     def required(self, name: str) -> str:
         """Return the value of a parameter; CaseError if there is none."""
         value = self.parameters.get(name)
         if not value:
-            raise self.location.refuse(f"the parameter {name} is missing")
+            raise self.refuse(f"the parameter {name} is missing")
         return value
 
 
@@ -317,21 +335,21 @@ def _included(block: Block, name: str, source: Source) -> Iterator[Block]:
     given = block.required("INPUT")
     for parameter in block.parameters:
         if parameter != "INPUT":
-            raise block.location.refuse(f"the parameter {parameter} is not supported")
+            raise block.refuse(f"the parameter {parameter} is not supported")
     shown, path = given[:LONGEST_QUOTED], source.folder / given.replace("\\", "/")
     try:
         target = path.resolve()
         inside = target.is_relative_to(source.folder)
         there = inside and target.is_file()
     except (OSError, ValueError, RuntimeError):
-        raise block.location.refuse(f"'{shown}' is no name of a file") from None
+        raise block.refuse(f"'{shown}' is no name of a file") from None
     if not inside:
-        raise block.location.refuse(
+        raise block.refuse(
             f"'{shown}' is outside of the folder of the deck: refused, copy the file below '{source.folder}'"
         )
     if not there:
-        raise block.location.refuse(f"file '{shown}' not found beside the deck, in '{source.folder}'")
+        raise block.refuse(f"file '{shown}' not found beside the deck, in '{source.folder}'")
     if target in source.open:
         target_name = "the deck" if target == source.open[0] else f"'{shown}'"
-        raise block.location.refuse(f"{target_name} includes itself")
+        raise block.refuse(f"{target_name} includes itself")
     yield from _blocks(target, given, source)

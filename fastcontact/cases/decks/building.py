@@ -123,14 +123,14 @@ class Building:
                 if self.found.dim == 2 and self.found.kinematics != "axisymmetric":
                     section_thickness = 1.0 if section.thickness is None else section.thickness
                     if thickness is not None and section_thickness != thickness:
-                        raise section.location.refuse(
+                        raise section.refuse(
                             f"thickness {section_thickness:g} after {thickness:g}: plane models have one thickness"
                         )
                     thickness = section_thickness
                 name = f"{scope}.{section.elements}" if scope else section.elements
                 for element in self.made.elements_of(name, section.location):
                     if element.section not in (None, section):
-                        raise section.location.refuse(
+                        raise section.refuse(
                             f"element {element.number} has a section already, in line {element.section.location.line}"
                         )
                     element.section = section
@@ -161,7 +161,7 @@ class Building:
         axes = orientation_of(self.content, section.orientation, section.location)
         for element in members:
             if axes.part is not self.content.root and self.made.turned(element.scope):
-                raise axes.location.refuse(
+                raise axes.refuse(
                     "axes of a part whose instance is turned are not supported: give them in the assembly"
                 )
         if axes.distribution:
@@ -172,9 +172,9 @@ class Building:
         return tuple(tuple(row) for row in local_axes(axes, np.zeros(3)).tolist())
 
     def _material(self, section: Section) -> Material:
-        material: Material = defined("material", section.material, self.content.materials, section.location)
+        material: Material = defined("material", section.material, self.content.materials, section)
         if material.law is None and self.content.heat != "alone":
-            raise material.location.refuse(f"material '{material.name}' has no *ELASTIC")
+            raise material.refuse(f"material '{material.name}' has no *ELASTIC")
         return material
 
     def _check_sections(self) -> None:
@@ -183,7 +183,7 @@ class Building:
             cell = without[0].cell
             many = "1 element" if len(without) == 1 else f"{len(without)} elements"
             named = f" of set '{cell.set}'" if cell.set else ""
-            raise cell.location.refuse(f"{many} ({without[0].number}){named} has no section, so no material")
+            raise cell.refuse(f"{many} ({without[0].number}){named} has no section, so no material")
 
     def _check_pairs(self) -> None:
         """Refuse pairs whose surfaces or interaction are not there."""
@@ -192,9 +192,9 @@ class Building:
             secondary_group(self.found, pair.secondary, pair.location)
             self.made.faces(pair.primary, pair.location)
             if not pair.tied:
-                defined("surface interaction", pair.interaction, self.content.interactions, pair.location)
+                defined("surface interaction", pair.interaction, self.content.interactions, pair)
             if folded(pair.name) in seen:
-                raise pair.location.refuse(f"the pair {pair.name} stands there twice")
+                raise pair.refuse(f"the pair {pair.name} stands there twice")
             seen.add(folded(pair.name))
 
     def _groups(self, conditions: Conditions) -> list[tuple[str, Any, Table]]:
@@ -329,7 +329,7 @@ class Building:
     def _contact(self) -> None:
         for pair in self.content.pairs:
             secondary, primary = (group_of_surface(self.found, name) for name in (pair.secondary, pair.primary))
-            with refusing(pair.location):
+            with refusing(pair):
                 options = self._tied(pair) if pair.tied else self._options(pair)
                 if secondary in self.found.loose:
                     options.update(self._at_nodes(pair, secondary))
@@ -341,7 +341,7 @@ class Building:
         if all(map(all_nodes_carry, self.found.groups[secondary])):
             options["formulation"] = "node_to_segment"
         self.content.note(
-            pair.location, f"the nodes of surface '{pair.secondary}' make up no whole faces: they alone of the facets around "
+            pair, f"the nodes of surface '{pair.secondary}' make up no whole faces: they alone of the facets around "
             "them are in contact"
         )  # fmt: skip
         return options
@@ -355,7 +355,7 @@ class Building:
             return {**options, **cohesion_of(self.content, law), **self._fitted(pair, glued=True)}
         if law.kind != "unilateral":
             if law.friction or law.changes:
-                raise law.location.refuse(f"friction with {law.kind} contact is not supported")
+                raise law.refuse(f"friction with {law.kind} contact is not supported")
             options["kind"] = law.kind
         if law.penalty is not None and law.kind != "tied":
             options["penalty"] = law.penalty
@@ -383,13 +383,11 @@ class Building:
         size = TOUCHING * float(np.ptp(self.model.mesh.points, axis=0).max())
         if glued:
             if gaps.max() > size or pair.clearance is not None:
-                raise pair.location.refuse(
-                    f"a cohesive layer between sides that are {gaps.max():.6g} apart is not supported"
-                )
+                raise pair.refuse(f"a cohesive layer between sides that are {gaps.max():.6g} apart is not supported")
             return {}
         if pair.clearance is not None:
             if np.ptp(gaps) > size:
-                raise pair.location.refuse(
+                raise pair.refuse(
                     f"*CLEARANCE is supported between sides of one distance, these are {gaps.min():.6g} to "
                     f"{gaps.max():.6g} apart"
                 )
@@ -397,7 +395,7 @@ class Building:
         try:
             within = float(pair.adjust)
         except ValueError:
-            raise pair.location.refuse(f"ADJUST={pair.adjust[:40]}: only a distance is supported") from None
+            raise pair.refuse(f"ADJUST={pair.adjust[:40]}: only a distance is supported") from None
         moved = gaps[(gaps <= within) & (np.abs(gaps) > size)]
         if not len(moved):
             return {}
@@ -406,7 +404,7 @@ class Building:
             if np.ptp(gaps) <= size
             else f"of {moved.min():.6g} to {moved.max():.6g} at {len(moved)} nodes"
         )
-        self.content.note(pair.location, f"ADJUST: the distance {apart} of the sides counts as none")
+        self.content.note(pair, f"ADJUST: the distance {apart} of the sides counts as none")
         if np.ptp(gaps) <= size:
             return {"clearance": -float(gaps.mean())}
         nodes, closing = cKDTree(places), -np.where(gaps <= within, gaps, 0.0)
@@ -424,7 +422,7 @@ class Building:
             for track in histories.distinct():
                 instants.update(round(time, 12) for time, _ in track.points if abs(time - round(time)) > 1e-6)
         if len(instants) > LONGEST_RAMP:
-            raise steps[0].location.refuse(f"the histories have {len(instants)} corners, more than {LONGEST_RAMP}")
+            raise steps[0].refuse(f"the histories have {len(instants)} corners, more than {LONGEST_RAMP}")
         return Ramp(tuple(sorted(instants)), ((0.0, 0.0), (float(len(steps)), 1.0)))
 
 
@@ -433,14 +431,14 @@ def _friction(law: Interaction, n_steps: int) -> dict[str, Any]:
     table, sticks = [(0.0, law.friction)], {law.stick} if law.friction else set()
     for before, changed in law.changes:
         if changed.friction < 0.0 or changed.penalty is not None or changed.kind != law.kind:
-            raise changed.location.refuse("one *FRICTION must follow, and nothing else of the interaction changes")
+            raise changed.refuse("one *FRICTION must follow, and nothing else of the interaction changes")
         table += [(float(before), table[-1][1]), (before + JUMP, changed.friction)]
         sticks |= {changed.stick} if changed.friction else set()
     largest = max(value for _, value in table)
     if not largest:
         return {}
     if len(sticks) > 1:
-        raise law.changes[0][1].location.refuse("a stick slope that changes is not supported: give the same one")
+        raise law.changes[0][1].refuse("a stick slope that changes is not supported: give the same one")
     options: dict[str, Any] = {"friction": largest, "tangential_penalty": sticks.pop()}
     if law.changes:
         points = {**dict(table), float(n_steps): table[-1][1]}
@@ -455,9 +453,7 @@ def _law(content: Content, material: Material, axes: Any, modes: bool) -> Any:
     assert material.law is not None
     law, expansion = material.law(axes), material.expansion
     if isinstance(law, NonlinearElastic) and modes:
-        content.note(
-            material.location, f"material '{material.name}': incompatible modes are left out, since it is nonlinear"
-        )
+        content.note(material, f"material '{material.name}': incompatible modes are left out, since it is nonlinear")
         modes = False
     law = _with(law, incompatible_modes=modes, density=material.density)
     if content.heat or material.conductivity is not None:
@@ -465,12 +461,10 @@ def _law(content: Content, material: Material, axes: Any, modes: bool) -> Any:
     heated = content.heat or any(given.block.keyword == "TEMPERATURE" for step in content.steps for given in step.given)
     if expansion is None:
         if heated:
-            content.note(
-                material.location, f"material '{material.name}' has no *EXPANSION: temperatures do not strain it"
-            )
+            content.note(material, f"material '{material.name}' has no *EXPANSION: temperatures do not strain it")
         return _with(law, expansion=0.0) if heated else law
     if not heated:
-        content.note(material.location, f"material '{material.name}': without temperatures the expansion has no effect")
+        content.note(material, f"material '{material.name}': without temperatures the expansion has no effect")
     return _with_axes(material, law, axes, expansion=expansion)
 
 
@@ -479,10 +473,10 @@ def _conductivity(content: Content, material: Material) -> float | tuple[float, 
     block = material.conductivity
     if content.heat:
         if block is None:
-            raise material.location.refuse(f"material '{material.name}' has no *CONDUCTIVITY")
+            raise material.refuse(f"material '{material.name}' has no *CONDUCTIVITY")
         return conductivity_of(material, block)
     if block is not None:
-        content.note(block.location, f"material '{material.name}': no effect, temperatures are given, not computed")
+        content.note(block, f"material '{material.name}': no effect, temperatures are given, not computed")
     return None
 
 
@@ -500,7 +494,7 @@ def _with_axes(material: Material, law: Any, axes: Any, **constants: Any) -> Any
     """Return a material with further constants, orthotropic where these differ along the axes."""
     if isinstance(law, LinearElastic) and any(isinstance(value, tuple) for value in constants.values()):
         if isinstance(law, NonlinearElastic):
-            raise material.location.refuse(
+            raise material.refuse(
                 f"material '{material.name}': expansion and conductivity along axes are supported in elastic materials only"
             )
         G = law.E / (2.0 * (1.0 + law.nu))

@@ -128,7 +128,7 @@ class Conditions:
         block = given.block
         kind = block.get("TYPE", "DISPLACEMENT").upper()
         if kind != "DISPLACEMENT":
-            raise block.location.refuse(f"TYPE={kind} is not supported, only DISPLACEMENT")
+            raise block.refuse(f"TYPE={kind} is not supported, only DISPLACEMENT")
         if given.new:
             self.supports.forget()
             self.heat.temperatures.forget()
@@ -140,25 +140,25 @@ class Conditions:
             points = self.made.nodes(row.text(0), row.location)
             named = NAMED.get(row.text(1).upper())
             if row.text(1).upper() in ("XASYMM", "YASYMM", "ZASYMM"):
-                raise row.location.refuse(f"{row.text(1)} is not supported: give the components")
+                raise row.refuse(f"{row.text(1)} is not supported: give the components")
             first = 1 if named else row.whole(1)
             last = first if named else row.whole(2, first)
             value = 0.0 if named else row.number(3, 0.0)
             if not 1 <= first <= last <= 6:
-                raise row.location.refuse(f"components {row.text(1)} to {row.text(2)} are not within 1 to 6")
+                raise row.refuse(f"components {row.text(1)} to {row.text(2)} are not within 1 to 6")
             driven = driven or bool(before and value)
             components = named or tuple(range(first, last + 1))
             for point in points:
                 for component in components:
                     self._support(given, row, point, component, value)
         if driven:
-            self.made.content.note(block.location, "a displacement before the first step is reached in that step")
+            self.made.content.note(block, "a displacement before the first step is reached in that step")
 
     def _support(self, given: Given, row: Row, point: int, component: int, value: float) -> None:
         name = self._component(point, component)
         if name is None:
             if value:
-                raise row.location.refuse(f"component {component} does not exist at nodes of this model")
+                raise row.refuse(f"component {component} does not exist at nodes of this model")
             return
         if self.locks.take(point, component, "FIXED" in given.block.parameters):
             return
@@ -198,7 +198,7 @@ class Conditions:
             for point in self.made.nodes(row.text(0), row.location):
                 name = self._component(point, component) if 1 <= component <= 6 else None
                 if name is None:
-                    raise row.location.refuse(f"a force cannot act on component {component} of this node")
+                    raise row.refuse(f"a force cannot act on component {component} of this node")
                 self.forces.give(
                     (*name[:2], point in self.directions and component <= 3), value, given.amplitude, row.location
                 )
@@ -215,7 +215,7 @@ class Conditions:
         label = row.text(1).upper()
         if keyword == "DSLOAD":
             if label != "P":
-                raise row.location.refuse(f"load {label[:40]} on a surface is not supported, only P")
+                raise row.refuse(f"load {label[:40]} on a surface is not supported, only P")
             faces, value = self.made.faces(row.text(0), row.location), row.number(2)
             return [(Distributed(keyword, "P", face), value) for face in faces]
         elements = self.made.elements_of(row.text(0), row.location) if row.text(0) else self.made.solids
@@ -224,10 +224,8 @@ class Conditions:
             return [(Distributed(keyword, "P", face), row.number(2)) for face in facets]
         size = {"GRAV": 3, "CENTRIF": 6, "BX": 0, "BY": 0, "BZ": 0}.get(label)
         if size is None:
-            raise row.location.refuse(
-                f"load {label[:40]} is not supported; known are P1, P2, ..., GRAV, CENTRIF, BX, BY, BZ"
-            )
+            raise row.refuse(f"load {label[:40]} is not supported; known are P1, P2, ..., GRAV, CENTRIF, BX, BY, BZ")
         vector = tuple(row.number(3 + i, 0.0) for i in range(size))
         if size and not any(vector[-3:]):
-            raise row.location.refuse(f"the direction of {label} is missing")
+            raise row.refuse(f"the direction of {label} is missing")
         return [(Distributed(keyword, label, None, tuple(elements), vector), row.number(2))]

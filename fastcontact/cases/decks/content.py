@@ -8,11 +8,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from fastcontact.cases.decks.blocks import Block, Location, folded
+from fastcontact.cases.decks.blocks import Block, Located, Location, folded
 
 
 @dataclass(frozen=True, slots=True)
-class Cell:
+class Cell(Located):
     """An element: its type, the numbers of its nodes, the place of its keyword, and its line."""
 
     type: str
@@ -22,13 +22,13 @@ class Cell:
     set: str = ""
 
     @property
-    def location(self) -> Location:
+    def location(self) -> Location:  # type: ignore[override]
         """Its place."""
         return replace(self.within, line=self.line)
 
 
 @dataclass(frozen=True, slots=True)
-class Members:
+class Members(Located):
     """Entries of a set: numbers, or the name of another set, in an instance (empty: where it is defined).
 
     Numbers may be those of several lines: `lines` says where each further one begins, as place among them and line.
@@ -62,7 +62,7 @@ class Face:
 
 
 @dataclass
-class SurfaceDefinition:
+class SurfaceDefinition(Located):
     """A surface as the deck has it."""
 
     name: str
@@ -72,7 +72,7 @@ class SurfaceDefinition:
 
 
 @dataclass(frozen=True)
-class Section:
+class Section(Located):
     """Which material the elements of a set have, and how thick they are (None: not given)."""
 
     location: Location
@@ -118,7 +118,7 @@ class Instance:
 
 
 @dataclass
-class Material:
+class Material(Located):
     """A material of the deck; `law` makes one of the model from axes, None for those of the mesh."""
 
     name: str
@@ -130,7 +130,7 @@ class Material:
 
 
 @dataclass
-class Interaction:
+class Interaction(Located):
     """How surfaces touch."""
 
     name: str
@@ -146,7 +146,7 @@ class Interaction:
 
 
 @dataclass
-class Pair:
+class Pair(Located):
     """A contact pair or a tie."""
 
     location: Location
@@ -165,7 +165,7 @@ class Pair:
 
 
 @dataclass(frozen=True)
-class SectorEnds:
+class SectorEnds(Located):
     """The two ends of a sector that repeats itself round an axis: their surfaces, by the name of the tie."""
 
     location: Location
@@ -174,7 +174,7 @@ class SectorEnds:
 
 
 @dataclass(frozen=True)
-class Sectors:
+class Sectors(Located):
     """How many sectors make the whole round an axis, by two of its points, and the name of the tie of their ends."""
 
     location: Location
@@ -184,7 +184,7 @@ class Sectors:
 
 
 @dataclass(frozen=True)
-class Equation:
+class Equation(Located):
     """A linear equation: node, component and coefficient of each term."""
 
     location: Location
@@ -192,7 +192,7 @@ class Equation:
 
 
 @dataclass(frozen=True)
-class Pin:
+class Pin(Located):
     """Nodes, one or those of a set, that have the displacement of a further one, or each that of one of a further set."""
 
     location: Location
@@ -201,7 +201,7 @@ class Pin:
 
 
 @dataclass(frozen=True)
-class MultiPoint:
+class MultiPoint(Located):
     """Nodes that stay in a plane or on a line, or, with a last one for it, have a mean rotation."""
 
     location: Location
@@ -210,7 +210,7 @@ class MultiPoint:
 
 
 @dataclass(frozen=True)
-class Link:
+class Link(Located):
     """A reference node with nodes that follow it (rigid, kinematic) or whose mean motion it follows (distributing)."""
 
     location: Location
@@ -224,7 +224,7 @@ class Link:
 
 
 @dataclass(frozen=True)
-class PretensionSection:
+class PretensionSection(Located):
     """A section through a bolt: its surface, the node that has its shortening and its force, and its normal."""
 
     location: Location
@@ -234,7 +234,7 @@ class PretensionSection:
 
 
 @dataclass(frozen=True)
-class Axes:
+class Axes(Located):
     """Local axes of nodes or materials: rectangular by points of the first axis and plane, or cylindrical about a line."""
 
     location: Location
@@ -265,7 +265,7 @@ class Given:
 
 
 @dataclass(slots=True)
-class Step:
+class Step(Located):
     """A load step of the deck."""
 
     location: Location
@@ -312,6 +312,6 @@ class Content:
     notes: list[str] = field(default_factory=list)
     outputs: list[Location] = field(default_factory=list)
 
-    def note(self, location: Location, text: str) -> None:
+    def note(self, at: Location | Located, text: str) -> None:
         """Remember what a line means here, where that is not plain."""
-        self.notes.append(f"{location}: {text}")
+        self.notes.append(f"{at}: {text}")

@@ -18,7 +18,7 @@ MOST_SECTORS = 100_000
 def sector_ends(block: Block) -> SectorEnds:
     """*TIE, CYCLIC SYMMETRY: the surfaces at the two ends of a sector."""
     if len(block.rows) != 1 or len([entry for entry in block.rows[0].entries if entry]) != 2:
-        raise block.location.refuse("cyclic symmetry needs one data line with two surfaces, the ends of the sector")
+        raise block.refuse("cyclic symmetry needs one data line with two surfaces, the ends of the sector")
     row = block.rows[0]
     return SectorEnds(block.location, block.get("NAME"), (unquoted(row.text(0)), unquoted(row.text(1))))
 
@@ -27,12 +27,12 @@ def cyclic_symmetry_model(content: Content, block: Block) -> None:
     """*CYCLIC SYMMETRY MODEL: the number of sectors, and two points of the axis."""
     text = block.required("N")
     if not text.isdecimal() or not 2 <= int(text) <= MOST_SECTORS:
-        raise block.location.refuse(f"N={text[:40]}: a whole number of sectors, 2 to {MOST_SECTORS}, is needed")
+        raise block.refuse(f"N={text[:40]}: a whole number of sectors, 2 to {MOST_SECTORS}, is needed")
     if len(block.rows) != 1:
-        raise block.location.refuse("one data line with two points of the axis is needed")
+        raise block.refuse("one data line with two points of the axis is needed")
     points = tuple(block.rows[0].number(i) for i in range(6))
     if points[:3] == points[3:]:
-        raise block.location.refuse("the two points of the axis are the same")
+        raise block.refuse("the two points of the axis are the same")
     content.sectors.append(Sectors(block.location, int(text), block.get("TIE"), points))
 
 
@@ -46,20 +46,18 @@ def add_sectors(model: Model, deck_mesh: DeckMesh) -> list[MultiPointConstraint]
         first, second = np.array(sectors.points[:3]), np.array(sectors.points[3:])
         direction = (second - first) / np.linalg.norm(second - first)
         if model.mesh.dim == 2 and np.abs(direction[:2]).max() > 1e-9:
-            raise sectors.location.refuse("the axis of a plane model is along z: give two points above each other")
+            raise sectors.refuse("the axis of a plane model is along z: give two points above each other")
         for name in ends.surfaces:
             deck_mesh.made.faces(name, ends.location)
         groups = [group_of_surface(deck_mesh, name) for name in ends.surfaces]
-        with refusing(sectors.location):
+        with refusing(sectors):
             model.add_cyclic_symmetry(
                 groups[0], groups[1], sectors=sectors.count, origin=tuple(first[: model.mesh.dim].tolist()),
                 direction=tuple(direction.tolist()),
             )  # fmt: skip
     for ends in content.sector_ends:
         if id(ends) not in used:
-            raise ends.location.refuse(
-                "no *CYCLIC SYMMETRY MODEL says how many sectors there are, and round which axis"
-            )
+            raise ends.refuse("no *CYCLIC SYMMETRY MODEL says how many sectors there are, and round which axis")
     return model.relations[before:]
 
 
@@ -69,5 +67,5 @@ def _ends(content: Content, sectors: Sectors) -> SectorEnds:
     if len(named) != 1:
         known = ", ".join(ends.name or f"that of line {ends.location.line}" for ends in content.sector_ends) or "none"
         which = f"TIE={sectors.tie[:80]}" if sectors.tie else "TIE is not given"
-        raise sectors.location.refuse(f"{which}, and the ties with CYCLIC SYMMETRY are: {known}")
+        raise sectors.refuse(f"{which}, and the ties with CYCLIC SYMMETRY are: {known}")
     return named[0]

@@ -10,7 +10,7 @@ import numpy as np
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.cases.decks.assembled import Assembled, facet_points
-from fastcontact.cases.decks.blocks import Location
+from fastcontact.cases.decks.blocks import Located, Location
 from fastcontact.cases.decks.conditions import Conditions
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.cases.decks.refusals import refusing
@@ -23,7 +23,7 @@ TOUCHING = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class GapGroup:
+class GapGroup(Located):
     """Gap elements of a set.
 
     Attributes
@@ -54,7 +54,7 @@ def check_discrete(made: Assembled, kind: str, given: Mapping[str, Any], needed:
     with_one = {element for name, entry in given.items() for element in made.elements_of(name, entry[0])}
     for element in made.discrete:
         if element.cell.type == kind and element not in with_one:
-            raise element.cell.location.refuse(f"element {element.number} of type {kind} has no {needed}")
+            raise element.cell.refuse(f"element {element.number} of type {kind} has no {needed}")
 
 
 def gap_groups(deck_mesh: DeckMesh) -> list[GapGroup]:
@@ -94,7 +94,7 @@ def add_gap(model: Model, deck_mesh: DeckMesh, gap: GapGroup, conditions: Condit
     first, second = model.mesh.points[gap.ends[:, 0]], model.mesh.points[gap.ends[:, 1]]
     size = TOUCHING * float(np.ptp(model.mesh.points, axis=0).max())
     if np.ptp(first @ gap.direction) > size:
-        raise gap.location.refuse("gap elements are supported where their nodes lie in a plane across their direction")
+        raise gap.refuse("gap elements are supported where their nodes lie in a plane across their direction")
     if gap.opposite:
         between = second - first
         along = between @ gap.direction
@@ -103,10 +103,10 @@ def add_gap(model: Model, deck_mesh: DeckMesh, gap: GapGroup, conditions: Condit
             or np.abs(between - np.outer(along, gap.direction)).max() > size
             or along.mean() < -size
         ):
-            raise gap.location.refuse(
+            raise gap.refuse(
                 "gap elements between bodies are supported along their direction, in planes across it only"
             )
-        with refusing(gap.location):
+        with refusing(gap):
             model.add_contact(
                 gap.name, secondary=gap.facets, primary=gap.opposite, formulation="node_to_segment",
                 clearance=gap.clearance - float(along.mean()),
@@ -133,7 +133,7 @@ def _motion(gap: GapGroup, conditions: Conditions) -> Table:
         names = [(end, axis, False) for end in gap.ends[:, 1].tolist()]
         tables = {supports.table(name) for name in names if name in supports.tracks and name not in temporary}
         if len(tables) != 1 or not all(name in supports.tracks and name not in temporary for name in names):
-            raise gap.location.refuse(
+            raise gap.refuse(
                 "gap elements are supported to nodes that are held, or driven as one, along their direction"
             )
         by_axis.append((float(gap.direction[axis]), np.array(tables.pop())))

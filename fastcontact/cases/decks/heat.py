@@ -41,12 +41,12 @@ def conductivity(content: Content, current: Material, block: Block) -> None:
 
 def specific_heat(content: Content, current: Material, block: Block) -> None:
     """*SPECIFIC HEAT: a property that neither static nor steady steps use."""
-    content.note(block.location, f"material '{current.name}': no effect, heat is steady, or temperatures are given")
+    content.note(block, f"material '{current.name}': no effect, heat is steady, or temperatures are given")
 
 
 def physical_constants(content: Content, block: Block) -> None:
     """*PHYSICAL CONSTANTS: those of radiation, without effect."""
-    content.note(block.location, "no effect: there is no radiation")
+    content.note(block, "no effect: there is no radiation")
 
 
 def gap_conductance(content: Content, current: Interaction, block: Block) -> None:
@@ -59,15 +59,11 @@ def gap_heat_generation(content: Content, current: Interaction, block: Block) ->
     row = block.rows[0] if block.rows else Row(block.location, ())
     share, secondary = row.number(0, 1.0), row.number(1, 0.5)
     if not 0.0 <= share <= 1.0:
-        raise row.location.refuse(
-            f"the share {share:g} of the work of friction that becomes heat must lie between 0 and 1"
-        )
+        raise row.refuse(f"the share {share:g} of the work of friction that becomes heat must lie between 0 and 1")
     if secondary != 0.5:
-        raise row.location.refuse(
-            f"{secondary:g} of the heat to the secondary side is not supported, only half of it, 0.5"
-        )
+        raise row.refuse(f"{secondary:g} of the heat to the secondary side is not supported, only half of it, 0.5")
     if row.number(2, 0.0) > 0.0:
-        raise row.location.refuse("a given velocity is not supported: sides slide by their displacements")
+        raise row.refuse("a given velocity is not supported: sides slide by their displacements")
     current.friction_heat = block.location, share
 
 
@@ -77,11 +73,9 @@ def conductance_of(content: Content, law: Interaction) -> dict[str, Any]:
     for block in law.conductance:
         rows = [(row.number(1, 0.0), row.number(0)) for row in block.rows]
         if len({row.number(2, 0.0) for row in block.rows}) > 1:
-            raise block.location.refuse(
-                "a conductance that depends on the temperature is not supported: give one table"
-            )
+            raise block.refuse("a conductance that depends on the temperature is not supported: give one table")
         if not rows or any(b[0] <= a[0] for a, b in pairwise(rows)):
-            raise block.location.refuse("needs conductances with pressures or clearances that ascend")
+            raise block.refuse("needs conductances with pressures or clearances that ascend")
         if len(rows) == 1:
             tables["number"] = rows[0][1]
             continue
@@ -91,19 +85,17 @@ def conductance_of(content: Content, law: Interaction) -> dict[str, Any]:
             meant = (
                 "rises with: pressure, as in CalculiX" if by == "pressure" else "falls with: clearance, as in Abaqus"
             )
-            content.note(block.location, f"the conductance is by what it {meant}")
+            content.note(block, f"the conductance is by what it {meant}")
         end = (rows[-1][0] * BEYOND, 0.0)
         tables[by] = rows if by == "pressure" else [*rows, end]
         if by == "pressure" and content.heat == "alone":
-            content.note(
-                block.location, "steps of heat alone have no pressures: sides that touch conduct as without any"
-            )
+            content.note(block, "steps of heat alone have no pressures: sides that touch conduct as without any")
     given = tables.pop("number", None)
     if given is not None and tables:
-        raise law.conductance[0].location.refuse("one conductance, and a table besides: give one of them")
+        raise law.conductance[0].refuse("one conductance, and a table besides: give one of them")
     if given is None and not tables:
         return {}
-    with refusing(law.conductance[0].location):
+    with refusing(law.conductance[0]):
         Conductance(law.name, tables or given)
     return {"conductance": tables or given}
 
@@ -112,7 +104,7 @@ def friction_heat_of(content: Content, law: Interaction) -> dict[str, Any]:
     """Return the option by which the work of friction heats both sides, by the time of the steps."""
     if law.friction_heat is None:
         if law.conductance:
-            content.note(law.location, "friction makes no heat without *GAP HEAT GENERATION, as in CalculiX")
+            content.note(law, "friction makes no heat without *GAP HEAT GENERATION, as in CalculiX")
         return {}
     location, share = law.friction_heat
     periods = {step.period for step in content.steps}
@@ -135,21 +127,17 @@ def check_steps(content: Content) -> None:
     content.heat = first.heat if first else ""
     for number, step in enumerate(content.steps):
         if first and step.heat != first.heat and (first.heat == "alone" or number > content.steps.index(first)):
-            raise step.location.refuse(
+            raise step.refuse(
                 "steps of heat alone, of heat with displacements, and static ones after these cannot be in one deck: make "
                 "all *HEAT TRANSFER, or *COUPLED TEMPERATURE-DISPLACEMENT"
             )
         for block in (given.block for given in step.given):
             if block.keyword in OF_HEAT and not step.heat:
-                raise block.location.refuse(
-                    "heats bodies in steps with *HEAT TRANSFER or *COUPLED TEMPERATURE-DISPLACEMENT"
-                )
+                raise block.refuse("heats bodies in steps with *HEAT TRANSFER or *COUPLED TEMPERATURE-DISPLACEMENT")
             if block.keyword == "TEMPERATURE" and first:
-                raise block.location.refuse(
-                    "temperatures are computed in this deck: prescribe them by *BOUNDARY, component 11"
-                )
+                raise block.refuse("temperatures are computed in this deck: prescribe them by *BOUNDARY, component 11")
             if block.keyword in ("CLOAD", "DLOAD", "DSLOAD") and step.heat == "alone":
-                raise block.location.refuse(
+                raise block.refuse(
                     "is no load of heat: use *COUPLED TEMPERATURE-DISPLACEMENT in place of *HEAT TRANSFER"
                 )
 
@@ -214,11 +202,9 @@ class HeatConditions:
     def prescribe(self, given: Given, row: Row) -> None:
         """Prescribe the temperature of nodes by a line of *BOUNDARY."""
         if not self.made.content.heat:
-            raise row.location.refuse(
-                "component 11, the temperature, is not within 1 to 6: in static steps use *TEMPERATURE"
-            )
+            raise row.refuse("component 11, the temperature, is not within 1 to 6: in static steps use *TEMPERATURE")
         if "FIXED" in given.block.parameters:
-            raise row.location.refuse("FIXED is not supported for temperatures: give them")
+            raise row.refuse("FIXED is not supported for temperatures: give them")
         for point in self._of_solids(row):
             self.temperatures.give(point, row.number(3, 0.0), given.amplitude, row.location)
 
@@ -227,9 +213,7 @@ class HeatConditions:
         points = self.made.nodes(row.text(0), row.location)
         for point in points:
             if point not in self.made.of_solids:
-                raise row.location.refuse(
-                    f"node {self.made.number_of(point)} belongs to no solid, so it has no temperature"
-                )
+                raise row.refuse(f"node {self.made.number_of(point)} belongs to no solid, so it has no temperature")
         return points
 
     def take(self, given: Given) -> None:
@@ -242,13 +226,13 @@ class HeatConditions:
         for row in given.block.each():
             if keyword == "CFLUX":
                 if row.whole(1, TEMPERATURE) not in (0, TEMPERATURE):
-                    raise row.location.refuse(f"component {row.text(1)} is not 11, that of heat")
+                    raise row.refuse(f"component {row.text(1)} is not 11, that of heat")
                 for point in self._of_solids(row):
                     self.powers.give(point, row.number(2), given.amplitude, row.location)
                 continue
             film = history is self.films
             if film and row.number(3) < 0.0:
-                raise row.location.refuse(f"the coefficient {row.number(3):g} of the film must not be negative")
+                raise row.refuse(f"the coefficient {row.number(3):g} of the film must not be negative")
             for name in self._places(keyword, row, row.number(3) if film else None):
                 if film:
                     self._in_place_of_others(name, row)
@@ -260,7 +244,7 @@ class HeatConditions:
         before = self.film_of.get((film.keyword, film.face))
         if before is not None and before != film:
             if before in self.films.changing:
-                raise row.location.refuse(
+                raise row.refuse(
                     f"{film.coefficient:g} is the second coefficient here in one step, after {before.coefficient:g}"
                 )
             if before in self.films.tracks and self.films.tracks[before].alive:
@@ -272,7 +256,7 @@ class HeatConditions:
         label, letter = row.text(1).upper(), "S" if coefficient is None else "F"
         if keyword in ("DSFLUX", "SFILM"):
             if label != letter:
-                raise row.location.refuse(f"{label[:40]} on a surface is not supported, only {letter}")
+                raise row.refuse(f"{label[:40]} on a surface is not supported, only {letter}")
             return [Exchange(keyword, face, (), coefficient) for face in self.made.faces(row.text(0), row.location)]
         elements = self.made.elements_of(row.text(0), row.location)
         if label[:1] == letter and label[1:].isdigit():
@@ -281,7 +265,7 @@ class HeatConditions:
         if label == "BF" and keyword == "DFLUX":
             return [Exchange(keyword, None, tuple(elements))]
         known = f"{letter}1, {letter}2, ..." + (", BF" if keyword == "DFLUX" else "")
-        raise row.location.refuse(f"{label[:40]} is not supported; known are {known}")
+        raise row.refuse(f"{label[:40]} is not supported; known are {known}")
 
     def advance(self, number: int, step: Step) -> None:
         """Go on to the end of step `number`, from 1."""

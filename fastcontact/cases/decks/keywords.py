@@ -185,14 +185,14 @@ def checked(block: Block, about: str) -> Keyword:
     """
     keyword = block.keyword
     if keyword in REFUSED:
-        raise block.location.refuse(f"{about}*{keyword} {REFUSED[keyword]}")
+        raise block.refuse(f"{about}*{keyword} {REFUSED[keyword]}")
     known = TRANSLATED.get(keyword)
     if known is None:
         near = difflib.get_close_matches(keyword, [*TRANSLATED, *OUTPUT, *REFUSED, "INCLUDE"], n=1, cutoff=0.6)
         meant = f"; is *{near[0]} meant?" if near else ""
-        raise block.location.refuse(f"unknown keyword *{keyword}{meant}")
+        raise block.refuse(f"unknown keyword *{keyword}{meant}")
     for name in block.parameters:
         if known.used != ANYTHING and name not in known.parameters:
             takes = ", ".join(sorted(known.parameters)) or "none"
-            raise block.location.refuse(f"the parameter {name[:40]} of *{keyword} is not supported; it takes {takes}")
+            raise block.refuse(f"the parameter {name[:40]} of *{keyword} is not supported; it takes {takes}")
     return known

@@ -40,7 +40,7 @@ def axes_by_cell(made: Assembled, axes: Axes, members: Sequence[Element]) -> Arr
     """
     block = made.content.distributions.get(folded(axes.distribution))
     if block is None:
-        raise axes.location.refuse(f"distribution '{axes.distribution[:80]}' is not defined")
+        raise axes.refuse(f"distribution '{axes.distribution[:80]}' is not defined")
     scopes = [scope for scope in made.scopes if made.part(scope) is axes.part]
     default, given = None, {}  # type: Array | None, dict[int, Array]
     for row in block.each():
@@ -57,7 +57,7 @@ def axes_by_cell(made: Assembled, axes: Axes, members: Sequence[Element]) -> Arr
     for element in members:
         axes_here = given.get(id(element), default)
         if axes_here is None:
-            raise block.location.refuse(
+            raise block.refuse(
                 f"element {element.number} has no axes, and no line without an element gives those of others"
             )
         frames[first[element.solid.element] + element.row] = axes_here
@@ -75,6 +75,6 @@ def local_axes(axes: Axes, point: Array) -> Array:
         first, third = a, np.cross(a, b)
     lengths = np.linalg.norm(first), np.linalg.norm(third)
     if min(lengths) <= LENGTH_ROUND_OFF * max(1.0, float(np.abs(axes.points).max()) if not axes.cylindrical else 0.0):
-        raise axes.location.refuse(f"the local axes are not defined at the point {point.tolist()}")
+        raise axes.refuse(f"the local axes are not defined at the point {point.tolist()}")
     first, third = first / lengths[0], third / lengths[1]
     return np.array([first, np.cross(third, first), third])

@@ -127,22 +127,20 @@ def begun(made: Assembled) -> DeckMesh:
     CaseError if there are no solids, if elements of several kinematics are mixed, or if a plane model is not flat.
     """
     if not made.solids:
-        raise made.content.steps[0].location.refuse("the deck has no solid elements")
+        raise made.content.steps[0].refuse("the deck has no solid elements")
     first = made.solids[0].solid
     for element in made.solids:
         if element.solid.kinematics != first.kinematics:
-            raise element.cell.location.refuse(
+            raise element.cell.refuse(
                 f"elements of type {element.solid.name} and {first.name} ({first.kinematics}) cannot be in one model"
             )
         if element.solid.conducts and made.content.heat != "alone":
-            raise element.cell.location.refuse(
+            raise element.cell.refuse(
                 f"elements of type {element.solid.name} conduct heat alone: they need steps with *HEAT TRANSFER, all of them"
             )
     dim, points = 3 if first.kinematics == "3d" else 2, made.points
     if dim == 2 and np.ptp(points[:, 2]) > FLAT * np.ptp(points[:, :2]):
-        raise made.solids[0].cell.location.refuse(
-            f"elements of type {first.name} lie in the plane z = const, but z differs"
-        )
+        raise made.solids[0].cell.refuse(f"elements of type {first.name} lie in the plane z = const, but z differs")
     deck_mesh = DeckMesh(made, first.kinematics, dim)
     _name_sets(deck_mesh)
     return deck_mesh
@@ -190,7 +188,7 @@ def secondary_group(deck_mesh: DeckMesh, name: str, location: Location) -> str:
     carried = {point for face in (*whole, *further) for point in facet_points(*face)}
     for point in deck_mesh.made.surface_nodes(definition, scope):
         if point not in carried:
-            raise definition.location.refuse(
+            raise definition.refuse(
                 f"node {deck_mesh.made.number_of(point)} of surface '{definition.name}' is on no outer face of a solid: "
                 "contact needs nodes of bodies, so leave it out"
             )

@@ -21,9 +21,7 @@ def multi_point_rows(deck_mesh: DeckMesh, constraint: MultiPoint) -> list[list[T
     nodes = [*dict.fromkeys(nodes[:-1] if constraint.kind == "MEANROT" else nodes), *nodes[-1:]]
     nodes = nodes if constraint.kind == "MEANROT" else nodes[:-1]
     if len(nodes) < LEAST[constraint.kind] or deck_mesh.dim == 2:
-        raise constraint.location.refuse(
-            f"{constraint.kind} needs {LEAST[constraint.kind]} different nodes or more, in space"
-        )
+        raise constraint.refuse(f"{constraint.kind} needs {LEAST[constraint.kind]} different nodes or more, in space")
     where = deck_mesh.made.points[nodes]
     if constraint.kind == "MEANROT":
         return [_mean_rotation(constraint, nodes, where)]
@@ -35,7 +33,7 @@ def multi_point_rows(deck_mesh: DeckMesh, constraint: MultiPoint) -> list[list[T
     else:
         across = np.cross(first, where[2] - where[0])[None]
         if np.linalg.norm(across) <= FLAT * (first @ first):
-            raise constraint.location.refuse("the first three nodes of PLANE lie on a line")
+            raise constraint.refuse("the first three nodes of PLANE lie on a line")
         edges = np.array([first, where[2] - where[0]])
         inside = np.linalg.lstsq(edges.T, (where - where[0]).T, rcond=None)[0].T
         weights = np.column_stack([1.0 - inside.sum(axis=1), inside])
@@ -51,7 +49,7 @@ def multi_point_rows(deck_mesh: DeckMesh, constraint: MultiPoint) -> list[list[T
 def _directions(constraint: MultiPoint, line: Array) -> Array:
     """Return two directions (2, 3) across a line [-]."""
     if not line.any():
-        raise constraint.location.refuse("the first two nodes of STRAIGHT are at one place")
+        raise constraint.refuse("the first two nodes of STRAIGHT are at one place")
     return np.asarray(np.linalg.svd(line[None])[2][1:])
 
 
@@ -64,14 +62,14 @@ def _mean_rotation(constraint: MultiPoint, nodes: list[int], where: Array) -> li
     axis, places = where[-1], where[:-1] - where[:-1].mean(axis=0)
     length = np.linalg.norm(axis)
     if length == 0.0:
-        raise constraint.location.refuse(
+        raise constraint.refuse(
             "the coordinates of the last node of MEANROT are the direction of the axis, and all zero"
         )
     axis = axis / length
     offset = places - np.outer(places @ axis, axis)
     squared = np.einsum("nd,nd->n", offset, offset)
     if squared.min() <= FLAT * squared.max():
-        raise constraint.location.refuse("a node of MEANROT lies in the middle of the others, where it has no angle")
+        raise constraint.refuse("a node of MEANROT lies in the middle of the others, where it has no angle")
     arms = np.cross(axis, offset) / squared[:, None] / len(offset)
     arms -= arms.mean(axis=0)
     return [*_terms(nodes[:-1], arms), (nodes[-1], 0, -1.0)]

@@ -19,11 +19,11 @@ from fastcontact.model.model import Model
 def pretension_section(content: Content, block: Block) -> None:
     """*PRE-TENSION SECTION: a surface through a bolt, and the node that has its shortening and its force."""
     if len(block.rows) > 1:
-        raise block.location.refuse(f"{len(block.rows)} data lines where one is needed, the normal")
+        raise block.refuse(f"{len(block.rows)} data lines where one is needed, the normal")
     row = block.rows[0] if block.rows else None
     normal = None if row is None else (row.number(0), row.number(1, 0.0), row.number(2, 0.0))
     if normal is not None and not any(normal):
-        raise block.location.refuse("the normal has no length")
+        raise block.refuse("the normal has no length")
     content.pretensions.append(
         PretensionSection(block.location, block.required("SURFACE"), block.required("NODE"), normal)
     )
@@ -36,11 +36,9 @@ def section_points(made: Assembled) -> dict[int, PretensionSection]:
     for section in made.content.pretensions:
         point = made.node(section.node, section.location)
         if point in used:
-            raise section.location.refuse(f"node {section.node} belongs to an element: a section needs one of its own")
+            raise section.refuse(f"node {section.node} belongs to an element: a section needs one of its own")
         if point in sections:
-            raise section.location.refuse(
-                f"node {section.node} has a section already, in line {sections[point].location.line}"
-            )
+            raise section.refuse(f"node {section.node} has a section already, in line {sections[point].location.line}")
         sections[point] = section
     return sections
 
@@ -81,10 +79,10 @@ def cut_sections(deck_mesh: DeckMesh, mesh: Mesh) -> Mesh:
         deck_mesh.made.faces(section.surface, section.location)
         group = group_of_surface(deck_mesh, section.surface)
         if group in sections:
-            raise section.location.refuse(f"surface '{group}' has a pretension section already")
+            raise section.refuse(f"surface '{group}' has a pretension section already")
         sections.add(group)
         normal = None if section.normal is None else section.normal[: deck_mesh.dim]
-        with refusing(section.location):
+        with refusing(section):
             mesh = cut(mesh, group, normal)
     return mesh
 

@@ -4,32 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeVar
 
-from fastcontact.cases.decks.blocks import Location, folded
+from fastcontact.cases.decks.blocks import Located, Location, folded
 from fastcontact.errors import CaseError, FastcontactError
+
+Entry = TypeVar("Entry")
 
 
 @contextmanager
-def refusing(location: Location, about: str = "") -> Iterator[None]:
+def refusing(at: Location | Located, about: str = "") -> Iterator[None]:
     """Refuse, at a location of the deck, what the package refuses in the block; the message begins with what it is about."""
     try:
         yield
     except CaseError:  # which has a location
         raise
     except FastcontactError as error:
-        raise location.refuse(f"{about}{error}") from error
+        raise at.refuse(f"{about}{error}") from error
 
 
-def check_new(kind: str, name: str, table: Mapping[str, Any], location: Location) -> None:
-    """Refuse a name that is in a table already."""
+def registered(kind: str, name: str, table: dict[str, Entry], entry: Entry, at: Location | Located) -> Entry:
+    """Put an entry into a table by its name, and return it; refused if there is one with this name already."""
     if folded(name) in table:
-        raise location.refuse(f"{kind} '{name}' is defined twice")
+        raise at.refuse(f"{kind} '{name}' is defined twice")
+    table[folded(name)] = entry
+    return entry
 
 
-def defined(kind: str, name: str, table: Mapping[str, Any], location: Location) -> Any:
+def defined(kind: str, name: str, table: Mapping[str, Any], at: Location | Located) -> Any:
     """Return the entry of a table with a name; refused with the names of all entries if there is none."""
     if folded(name) not in table:
         known = ", ".join(entry.name for entry in table.values()) or "none"
-        raise location.refuse(f"{kind} '{name}' is not defined; {kind.rpartition(' ')[2]}s: {known}")
+        raise at.refuse(f"{kind} '{name}' is not defined; {kind.rpartition(' ')[2]}s: {known}")
     return table[folded(name)]

@@ -26,7 +26,7 @@ def make_rotations(deck_mesh: DeckMesh) -> None:
         if link.rotation:
             deck_mesh.rotations[point] = deck_mesh.made.node(link.rotation, link.location)
         elif deck_mesh.kinematics == "axisymmetric":
-            raise link.location.refuse("is not supported in axisymmetric models: relate the nodes by *EQUATION")
+            raise link.refuse("is not supported in axisymmetric models: relate the nodes by *EQUATION")
         else:
             deck_mesh.rotation(point)
 
@@ -51,11 +51,11 @@ def _equation(deck_mesh: DeckMesh, equation: Equation, axes: Mapping[int, Array]
     for name, component, coefficient in equation.terms:
         point = deck_mesh.made.node(name, equation.location)
         if not 1 <= component <= deck_mesh.dim:
-            raise equation.location.refuse(f"component {component} of '{name}' is not within 1 to {deck_mesh.dim}")
+            raise equation.refuse(f"component {component} of '{name}' is not within 1 to {deck_mesh.dim}")
         along = axes.get(point, np.eye(3))[component - 1]
         terms += [(point, axis, coefficient * along[axis]) for axis in np.flatnonzero(along[: deck_mesh.dim]).tolist()]
     if not any(coefficient for _, _, coefficient in terms):
-        raise equation.location.refuse("all coefficients of the equation are zero")
+        raise equation.refuse("all coefficients of the equation are zero")
     return terms
 
 
@@ -65,7 +65,7 @@ def _pinned(deck_mesh: DeckMesh, pin: Pin) -> list[list[Term]]:
     if len(second) == 1:
         second = second * len(first)
     if len(first) != len(second) or set(zip(first, second, strict=True)) & set(zip(second, first, strict=True)):
-        raise pin.location.refuse(
+        raise pin.refuse(
             f"'{pin.first}' and '{pin.second}' have {len(first)} and {len(second)} nodes: as many are needed, or one that "
             "leads, each another one"
         )
@@ -91,7 +91,7 @@ def _points(deck_mesh: DeckMesh, link: Link) -> list[int]:
     reference = made.node(link.reference, link.location)
     kept = sorted(set(points) - {reference, deck_mesh.rotations[reference]})
     if not kept:
-        raise link.location.refuse(f"'{link.group}' holds no nodes that could follow the reference node")
+        raise link.refuse(f"'{link.group}' holds no nodes that could follow the reference node")
     return kept
 
 
@@ -139,7 +139,7 @@ def _distributing(deck_mesh: DeckMesh, mesh: Mesh, link: Link) -> list[list[Term
     areas = Traction(_known(mesh, deck_mesh, group), {0: 1.0}, None).vector(mesh, deck_mesh.kinematics)[:, 0]
     points = np.array(_points(deck_mesh, link), np.intp)
     weight = areas[points] / areas[points].sum()
-    with refusing(link.location):
+    with refusing(link):
         rows = distributing_rows(_reference(deck_mesh, link), points, made.points[points, : deck_mesh.dim], weight)
     turns = len(rows) - deck_mesh.dim
     return rows[:turns] + _along(rows[turns:], _directions(deck_mesh, link, made.node(link.reference, link.location)))

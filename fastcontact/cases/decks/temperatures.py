@@ -23,7 +23,7 @@ def expansion(content: Content, current: Material, block: Block) -> None:
     current.expansion = along_axes(current, block)
     if "ZERO" in block.parameters:
         content.note(
-            block.location, "ZERO has no effect: strains count from the initial temperatures, coefficients are constant"
+            block, "ZERO has no effect: strains count from the initial temperatures, coefficients are constant"
         )
 
 
@@ -31,16 +31,14 @@ def along_axes(current: Material, block: Block) -> float | tuple[float, ...]:
     """Return coefficients of one temperature, one for all directions or one along each axis."""
     kind = block.choice("TYPE", tuple(COEFFICIENTS))
     if len(block.rows) != 1:
-        raise block.location.refuse(
+        raise block.refuse(
             f"material '{current.name}': {len(block.rows)} data lines where one is needed: coefficients that depend on "
             "temperatures are not supported"
         )
     row, count = block.rows[0], COEFFICIENTS[kind]
     values = tuple(row.number(index) for index in range(count))
     if any(row.entries[count + 1 :]):
-        raise row.location.refuse(
-            f"material '{current.name}': TYPE={kind} has {count} coefficients, at one temperature"
-        )
+        raise row.refuse(f"material '{current.name}': TYPE={kind} has {count} coefficients, at one temperature")
     return values[0] if kind == "ISO" else values
 
 
@@ -48,7 +46,7 @@ def conductivity_of(material: Material, block: Block) -> float | tuple[float, ..
     """Return the conductivity of a material, one or three along its axes; CaseError if one is not positive."""
     values = along_axes(material, block)
     if not np.min(values) > 0.0:
-        raise block.location.refuse(f"material '{material.name}': the conductivity {np.min(values):g} must be positive")
+        raise block.refuse(f"material '{material.name}': the conductivity {np.min(values):g} must be positive")
     return values
 
 
@@ -56,7 +54,7 @@ def initial_conditions(content: Content, block: Block) -> None:
     """*INITIAL CONDITIONS: temperatures of nodes, or stresses of elements, before the first step."""
     kind = " ".join(block.required("TYPE").upper().split())
     if kind not in ("TEMPERATURE", "STRESS"):
-        raise block.location.refuse(f"TYPE={kind[:40]} is not supported, only TEMPERATURE and STRESS")
+        raise block.refuse(f"TYPE={kind[:40]} is not supported, only TEMPERATURE and STRESS")
     (content.initial if kind == "TEMPERATURE" else content.stresses).append(block)
 
 
@@ -81,7 +79,7 @@ def _by_point(made: Assembled, block: Block) -> Iterable[tuple[int, float]]:
 
 def _of_row(made: Assembled, block: Block, row: Row) -> list[tuple[int, float]]:
     if any(row.entries[2:]):
-        raise row.location.refuse("gradients of the temperature are those of beams and shells: give one number")
+        raise row.refuse("gradients of the temperature are those of beams and shells: give one number")
     value = row.number(1)
     return [(point, value) for point in made.nodes(row.text(0), row.location)]
 

@@ -1,7 +1,7 @@
 """Segmentation of secondary faces by clipping with the primary faces, and integration over the segments (Puso, 2004).
 
-Both sides are followed along the normal of the secondary facet, so that each piece has one facet on either side.
-Curved facets are cut by their corner polygons, an error of second order in the facet's length over its radius.
+Both sides are projected along the normal of the secondary facet, so that each segment has one facet on either side.
+Curved facets are clipped as their corner polygons, an error of second order in the facet's length over its radius.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements, quadrature
 
-# How far off what faces a facet may be: in distances of the closest primary facet, and radii of the facet itself.
+# Largest distance of a facing facet: in distances of the closest primary facet, and radii of the facet itself.
 DISTANCES, RADII = 2.0, 3.0
-# Work on a secondary facet beside that on a node of a cell, for threads.
+# Work per secondary facet relative to that per node of a cell, for the choice of threads.
 EFFORT = 400
-# Highest degree in s and t together of what the mapped shape functions of a facet contain.
+# Total degree in s and t of the products of mapped shape functions of a facet.
 DEGREE = {3: 1, 4: 2, 6: 2, 8: 3, 9: 4}
 
 
@@ -42,12 +42,12 @@ def face_overlap(
     reference, deformed : ndarray (n_points, 3)
         Coordinates of all points [length].
     smoothing : Smoothing or None
-        The smooth surfaces that facets stand for, if they count.
+        The smooth surfaces that facets approximate, if they are taken into account.
 
     Raises
     ------
     ContactError
-        If a facet is too distorted to be followed.
+        If a facet is too distorted to be projected.
     """
     ours = [_Polygons.of(block, deformed) for block in secondary.blocks]
     theirs = [_Polygons.of(block, deformed) for block in primary.blocks]
@@ -79,7 +79,7 @@ def _heights(
 ) -> tuple[Array, Array, Array]:
     """Return the heights of the facets of two blocks above their planes, and the factors (n_pairs, 2) of `Smoothing.shared`.
 
-    Heights of degree zero for none; `rows` are those of the facets of the blocks, `axes` the `frames` of all.
+    Without smoothing the heights have no coefficients. `rows` are the facets of the two blocks, `axes` the `frames` of all.
     """
     if smoothing is None or axes is None:
         none = np.zeros((0, 0, 0))
@@ -108,7 +108,7 @@ class _Polygons:
 
     @classmethod
     def of(cls, block: FacetBlock, deformed: Array) -> _Polygons:
-        """Return the facets of a block where they are."""
+        """Return the deformed facets of a block."""
         nodes, count = deformed[block.facets], elements.get(block.element).n_corners
         origin, axes = np.empty((len(nodes), 3)), np.empty((len(nodes), 3, 3))
         _cut_faces_kernels.planes(nodes, count, origin, axes)
@@ -118,7 +118,7 @@ class _Polygons:
 
 
 def _facing(ours: _Polygons, theirs: _Polygons, reach: Array) -> Indices:
-    """Return the pairs of facets (n, 2) that face each other with a part, in ascending order."""
+    """Return the pairs of facets (n, 2) that overlap, in ascending order."""
     numbers = tree_order(theirs.origin, 1)
     tree = build(theirs.low[numbers], theirs.high[numbers])
     room = 8 * (len(ours.nodes) + len(theirs.nodes))
@@ -142,7 +142,7 @@ def _integrated(
     n, k = ours.block.facets.shape
     mass, integrals, closer = np.empty((n, k, k)), np.empty((len(pairs), k, other.n_nodes)), np.empty((n, k))
     degree = DEGREE[one.n_nodes] + max(DEGREE[one.n_nodes], DEGREE[other.n_nodes])
-    if one.n_nodes == other.n_nodes == 3:  # integrated without error, whichever the first corner
+    if one.n_nodes == other.n_nodes == 3:  # integrated exactly, whichever the first corner
         degree = max(degree, heights[0].shape[1])
     given = (
         np.searchsorted(pairs[:, 0], np.arange(n + 1)), ours.nodes, ours.count, ours.origin, ours.axes,

@@ -1,11 +1,11 @@
 r"""Pressure fields that remain determined by their integration points on partly covered facets.
 
-The points of a facet that faces the other side with a strip of itself hardly determine a field over all of
-it: on a strip of a fraction :math:`\theta` at the end of a line, what a polynomial of degree k is at the other end weighs
-:math:`\theta^{2k+1}`. How well a facet determines its field says the smallest eigenvalue of its mass matrix over what takes
-part, relative to that over the whole facet. Where it is too small the field is a simpler one there: linear between the
-corners of a quadratic facet, or the value that it has at the nodes which other facets determine. Fields that are constant
-over a strip remain among them, so a uniform pressure passes.
+The integration points of a facet of which only a strip faces the other side hardly determine a field over the whole facet:
+on a strip of a fraction :math:`\theta` at one end of a line, the value of a polynomial of degree k at the other end has the
+weight :math:`\theta^{2k+1}`. The measure is the smallest eigenvalue of the mass matrix over the covered part, relative to
+that over the whole facet. Where it is too small the field is simplified: linear between the corners of a quadratic facet, or
+constant from the nodes that other facets determine. Fields that are constant over a strip remain representable, so a uniform
+pressure is transmitted.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.mesh import elements
 from fastcontact.round_off import SINGLE_PRECISION
 
-# A line is determined by a seventh of it, a parabola by two fifths; values at the other end count no more than thirtyfold.
+# A seventh of the facet determines a line, two fifths a parabola; values at the other end are amplified at most thirtyfold.
 DETERMINED = 1e-3
 
 
@@ -34,7 +34,7 @@ class WholeFacets:
     ----------
     block : FacetBlock
     to_corners : ndarray (n_corners, k)
-        Corner functions by shape functions [-].
+        Coefficients of corner functions in shape functions [-].
     mass : ndarray (n_facets, k, k)
         Integrals of products of two shape functions over the facets [area].
     """
@@ -56,7 +56,7 @@ class WholeFacets:
     def degrees(self, mass: Array) -> Indices:
         """Return the degree of the field (n_facets,) that `mass` (n_facets, k, k) over the covered part determines.
 
-        2 all of it, 1 one that is linear between the corners, 0 none, -1 where nothing takes part.
+        2 for the full field, 1 for one that is linear between the corners, 0 for none, -1 where nothing takes part.
         """
         degrees = np.full(len(mass), 2)
         degrees[~mass.any(axis=(1, 2))] = -1
@@ -69,7 +69,7 @@ class WholeFacets:
 
 
 def _smallest(whole: Array, mass: Array) -> Array:
-    """Return the smallest eigenvalues (n_facets,) of mass matrices relative to those of whole facets."""
+    """Return the smallest generalised eigenvalues (n_facets,) of mass matrices relative to those of whole facets."""
     inverse = np.linalg.inv(np.linalg.cholesky(whole))
     return np.asarray(np.linalg.eigvalsh(inverse @ mass @ inverse.transpose(0, 2, 1))[:, 0])
 
@@ -77,17 +77,17 @@ def _smallest(whole: Array, mass: Array) -> Array:
 def determined(
     side: Surface, whole: list[WholeFacets], masses: list[Array], excluded: Mask
 ) -> tuple[csr_array, Indices]:
-    """Return the field at all nodes (m, k) by its independent values, and the nodes (k,) of these.
+    """Return the matrix (m, k) from the independent values of the field to all nodes, and the nodes (k,) of these values.
 
     Parameters
     ----------
     side : Surface
     whole : list of WholeFacets
-        Of each block of the side.
+        Whole facets of each block of the side.
     masses : list of ndarray (n_facets, n_nodes, n_nodes)
-        Integrals of products of two shape functions over what takes part [area].
+        Integrals of products of two shape functions over the covered part [area].
     excluded : ndarray of bool (m,)
-        Nodes that have no value of their own.
+        Nodes without an independent value.
     """
     degrees = [field.degrees(mass) for field, mass in zip(whole, masses, strict=True)]
     kept = np.zeros(len(side.points), bool)
@@ -105,7 +105,7 @@ def determined(
 
 
 def _give_each_a_value(kept: Mask, local: Indices, mass: Array, excluded: Mask) -> None:
-    """Make one node independent, in place, in facets that have none: where most of the facet takes part."""
+    """Make a node of each facet without independent ones independent, in place: where most of the facet takes part."""
     for row in np.flatnonzero(~kept[local].any(axis=1)):
         nodes = local[row]
         if not (kept[nodes].any() or excluded[nodes].all()):
@@ -115,9 +115,9 @@ def _give_each_a_value(kept: Mask, local: Indices, mass: Array, excluded: Mask) 
 def _interpolated(
     values: csr_array, whole: list[WholeFacets], degrees: list[Indices], with_value: Mask, excluded: Mask
 ) -> csr_array:
-    """Return the values (m, m) with those of nodes that are neither independent nor excluded.
+    """Return `values` (m, m), completed by rows of the nodes that are neither independent nor excluded.
 
-    Corners take the mean of the independent nodes of their facets, and other nodes what is linear between the corners.
+    Corners take the mean of the independent nodes of their facets; other nodes interpolate linearly between corners.
     """
     m = len(with_value)
     pairs = []
@@ -135,7 +135,7 @@ def _interpolated(
 
 
 def _between_corners(whole: list[WholeFacets], degrees: list[Indices], done: Mask) -> csr_array:
-    """Return the rows (m, m) of nodes between corners that are not `done` (m,): linear between those."""
+    """Return the rows (m, m) of nodes between corners that are not `done` (m,), interpolated linearly."""
     between = lil_array((len(done), len(done)))
     for field, degree in zip(whole, degrees, strict=True):
         corners = len(field.to_corners)

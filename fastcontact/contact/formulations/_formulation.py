@@ -31,12 +31,12 @@ from fastcontact.errors import ContactError, unknown
 from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
 
 SLIPS = ("symmetric", "primary")
-# Nodes on an axis or plane of symmetry stand out a little beyond facets that lean, nodes at the end of one side beyond
-# that of the other where the two strain differently, in facet lengths.
+# In facet lengths: nodes on an axis or plane of symmetry lie slightly beyond inclined facets, and nodes at the end of
+# one side beyond the end of the other where the two strain differently.
 ON_SYMMETRY = 0.05
-# In 3D a body that slides leaves edges and planes of symmetry node by node; a node that is dropped earlier comes and goes.
+# In 3D a sliding body leaves edges and planes of symmetry node by node; with a smaller tolerance pairings of nodes oscillate.
 LEAVING = 0.5
-# Sine of the angle to a plane of symmetry from which on a surface has a corner there.
+# Sine of the angle to a plane of symmetry above which a surface has a corner there.
 LEANING = 0.38
 
 
@@ -59,25 +59,25 @@ class Formulation(ABC):
     friction : float
         Coefficient of Coulomb friction, zero for none [-].
     projection_tolerance : float, optional
-        How far a point may stand out beyond the end of the primary side and still be paired, in facet lengths. A little by
-        default, lest points at the very end come and go as the bodies strain; in 3D, where sliding bodies leave edges and
-        planes of symmetry point by point, half a facet.
+        Largest distance beyond the end of the primary side at which a point is still paired, in facet lengths. Small by
+        default, so that points at the very end do not alternate as the bodies strain; half a facet in 3D, where sliding
+        bodies leave edges and planes of symmetry point by point.
     normals : str or sequence of float, optional
-        Along which the gap is measured. ``"facet"``: that of the primary facet at the projection; ``"averaged"``:
+        Normals along which the gap is measured. ``"facet"``: normal of the primary facet at the projection; ``"averaged"``:
         interpolated between nodal means. By default the former in 2D without `surface_smoothing`, and the latter in 3D,
-        where a point opposite an edge between facets often flips for ever. ``"secondary"``: opposite to the mean normal
-        of the secondary side at the point. A vector (dim,) of any length: that one for the whole primary side, out of its
+        where the pairing of a point opposite an edge may not converge. ``"secondary"``: opposite to the mean normal
+        of the secondary side at the point. A vector (dim,) of any length: one normal for the whole primary side, out of its
         body; points are projected along it.
     slip : str
-        ``"symmetric"``: closing a gap along the mean of both sides' normals is no slip. ``"primary"``: all relative motion
-        along the tangents to the primary side is, also of a gap that closes while its normal leans, as in code_aster.
+        ``"symmetric"``: closing a gap along the mean of both sides' normals is no slip. ``"primary"``: slip is all relative
+        displacement along the tangents to the primary side, also while a gap closes obliquely, as in code_aster.
     surface_smoothing : bool
-        Whether the gap is that between the smooth surfaces which straight facets of curved sides stand for, see
-        `surface_smoothing`; for mortar it is by default.
+        Whether to measure the gap between the smooth surfaces that straight facets of curved sides approximate, see
+        `surface_smoothing`; the default for mortar.
     options : PairOptions
         Options of the pair that do not depend on its formulation, e.g. its clearance.
     held : HeldMotions, optional
-        Directions in which supports and relations hold single nodes, where they are known.
+        Directions in which supports and multi-point constraints hold single nodes, where they are known.
     """
 
     secondary: Surface
@@ -121,7 +121,7 @@ class Formulation(ABC):
 
     @cached_property
     def smoothing(self) -> Smoothing | None:
-        """The smooth surfaces of both sides, where they count and differ from the facets; not along one normal for all."""
+        """The smooth surfaces of both sides; None without smoothing, on flat sides, and with one normal for all points."""
         if not self.surface_smoothing or self.options.tied or not isinstance(self.primary, Surface):
             return None
         if not isinstance(self.normals, str):
@@ -130,23 +130,23 @@ class Formulation(ABC):
 
     @property
     def slides(self) -> bool:
-        """Whether what the sides do along each other counts."""
+        """Whether tangential motion matters: friction, tying or cohesion."""
         cohesion = self.options.cohesion
         return bool(self.friction) or self.options.tied or not (cohesion is None or cohesion.reversible)
 
     @property
     def eliminable(self) -> bool:
-        """Whether iterative solvers can eliminate closed constraints; penalties, which are springs, do not prevent it."""
+        """Whether iterative solvers can eliminate closed constraints; penalties do not prevent it, since they are springs."""
         return True
 
     @property
     def faceted(self) -> bool:
-        """Whether normals are those of single facets, between which points may flip."""
+        """Whether normals are those of single facets, so that the pairing of points may alternate between two."""
         return isinstance(self.primary, Surface) and self.normals == "facet" and not self.options.tied
 
     @property
     def basis_transformation(self) -> csr_array | None:
-        """Values at mid nodes of functions that gaps are weighted with, where these are linear on quadratic facets.
+        """Values at mid nodes of the test functions of gaps, where these are linear on quadratic facets.
 
         A matrix (n_points, n_points) with rows of mid nodes and columns of corners [-]; None where there are none.
         """
@@ -162,12 +162,12 @@ class Formulation(ABC):
         """Pair the two sides and return constraints that may open and close, without penalty."""
 
     def constraints(self, at: Configuration) -> Constraints:
-        """Pair the two sides and return the constraints of the kind of contact asked for.
+        """Pair the two sides and return the constraints of the pair's kind of contact.
 
         Raises
         ------
         ContactError
-            If the pair has a penalty, and the constraints of its formulation stand for no areas.
+            If the pair has a penalty, and the constraints of its formulation have no areas.
         """
         if self.tied is not None:
             return self.tied.constraints()
@@ -183,7 +183,7 @@ class Formulation(ABC):
         if self.options.gap_only:
             return constraints.without(np.ones(len(constraints), bool))
         if self.options.search_distance is not None:
-            # Also as the step begins: what this iterate lets through by itself is not out of reach.
+            # Also at the beginning of the step: a penetration that only this iterate produces must not be ignored.
             away = np.minimum(np.abs(constraints.gaps(at.displacement)), np.abs(constraints.gaps(at.start)))
             constraints = constraints.without(away > self.options.search_distance)
         if self.options.cohesion is not None:
@@ -204,7 +204,7 @@ class Formulation(ABC):
         if normal is None and tangential is None:
             return constraints
         if areas is None:
-            raise ContactError(f"formulation '{self.name}' knows no penalty: leave out the option")
+            raise ContactError(f"formulation '{self.name}' supports no penalty: leave out the option")
         if isinstance(normal, OverclosureLaw):
             slope, without = normal.line(-constraints.gaps(at.displacement))
             constraints = replace(
@@ -218,13 +218,13 @@ class Formulation(ABC):
 
     @cached_property
     def _gaps_as_they_lie(self) -> tuple[Array, Array]:
-        """Places (m, dim) of constraints on the bodies before any load, and their gaps (m,) [length]."""
+        """Positions (m, dim) of constraints on the undeformed bodies, and their gaps (m,) [length]."""
         constraints = self.unilateral(Configuration.undeformed(self.points))
         return constraints.positions, constraints.gap0
 
     @cached_property
     def tied(self) -> TiedPair | None:
-        """The equations of a tied pair, on the bodies as they lie before any load."""
+        """The equations of a tied pair, on the undeformed bodies."""
         if not self.options.tied:
             return None
         constraints = self.unilateral(Configuration.undeformed(self.points))
@@ -245,7 +245,7 @@ class Formulation(ABC):
     def facing(self, candidates: Candidates, at: Configuration, tolerance: float | None = None) -> Pairing:
         """Return the pairing of candidates on the deformed configuration, by the options of the pair.
 
-        `tolerance` takes the place of `projection_tolerance` where it is given.
+        `tolerance` replaces `projection_tolerance` where given.
         """
         deformed = self.points + at.displacement
         beyond = self.projection_tolerance if tolerance is None else tolerance
@@ -281,7 +281,7 @@ class Formulation(ABC):
         return Constraints(B, gap0, positions, compliance, along, directions, friction, slip0, geometry=geometry)
 
     def _held_at(self, candidates: Candidates) -> Array | None:
-        """Return projectors (n, dim, dim) on the directions in which all nodes of candidates are held, None without any."""
+        """Return projectors (n, dim, dim) on the directions in which all nodes of candidates are held; None without any."""
         if self.held is None or not len(self.held.nodes) or not self.friction:
             return None
         return spanned(
@@ -306,7 +306,8 @@ class Formulation(ABC):
     ) -> tuple[tuple[csr_array, ...], Array | None]:
         """Return rows (n, n_dofs) of the slip of candidates along k tangents (n, dim), and its constant part (k, n).
 
-        The latter: what a rigid primary side moves in the step, or minus the part that closes a gap [length]; None is zero.
+        The latter is the motion of a rigid primary side in the step, or minus the part that closes a gap [length]; None
+        for zero.
         """
         along = tuple(rows_along(t, candidates, pairing, self.primary, self.points.size) for t in directions)
         slip0: Array | None = None
@@ -327,7 +328,7 @@ class Formulation(ABC):
         return added + np.where(pairing.paired, np.einsum("nk,nk->n", candidates.shape, at.worn[candidates.nodes]), 0.0)
 
     def overlap_of_smooth(self, candidates: Candidates, pairing: Pairing, at: Configuration) -> Array:
-        """Return by how much the smooth surfaces are closer than the facets at candidates (n,) with known facets [length]."""
+        """Return the reduction of the gaps (n,) of candidates by the smooth surfaces above their facets [length]."""
         closer, rows = np.zeros(len(pairing.paired)), np.flatnonzero(pairing.paired)
         if (
             self.smoothing is None
@@ -343,16 +344,17 @@ class Formulation(ABC):
         return closer
 
     def turning(self, candidates: Candidates, at: Configuration) -> Array | None:
-        """Return the displacement of the points faced by candidates due to obstacle rotation (n, dim) [length], or None."""
+        """Return the displacement (n, dim) due to obstacle rotation of the points faced by candidates [length], or None."""
         assert isinstance(self.primary, RigidSide)
         now, before = (candidates.positions(self.points + u) for u in (at.displacement, at.start))
         return self.primary.turning(now, before, at.pose, at.pose_start)
 
     def without_slip(self, at: Configuration) -> list[tuple[Array, Mask]]:
-        """Return directions (n_nodes, dim) in which both sides are held, and do not move apart, with the nodes (n_nodes,).
+        """Return directions (n_nodes, dim) in which both sides are held without relative motion, with the nodes (n_nodes,).
 
-        So it is in a plane of symmetry and on an axis: slip is zero there whatever the traction, which nothing determines.
-        Where one side is free, or driven past the other, there is friction. Facets all of whose nodes are held are left out.
+        This is the case in a plane of symmetry and on an axis: slip is zero there for every traction, so that the traction is
+        undetermined. Where one side is free, or driven past the other, friction acts. Facets with all nodes held are
+        left out.
         """
         nodes = np.flatnonzero(np.isin(self.secondary.points, () if self.held is None else self.held.nodes))
         if not len(nodes) or self.held is None:
@@ -371,13 +373,14 @@ class Formulation(ABC):
             held, motion = self.held.at(facing.nodes), (at.displacement - at.start)[facing.nodes]
             theirs[rows] = np.einsum("nk,nkde->nde", facing.shape, held)
             mean = np.einsum("nk,nkd->nd", facing.shape, motion)
-            # Where a leaning normal leads a little past a held node, what moves beside it does not count.
+            # Where an inclined normal leads slightly past a held node, the motion of the other nodes there is ignored.
             beside = np.einsum("nk,nkde,nkd->ne", facing.shape, held, motion - mean[:, None])
             moved[rows] -= mean + np.einsum("nde,ne->nd", np.linalg.pinv(theirs[rows], hermitian=True), beside)
             both = spanned(both @ theirs @ both, 0.5)
         along = np.einsum("nde,ne->nd", both, pairing.normal)
         both = without(both, pairing.normal, np.sqrt(0.5))
-        # Closing is no slip where the normal is held, too. Elsewhere it may lean, as at the edge of a plane of symmetry.
+        # Closing is no slip where the normal is held, too. Elsewhere it may be inclined, as at the edge of a plane of
+        # symmetry.
         closing = np.where(
             np.linalg.norm(along, axis=1) > np.sqrt(0.5), np.einsum("nd,nd->n", moved, pairing.normal), 0.0
         )
@@ -388,7 +391,7 @@ class Formulation(ABC):
         return alike(_without_whole_facets(held, self.secondary), self.points[self.secondary.points])
 
     def _mirrored(self, side: Surface) -> Surface:
-        """Return a side whose averaged normals are those of the whole where supports hold its edge in a plane of symmetry."""
+        """Return a side whose averaged normals are those of the full model where its edge is held in a plane of symmetry."""
         if self.held is None or not np.isin(side.points, self.held.nodes).any():
             return side
         held = _without_whole_facets(self.held.at(side.points), side)
@@ -401,11 +404,11 @@ class Formulation(ABC):
     def _closing_slip(
         self, candidates: Candidates, pairing: Pairing, directions: Sequence[Array], at: Configuration
     ) -> Array:
-        """Return the slip (k, n) to add so that closing a gap is none, though the normal leans.
+        """Return the slip (k, n) to add so that closing a gap causes none where the normal is inclined.
 
-        Where the surface bends, at the edge of the contact above all, the normal of one side leans against the direction
-        in which the gap closes, and a part of that would count as slip. Along the mean of both sides' normals mirrored
-        bodies close their gaps without any.
+        On curved surfaces, above all at the edge of the contact, the normal of one side is inclined to the direction in which
+        the gap closes, and a component of the closing motion would count as slip. Along the mean of both sides' normals,
+        mirrored bodies close their gaps without slip.
         """
         assert isinstance(self.primary, Surface)
         deformed, start = self.points + at.displacement, self.points + at.start
@@ -426,7 +429,7 @@ class Formulation(ABC):
         return slip0
 
     def first_contact(self, at: Configuration) -> tuple[Array, Array]:
-        """Return where the bodies meet first [length], and the normal faced there [-], both (dim,).
+        """Return the point of first contact [length], and the normal faced there [-], both (dim,).
 
         The secondary node with the smallest gap before any displacement of the bodies; of equally close ones that nearest to
         the origin.
@@ -442,8 +445,8 @@ class Formulation(ABC):
     ) -> tuple[Array, Array]:
         """Return the gaps (n_nodes,) of the secondary nodes [length], and the normals (n_nodes, dim) that they face [-].
 
-        Infinite where a node faces no primary facet. Clearances count unless they are left out. Where `displacement`
-        (n_points, dim) is given, the gaps are those that it leaves in the pairing of `at` [length].
+        Infinite where a node faces no primary facet. Clearances are included unless `with_clearance` is False. Where
+        `displacement` (n_points, dim) is given, the gaps are those at this displacement in the pairing of `at` [length].
         """
         nodes = Candidates.nodes_of(self.secondary)
         pairing = self.facing(nodes, at, max(self.projection_tolerance or 0.0, ON_SYMMETRY))

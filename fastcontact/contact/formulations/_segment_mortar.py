@@ -1,9 +1,9 @@
 r"""Segment-based mortar contact in the plane with a multiplier field, integrated exactly over the segments.
 
-Every secondary facet is cut in each pairing, see `_cut_lines`, and every piece gets Gauss points of its own (Puso and
-Laursen, 2004). A uniform pressure then passes between meshes that do not match without error, which neither
-node-to-segment nor quadrature over whole facets achieves. Pieces that face nothing carry nothing, and the pressure field
-is projected over the rest: where the primary surface ends inside a facet, the pressure ends there too.
+Every secondary facet is cut in each pairing, see `_cut_lines`, and every segment gets its own Gauss points (Puso and
+Laursen, 2004). A uniform pressure is then transmitted exactly between non-matching meshes, which neither node-to-segment
+contact nor quadrature over whole facets achieves. Segments that face nothing carry nothing, and the pressure field is
+projected over the others: where the primary surface ends inside a facet, the pressure ends there too.
 
 The pressure at a point and the complementarity are those of `_pressure_field`.
 """
@@ -38,7 +38,7 @@ class SegmentMortar(PressureFieldFormulation):
     Parameters
     ----------
     n_gauss : int, optional
-        Gauss points per piece; by default 3 on linear and 4 on quadratic facets.
+        Gauss points per segment; by default 3 on linear and 4 on quadratic facets.
     multipliers : str
         ``"standard"``: the multiplier field is that of the facets.
     """

@@ -1,16 +1,16 @@
 r"""Mortar contact with one weighted gap per node: :math:`\int \psi_j\, (x_s - x_p) \cdot n_j \ge 0`.
 
-The integrals run over the pieces into which the two sides cut each other (Puso, 2004; Popp, Gitterle, Gee and Wall,
-2010). A gap is divided by the weight of its :math:`\psi_j`, so that it is a length, and its multiplier is the force
-of the node's share of the pressure; the normal is the mean of those of the primary side around the node.
+The integrals run over the mortar segments of the two sides (Puso, 2004; Popp, Gitterle, Gee and Wall, 2010). A gap is divided
+by the weight of its :math:`\psi_j`, so that it is a length and its multiplier is the nodal force; the normal is the mean of
+the normals of the primary side around the node.
 
 ``"dual"`` functions are biorthogonal to the displacement of the secondary side, see `_dual_basis`: a gap involves one
-node of that side, on quadratic facets also the ends of the edge in the middle of which it lies. So constraints are
-eliminated one by one, the corners first, and the matrix stays sparse and positive definite. ``"standard"`` functions are
-linear between the corners, also on quadratic facets; only corners have gaps.
+node of that side, and for a mid node also the ends of its edge. Constraints can therefore be eliminated one by one, the
+corners first, and the matrix stays sparse and positive definite. ``"standard"`` functions are linear between the corners,
+also on quadratic facets; only corners have gaps.
 
-Against a rigid obstacle the integrals run over whole facets by Gauss points, and :math:`x_p` is the place on the obstacle
-nearest to each.
+Against a rigid obstacle the integrals use Gauss points of whole facets, and :math:`x_p` is the point of the obstacle closest
+to each.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ from fastcontact.mesh import elements
 from fastcontact.round_off import SINGLE_PRECISION, TINY
 
 MULTIPLIERS = ("standard", "dual")
-# A tangent of which less than this part, squared, is free counts as held.
+# A tangent of which a smaller fraction, squared, is free counts as held.
 FREE = 0.1
-# In facet lengths: points of facets in contact that stand out farther beyond the primary side than this do not face it.
+# In facet lengths: points of facets in contact farther beyond the end of the primary side than this do not face it.
 BESIDE = 1.0
 
 
@@ -57,8 +57,8 @@ class WeightedMortar(Formulation):
     Parameters
     ----------
     normals : str or sequence of float
-        What the normal of a node is the mean of: ``"facet"``, those of the primary facets that it faces;
-        ``"averaged"``, nodal means of them. ``"secondary"`` and vectors as in `Formulation`.
+        Normals that the normal of a node averages: ``"facet"``, those of the primary facets that it faces; ``"averaged"``,
+        their nodal means. ``"secondary"`` and vectors as in `Formulation`.
     multipliers : str
         ``"dual"`` or, between faces, ``"standard"``.
     """
@@ -85,7 +85,7 @@ class WeightedMortar(Formulation):
 
     @property
     def eliminable(self) -> bool:
-        """See `Formulation`; with a penalty, excesses at corners of quadratic facets would need unknowns of their own."""
+        """See `Formulation`; with a penalty, corner gaps of quadratic facets would need additional unknowns."""
         if self.multipliers == "dual" or self.secondary.order == 1:
             return True
         exact = self.options.penalty is None and self.options.tangential_penalty is None
@@ -110,7 +110,7 @@ class WeightedMortar(Formulation):
         return csr_array((total.data / count.data, total.indices, total.indptr), shape=shape)
 
     def _test_functions(self, name: str) -> Array:
-        """Return the non-negative functions of a facet that sum to one, by its shape functions (n_nodes, n_nodes)."""
+        """Return the non-negative functions of a facet that sum to one, as coefficients (n_nodes, n_nodes)."""
         if self.multipliers == "dual":
             return positive(name)
         element = elements.get(name)
@@ -139,7 +139,7 @@ class WeightedMortar(Formulation):
         covered = [mass.sum(axis=2) @ T.T for T, mass in zip(self._test, overlap.mass, strict=True)]
         kept = self._taking_part(covered)
         rows, across, closer = self._weighted(overlap, covered, kept)
-        # Left out as a whole: its neighbours' functions do not take over what an excluded node stands for.
+        # Left out altogether: the functions of its neighbours are not extended over the area of an excluded node.
         sums = np.where(self.options.excluded_nodes(self.secondary), 0.0, np.asarray(rows.sum(axis=1)).ravel())
         weight = np.where(sums > 0.0, sums, np.inf)
         mean = scaled(csr_array(rows - across), 1.0 / weight)
@@ -181,9 +181,9 @@ class WeightedMortar(Formulation):
         self, at: Configuration, overlap: Overlap, covered: list[Array], kept: Mask, normal: Array, weight: Array,
         multiplier: Array,
     ) -> WeightedForces:  # fmt: skip
-        """Return how contact forces and mean gaps vary; see `linearised_geometry`.
+        """Return the linearisation of contact forces and mean gaps; see `linearised_geometry`.
 
-        Over Gauss points of whole facets: where the cut runs, what is integrated is continuous.
+        Gauss points of whole facets suffice: the integrand is continuous across the cuts.
         """
         deformed, acts = self.points + at.displacement, multiplier != 0.0
         nodes, shapes, functions, tests, first = [], [], Entries(), Entries(), 0
@@ -210,7 +210,7 @@ class WeightedMortar(Formulation):
         return WeightedForces(points, weighted, mean, normal, multiplier, self._own_normals(pairing, deformed, at.pose))
 
     def _own_normals(self, pairing: Pairing, deformed: Array, pose: Pose) -> NodalNormals | Points | None:
-        """Return how the normals of the nodes vary, where they are no means over the primary side."""
+        """Return the variation of the nodal normals, where they are no means over the primary side."""
         if isinstance(self.primary, RigidSide):
             nodes = self.secondary.points[:, None]
             here, all_nodes = Candidates(nodes, np.ones(nodes.shape)), np.arange(len(nodes))
@@ -218,12 +218,12 @@ class WeightedMortar(Formulation):
         return NodalNormals(self.secondary, deformed) if self.normals == "secondary" else None
 
     def _fraction(self, number: int, covered: list[Array]) -> Array:
-        """Return what part of the weights (n_facets, k) of its functions a block faces the other side with."""
+        """Return the fraction (n_facets, k) of the weights of a block's functions that faces the other side."""
         whole = self._whole[number]
         return np.where(whole > 0.0, covered[number] / np.where(whole > 0.0, whole, 1.0), 0.0)
 
     def _slip0(self, mean: csr_array, closing: Array, directions: tuple[Array, ...], at: Configuration) -> Array:
-        """Return the slip (k, m) beside that by displacements: by a rigid obstacle, or minus the part of `closing`."""
+        """Return the slip (k, m) not due to displacements: that of a rigid obstacle, or minus that of `closing`."""
         if not isinstance(self.primary, RigidSide):
             moved = -closing if self.slip == "symmetric" else np.zeros_like(closing)
         else:
@@ -259,7 +259,7 @@ class WeightedMortar(Formulation):
     def _closing(self, part: Constraints, normal: Array, at: Configuration) -> Array:
         """Return the gaps (m, dim) that the step closes, along the directions in which closing is no slip [length].
 
-        As in `Formulation`: along the mean of both sides' normals, but along that of an obstacle.
+        As in `Formulation`: along the mean of both sides' normals, or along the normal of an obstacle.
         """
         between = normal
         if not isinstance(self.primary, RigidSide):
@@ -275,11 +275,11 @@ class WeightedMortar(Formulation):
     ) -> tuple[tuple[csr_array, ...], list[tuple[Array, Mask, csr_array]]]:  # fmt: skip
         """Return rows (m, n_dofs) of the slips along tangents (m, dim).
 
-        Mostly they are those of the `mean` relative motion. In a direction in which both sides are held at a node, as in a
-        plane of symmetry, that would be the motion of the other side beside the plane, for want of any at the node: there
-        the functions of its neighbours take the place of the node's own (`Formulation.without_slip`). For each such direction
-        (m, dim) also the matrix (m, m) of what these functions take more of the motion of the secondary nodes: on curved
-        sides these close their gaps along other normals.
+        Usually these are the rows of the `mean` relative motion. In a direction in which both sides are held at a node, as in
+        a plane of symmetry, the mean would contain only the motion of the other side beside the plane: there the functions of
+        neighbouring nodes replace the node's own (`Formulation.without_slip`). For each such direction (m, dim) the matrix
+        (m, m) of the additional motion of secondary nodes in these functions is returned, too: on curved sides they close
+        their gaps along other normals.
         """
         rows, beside = [rows_of(mean, direction) for direction in directions], []
         held = np.zeros((len(weight), *2 * self.points.shape[1:]))
@@ -302,8 +302,8 @@ class WeightedMortar(Formulation):
     def _weighted(self, overlap: Overlap, covered: list[Array], kept: Mask) -> tuple[csr_array, csr_array, Array]:
         """Return the integrals of psi with secondary and with primary shape functions, both (m, n_points) [area].
 
-        And those of psi with by how much the smooth surfaces are closer than the facets (m,) [volume].
-        `covered` are the weights (n_facets, k) of the functions of each block, `kept` (m,) the nodes with gaps.
+        The third result are the integrals of psi with the distance by which smooth surfaces are closer than facets (m,)
+        [volume]. `covered` are the weights (n_facets, k) of the functions of each block, `kept` (m,) the nodes with gaps.
         """
         size = (len(self.secondary.points), len(self.points))
         rows, across, functions = Entries(), Entries(), {}
@@ -322,7 +322,7 @@ class WeightedMortar(Formulation):
         return rows.matrix(size), across.matrix(size), closer
 
     def _functions(self, T: Array, mass: Array, kept: Mask, fraction: Array) -> tuple[Array, Array]:
-        """Return psi of facets by their shape functions, and its integrals with those, both (n_facets, k, k)."""
+        """Return the coefficients of psi in shape functions, and its integrals with these, both (n_facets, k, k)."""
         if self.multipliers == "standard":
             psi = np.where(kept[:, :, None], T, 0.0)
             return psi, psi @ mass
@@ -338,16 +338,16 @@ class WeightedMortar(Formulation):
             np.add.at(whole, block.local, full)
         enough = total > (COVERED if self.multipliers == "dual" else LEAST) * whole
         for block, weights, full in zip(self.secondary.blocks, covered, self._whole, strict=True):
-            # What a facet faces is not lost: where no node has enough, the one with most takes it.
+            # The overlap of a facet is not lost: where no node has a sufficient part, the node with the largest takes it.
             lost = ~enough[block.local].any(axis=1) & (weights.sum(axis=1) > LEAST * full.sum(axis=1))
             most = np.argmax(total[block.local[lost]], axis=1)
             rescued[block.local[lost][np.arange(len(most)), most]] = True
         return (enough | rescued) & (whole > 0.0)
 
     def _mean_normals(self, overlap: Overlap, deformed: Array, pose: Pose) -> Array:
-        """Return unit means (m, dim) of the primary normals that the nodes face; the last axis for nodes without.
+        """Return unit means (m, dim) of the primary normals that the nodes face; the last axis where there are none.
 
-        Against an obstacle the normals at the nodes themselves, which lie in planes of symmetry.
+        Against an obstacle these are the normals at the nodes themselves, which lie in planes of symmetry.
         """
         if isinstance(self.primary, RigidSide):
             _, normal, paired, _ = self.primary.facing(deformed[self.secondary.points], pose)
@@ -390,15 +390,15 @@ class WeightedPressures(NodalField):
     Attributes
     ----------
     weight : ndarray (m,)
-        Area that each gap stands for, infinite where it does nothing [area].
+        Area of each gap, infinite where it takes no part [area].
     tested : ndarray (m,)
         Integrals of the positive functions over the whole secondary side [area].
     nodal_areas : ndarray (m,)
         The same of the shape functions [area].
     quadratic : list of (int, ndarray (n_nodes, n_nodes), ndarray of int (n_facets, n_nodes))
-        Kinds of quadratic facets: number of corners, positive functions by shape functions, nodes.
+        Kinds of quadratic facets: number of corners, coefficients of positive functions in shape functions, nodes.
     held : ndarray of bool (m,)
-        Nodes that supports prescribe altogether: their forces are between supports, and say nothing of their neighbours.
+        Nodes prescribed in all directions: their forces act between supports and say nothing about those of their neighbours.
     """
 
     weight: Array
@@ -423,15 +423,15 @@ class WeightedPressures(NodalField):
     def over_whole_side(self, force: Array) -> Array:
         """Return forces over the whole areas of the positive functions; see `_at_nodes`.
 
-        A node may face the other side with as little as it likes, and its force goes to nothing with that: over what it
-        faces its pressure is nearly undetermined, over all that belongs to it it is not.
+        The part of a node's area that faces the other side may be arbitrarily small, and its force vanishes with it: per
+        facing area its pressure is nearly undetermined, per whole area it is not.
         """
         return self._at_nodes(np.divide(force, self.tested, out=np.zeros_like(force), where=self.tested > 0.0))
 
     def _at_nodes(self, coefficients: Array, only_without_gap: bool = False) -> Array:
         """Return the nodal values (m,) of a field with `coefficients` (m,) of the positive functions.
 
-        They are the coefficients themselves but for mid nodes of quadratic facets, where functions of corners are not
+        They are the coefficients themselves except at mid nodes of quadratic facets, where corner functions are not
         zero, or the only ones.
         """
         values = coefficients.copy()

@@ -14,8 +14,8 @@ from fastcontact.errors import ContactError
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 
-# A point counts as beyond the border of an open surface if it stands out farther than this part of a facet, and leans
-# by more than this over its height: borders on a plane of symmetry, where facets never stand quite upright, still hold.
+# A point counts as beyond the border of an open surface if it lies farther out than this fraction of a facet, and of its
+# height: at borders on a plane of symmetry, to which facets are never exactly perpendicular, contact is then still found.
 BEYOND, LEAN = 0.05, 0.27
 
 
@@ -25,7 +25,7 @@ class MeshedSurface:
     """A rigid surface given by a group of facets of a mesh.
 
     Normals point out of the obstacle, towards the body: to the right of a line's direction in two dimensions, to where
-    a face's nodes run counter-clockwise in three; facets on the outside of solid cells of their mesh look out of these.
+    a face's nodes run counter-clockwise in three; facets on the outside of solid cells of their mesh point out of these.
     Distances are exact, from the closest point of the facets as they are curved. Beyond the border of an open surface
     there is nothing to touch.
 
@@ -38,16 +38,16 @@ class MeshedSurface:
     flip : bool
         Whether to turn all normals round.
     crease : float
-        Facets that meet at this angle or less count as one smooth surface, whose normals turn without a jump from
-        facet to facet; at larger angles the edge is sharp [degrees]. With 0 each facet keeps its own normals.
+        Facets that meet at this angle or less count as one smooth surface, whose normals are continuous across facets; at
+        larger angles the edge is sharp [degrees]. With 0 each facet keeps its own normals.
 
     Raises
     ------
     MeshError
         If there is no such group.
     ContactError
-        If the group holds no facets, a facet has no area, facets that share an edge look to different sides, or more
-        than two share one.
+        If the group holds no facets, a facet has no area, facets that share an edge have opposite orientations, or more than
+        two share one.
 
     Examples
     --------
@@ -100,13 +100,13 @@ class MeshedSurface:
         apart = points - closest.position
         extents = [np.linalg.norm(np.ptp(block.corners, axis=1), axis=1) for block in self._facets.blocks]
         size = np.concatenate(extents)[closest.facet]
-        # There the direction to the closest point is rounding; the facet's normal takes its place.
+        # There the direction to the closest point is dominated by round-off; the facet's normal replaces it.
         touching = closest.distance <= SINGLE_PRECISION * size
         outside = np.einsum("nd,nd->n", apart, sense) >= 0
         distance = np.where(outside, closest.distance, -closest.distance)
         normal = smooth if self.crease else np.where(on_ridge[:, None], smooth, closest.normal)
         sense /= np.linalg.norm(sense, axis=1, keepdims=True)
-        # Next to a sharp edge the closest point tells the direction; the normals of either facet do not.
+        # Next to a sharp edge the direction to the closest point is the normal, not that of either facet.
         sharp = np.einsum("nd,nd->n", sense, smooth) < np.cos(np.radians(0.5 * self.crease)) - LENGTH_ROUND_OFF
         turned = on_ridge & sharp & ~touching
         normal[turned] = apart[turned] / distance[turned, None]
@@ -116,10 +116,10 @@ class MeshedSurface:
         return np.where(nothing, np.inf, distance), normal
 
     def _frames(self, closest: Closest) -> tuple[Array, Array, Mask, Mask]:
-        """Return, at projections, a vector that tells in from out (n, dim), smooth normals, what is on a ridge or border.
+        """Return pseudonormals (n, dim) at projections, smooth normals, and whether projections lie on a ridge or border.
 
-        Inside a facet its normal tells; on an edge the mean of the facets that meet there, at a corner that of all
-        facets weighted by their angles: the only ones that never err (Baerentzen and Aanaes, 2005).
+        The pseudonormal, whose sign of the distance is always right, is the normal inside a facet, the mean of the adjacent
+        facets on an edge, and the angle-weighted mean of all facets at a corner (Baerentzen and Aanaes, 2005).
         """
         sense, smooth = closest.normal.copy(), np.empty_like(closest.normal)
         on_ridge, on_border = np.zeros(len(sense), bool), np.zeros(len(sense), bool)
@@ -141,7 +141,7 @@ class MeshedSurface:
         return sense, smooth, on_ridge, on_border
 
     def _across(self, block: Block, first: int, rows: Indices, edge: Indices, xi: Array) -> Array:
-        """Return the normals (n, 3) of the facets beyond edges, at the same places; zero where there is none."""
+        """Return the normals (n, 3) of the facets beyond edges, at the same points; zero where there is none."""
         ends = np.array(block.element.edges)[edge]
         a, b = block.element.nodes[ends[:, 0]], block.element.nodes[ends[:, 1]]
         along = np.linalg.norm(xi - a, axis=1) / np.linalg.norm(b - a, axis=1)

@@ -106,7 +106,7 @@ class Sphere:
         apart = points - _vector("centre", self.centre, points.shape[1])
         length = np.linalg.norm(apart, axis=1)
         away = np.zeros_like(apart)
-        away[:, -1] = 1.0  # at the centre itself every direction leads out
+        away[:, -1] = 1.0  # at the centre itself every direction is outward
         np.divide(apart, length[:, None], out=away, where=length[:, None] > 0)
         return (self.R - length, -away) if self.hollow else (length - self.R, away)
 
@@ -251,7 +251,7 @@ class FlatPunch:
     radius : float
         [length].
     height : float
-        Of the face over the origin [length].
+        Height of the face over the origin [length].
     side : str
         ``"above"`` or ``"below"`` the body.
 

@@ -15,7 +15,7 @@ from fastcontact.contact.search.facet_tables import flat_triangles, tables
 from fastcontact.contact.search.projection_3d_kernels import Domain, Facets
 from fastcontact.errors import ContactError
 
-# So many points that follow each other in the order of the search need not be sorted among themselves.
+# Number of consecutive points in the order of the search that need not be sorted among themselves.
 TOGETHER = 16
 
 
@@ -28,7 +28,7 @@ class Closest(NamedTuple):
     facet: Indices  # (n,): row of the facet; of equally close ones the first
     xi: Array  # (n, dim - 1): reference coordinates of the projection [-]
     normal: Array  # (n, dim): unit normal of the facet there [-]
-    overhang: Array  # (n,): how far the point stands out beyond the end of its facet, in facet lengths; 0 within [-]
+    overhang: Array  # (n,): distance of the point beyond the end of its facet, in facet lengths; 0 within [-]
     position: Array  # (n, dim): the projection [length]
     distance: Array  # (n,): distance to it [length]
 

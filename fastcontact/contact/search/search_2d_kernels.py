@@ -96,7 +96,7 @@ def closest_facets(points, order, begin, end, corners, numbers, tree, result):
 
 @inlined_kernel
 def _write(closest, i, corners, f, s, x, y):
-    """Fill what is found for point `i`, at (x, y), but for the number of the facet `f`."""
+    """Fill the results for point `i`, at (x, y), except the number of the facet `f`."""
     px, py, tx, ty, _, _ = _curve(corners, f, s)
     square = tx * tx + ty * ty
     length, along = np.sqrt(square), ((x - px) * tx + (y - py) * ty) / square

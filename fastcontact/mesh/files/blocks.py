@@ -55,7 +55,7 @@ def build_mesh(
     return Mesh(_without_flat_z(places, dim), cells, cell_groups, all_point_groups)
 
 
-def check_known(foreign: Mapping[str, int], known: Iterable[str]) -> None:
+def check_kinds(foreign: Mapping[str, int], known: Iterable[str]) -> None:
     """Raise MeshError if there is any kind of cells in `foreign`, given with their numbers."""
     if foreign:
         listed = [f"{count} cells of kind {kind[:SHOWN]}" for kind, count in list(foreign.items())[:SHOWN]]

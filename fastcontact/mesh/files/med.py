@@ -17,10 +17,10 @@ from fastcontact._tools.hdf5 import attribute, check_size, opened, values
 from fastcontact._tools.hdf5_driver import new_hdf5
 from fastcontact._tools.paths import PathLike, replacing
 from fastcontact.arrays import AnyArray, Array, Indices
-from fastcontact.errors import FileError, MeshError, unknown
+from fastcontact.errors import FileError, MeshError, check_known
 from fastcontact.mesh import elements
 from fastcontact.mesh.files import med_families
-from fastcontact.mesh.files.blocks import VERTEX, Block, build_mesh, check_known
+from fastcontact.mesh.files.blocks import VERTEX, Block, build_mesh, check_kinds
 from fastcontact.mesh.files.med_families import Families, checked_name, decoded
 from fastcontact.mesh.mesh import Mesh
 
@@ -70,8 +70,7 @@ def _chosen_mesh(file: Any, path: PathLike, mesh_name: str | None) -> str:
     if not names:
         raise FileError(f"'{path}' holds no MED mesh (no entry in ENS_MAA): name a MED file that has one")
     if mesh_name is not None:
-        if mesh_name not in names:
-            raise FileError(f"'{path}': {unknown('mesh', mesh_name, names)}")
+        check_known("mesh", mesh_name, names, FileError, f"'{path}': ")
         return mesh_name
     if len(names) > 1:
         listed = ", ".join(f"'{name[:NAME_SIZE]}'" for name in names[:12]) + (", ..." if len(names) > 12 else "")
@@ -138,7 +137,7 @@ def _read_blocks(step: Any, families: Families) -> Iterator[Block]:
     folders = [step[name] for name in ("MAI", "FAC", "ARE") if name in step]
     entries = [entry for folder in folders for entry in folder.items()]
     foreign = {code: _cell_count(entry) for code, entry in entries if code not in elements.BY_MED and code != "PO1"}
-    check_known(foreign, elements.BY_MED)
+    check_kinds(foreign, elements.BY_MED)
     for code, entry in entries:
         if "NOD" not in entry:
             raise MeshError(f"its {code} cells have no nodal connectivity: write the mesh with nodal connectivity")
@@ -337,8 +336,7 @@ def read_point_field(path: PathLike, field: str) -> tuple[Array, Array, Array | 
 def _field_and_mesh(file: Any, path: PathLike, field: str) -> tuple[Any, str, Any]:
     """Return the group of a field, the name of its mesh, and the group of this, None where it is in another file."""
     names = list(file["CHA"]) if "CHA" in file else []
-    if field not in names:
-        raise FileError(f"'{path}': {unknown('field', field, names)}")
+    check_known("field", field, names, FileError, f"'{path}': ")
     name = decoded(bytes(attribute(file["CHA"][field], "MAI")))
     return file["CHA"][field], name, file.get(f"ENS_MAA/{name}")
 

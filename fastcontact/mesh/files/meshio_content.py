@@ -10,7 +10,7 @@ import numpy as np
 
 from fastcontact.arrays import AnyArray
 from fastcontact.mesh import elements
-from fastcontact.mesh.files.blocks import VERTEX, Block, build_mesh, check_known, merged, without_duplicates
+from fastcontact.mesh.files.blocks import VERTEX, Block, build_mesh, check_kinds, merged, without_duplicates
 from fastcontact.mesh.files.meshio_process import CELL_PREFIX, POINT_PREFIX, TAGS
 from fastcontact.mesh.mesh import Mesh
 
@@ -68,7 +68,7 @@ def _blocks(content: Mapping[str, Any], order: Orders) -> list[Block]:
     for kind, count, _ in content["cells"]:
         if kind not in elements.BY_MESHIO and kind != VERTEX:
             foreign[kind] = foreign.get(kind, 0) + count
-    check_known(foreign, elements.BY_MESHIO)
+    check_kinds(foreign, elements.BY_MESHIO)
     return [_block(content, index, kind, nodes, order) for index, (kind, _, nodes) in enumerate(content["cells"])]
 
 

@@ -20,7 +20,7 @@ from fastcontact.elasticity.nonlinear_materials import STRAINS
 from fastcontact.elasticity.springs import Springs, stacked
 from fastcontact.elasticity.temperature import Temperature
 from fastcontact.elasticity.varying_constants import Cells
-from fastcontact.errors import ModelError, unknown
+from fastcontact.errors import ModelError, check_known
 from fastcontact.heat.loads import Film, FixedTemperature, Heating
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
@@ -87,10 +87,8 @@ class ModelBase:
         reference_temperature: float = 0.0,
         units: str | Mapping[str, str] = "",
     ) -> None:
-        if kinematics not in KINEMATICS:
-            raise ModelError(unknown("kinematics", kinematics, KINEMATICS))
-        if strain not in STRAINS:
-            raise ModelError(unknown("strain", strain, STRAINS))
+        check_known("kinematics", kinematics, KINEMATICS, ModelError)
+        check_known("strain", strain, STRAINS, ModelError)
         if (kinematics == "3d") != (mesh.dim == 3):
             fitting = ", ".join(f"'{name}'" for name in KINEMATICS if (name == "3d") == (mesh.dim == 3))
             raise ModelError(f"kinematics '{kinematics}' do not fit a mesh in {mesh.dim} dimensions: use {fitting}")

@@ -25,7 +25,7 @@ from fastcontact.contact.pair_options import PairOptions
 from fastcontact.contact.side_checks import check_obstacle, check_sides
 from fastcontact.contact.surface import Surface, surface
 from fastcontact.elasticity.loads import Value, axes_of, check_number
-from fastcontact.errors import ContactError, ModelError, unknown
+from fastcontact.errors import ContactError, ModelError, check_known
 from fastcontact.model.contact_options import SHARED_OPTIONS, ContactOptions
 from fastcontact.model.contact_pair import ContactPair, Driving, FluidPressure, method
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
@@ -220,8 +220,7 @@ class ModelContact(ModelConnections):
         if pressure < 0.0:
             raise ModelError(f"the fluid pressure {pressure} in contact '{contact}' must not be negative")
         names = [pair.name for pair in self.contact]
-        if contact not in names:
-            raise ModelError(unknown("contact", contact, names))
+        check_known("contact", contact, names, ModelError)
         fluid = FluidPressure(float(pressure), source, table_of(ramp, f"the ramp of the fluid in contact '{contact}'"))
         index = names.index(contact)
         changed = dataclasses.replace(self.contact[index], fluid=fluid)
@@ -373,14 +372,12 @@ class ModelContact(ModelConnections):
         `held` are the motions of nodes that supports and relations prescribe, where they are known; `sectors_alike` tells
         whether pressures are the same at both ends of a sector.
         """
-        if pair.formulation not in FORMULATIONS:
-            raise ContactError(unknown("contact formulation", pair.formulation, FORMULATIONS))
+        check_known("contact formulation", pair.formulation, FORMULATIONS, ContactError)
         kind = FORMULATIONS[pair.formulation].variant(self.mesh.dim, pair.options)
         given = ("secondary", "primary", "points", "axisymmetric", "modulus", "options", "held")
         known = [*SHARED_OPTIONS, *(f.name for f in dataclasses.fields(kind) if f.init and f.name not in given)]
         for option in pair.options:
-            if option not in known:
-                raise ContactError(unknown(f"option of {pair.formulation}", option, known))
+            check_known(f"option of {pair.formulation}", option, known, ContactError)
         specific = {key: value for key, value in pair.options.items() if key not in SHARED_OPTIONS}
         check_fields(f"contact '{pair.name}'", specific, kind, ContactError)
         ends = [
