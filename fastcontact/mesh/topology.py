@@ -210,9 +210,9 @@ class OrderedLine:
 
 @typed(MeshError)
 def ordered_line(mesh: Mesh, group: str, start: str | int | None = None) -> OrderedLine:
-    """Return the nodes of a line group in order, as code_aster's NOEUD_ORDO and ABSC_CURV.
+    """Return the ordered nodes and the abscissa of a line group, like code_aster's NOEUD_ORDO and ABSC_CURV.
 
-    MeshError if the group holds no lines, branches, closes on itself, is in pieces, or `start` is not one of its ends.
+    MeshError if the group holds no lines, branches, is closed or disconnected, or `start` is not one of its ends.
 
     Parameters
     ----------

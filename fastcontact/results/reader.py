@@ -44,7 +44,7 @@ def open_results(path: PathLike) -> Results:
     Parameters
     ----------
     path : path-like
-        A file that ``ResultWriter`` wrote, or is still writing: then the steps complete by now are seen.
+        A file that ``ResultWriter`` wrote or is still writing, in which case all complete steps are visible.
 
     Returns
     -------
