@@ -38,9 +38,9 @@ class FoundContact:
     Attributes
     ----------
     name : str
-        Name of the pair: both bodies, and a number where they have several faces.
+        Name of the pair: both bodies, and a number if they have several pairs.
     bodies : (str, str)
-        The secondary and the primary body: the cell group that is all of it, or ``"body 1"`` and so on.
+        Names of the secondary and the primary body: the cell group of the body, or ``"body 1"`` and so on.
     secondary, primary : str
         Groups of facets in `FoundContacts.mesh`.
     facets : (int, int)
@@ -48,7 +48,7 @@ class FoundContact:
     spacing : (float, float)
         Distance between nodes of each side, the geometric mean over the facing part [length].
     gap : (float, float)
-        The least and the largest gap, negative where bodies overlap [length].
+        Smallest and largest gap, negative if bodies overlap [length].
     reason : str
         Why this side is the secondary one.
     """

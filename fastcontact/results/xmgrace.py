@@ -34,11 +34,11 @@ class Curve:
     Parameters
     ----------
     x, y : array_like (n,)
-        Coordinates, in the units of the axes; points with a value that is not finite are left out.
+        Coordinates, in the units of the axes; points that are not finite are omitted.
     legend : str
         Text in the legend; empty for none.
     style : {"line", "symbols", "line+symbols"}
-        A line for theory, symbols for what was computed at nodes.
+        A line for theory, symbols for nodal values.
 
     Raises
     ------

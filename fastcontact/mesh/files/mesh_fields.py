@@ -52,8 +52,8 @@ def read_field(
     Returns
     -------
     ndarray (n_cells, 1) or (n_points,)
-        Values of the solid cells of the groups, or of all points; points outside the groups have the mean value [unit
-        of the field].
+        Values [unit of the field] of the solid cells of the groups, or of all points; points outside the groups have
+        the mean.
 
     Raises
     ------
