@@ -75,9 +75,8 @@ def nodal_stress(
 ) -> Array:
     """Return the stress (n_points, n_components) [pressure] at the nodes: `nodal_average` of `stress_at_points`.
 
-    Stresses at points are computed for a few cells at a time, which takes less memory. Arguments as for
-    `stress_at_points`. With `sides` the average is over the cells of one material, (n_places, n_components) in their
-    order.
+    Arguments are as for `stress_at_points`. Stresses at points are computed for a few cells at a time, which takes less
+    memory. With `sides` the average is over the cells of one material, (n_places, n_components) in their order.
     """
     stress = CellStress(mesh, kinematics, moduli, displacement, averaged, offset)
     places = mesh.cells if sides is None else sides.cells
