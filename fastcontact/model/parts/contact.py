@@ -353,7 +353,7 @@ class ModelContact(ModelConnections):
 
     @property
     def force_driven(self) -> ForceDrivenObstacles:
-        """The rigid obstacles that forces drive."""
+        """The force-driven rigid obstacles."""
         return ForceDrivenObstacles([pair for pair in self.contact if pair.force], (self.mesh.n_points, self.mesh.dim))
 
     def _add_pair(self, pair: ContactPair) -> None:
@@ -369,8 +369,8 @@ class ModelContact(ModelConnections):
     def bind(self, pair: ContactPair, held: HeldMotions | None = None, *, sectors_alike: bool = True) -> Formulation:
         """Return the formulation of a contact pair on this mesh; see `add_contact` for the errors.
 
-        `held` are the motions of nodes that supports and relations prescribe, where they are known; `sectors_alike` tells
-        whether pressures are the same at both ends of a sector.
+        `held` are the nodal motions that supports and multi-point constraints prescribe, if known; `sectors_alike`
+        states whether pressures are equal at both ends of a sector.
         """
         check_known("contact formulation", pair.formulation, FORMULATIONS, ContactError)
         kind = FORMULATIONS[pair.formulation].variant(self.mesh.dim, pair.options)

@@ -342,7 +342,7 @@ class ModelLoads(ModelHeat):
         return by_ramp
 
     def following_pressures(self) -> list[tuple[FollowingPressure, Table | None]]:
-        """Return the pressures of finite strain, which follow the deformed surface, with their histories."""
+        """Return the follower pressures of finite strain with their histories."""
         if self.strain == "small":
             return []
         pressures = [load for load in self.loads if isinstance(load, Pressure)]
