@@ -30,12 +30,12 @@ OTHERWISE = {
     "no message: a hole opens along the axis, or nodes pass through it": (
         "a support that moves the axis of symmetry", "a radial force on the axis of symmetry",
     ),
-    "a division by zero: infinite or undefined stresses": ("nu is a half", "nu of 0.5 in a call"),
+    "a division by zero: infinite or undefined stresses": ("nu is a half", "nu of 0.5 in Python"),
     "an indefinite stiffness: a failed factorisation or a meaningless solution": (
-        "nu above a half", "nu below -1", "E is negative", "a spring that pulls backwards",
+        "nu above a half", "nu below -1", "E is negative", "a spring with negative stiffness",
     ),
     "a singular matrix, reported as a small pivot of a numbered equation": (
-        "a spring as a rigid link",        "E is zero", "E of zero in a call", "no support at all", "one body free to slide", "a plate held at one point",
+        "a spring as a rigid link",        "E is zero", "E of zero in Python", "no support at all", "one body free to slide", "a plate held at one point",
         "nodes not merged, one part not held",
     ),
     "a solution of NaN values, or the value is read as zero": (
@@ -43,7 +43,7 @@ OTHERWISE = {
     ),
     "an error of the programming language, far from the mistake": (
         "E is a string", "support value is a string", "load steps as a string", "broken load steps", "ramp is not a table",
-        "threads in words", "a function that returns the wrong shape", "coordinates in one dimension",
+        "threads as a word", "a function that returns the wrong shape", "coordinates in one dimension",
         "cells with a node too few", "theory lacks a radius", "code instead of data",
     ),
     "no message: the default is used, or nothing happens": (
@@ -57,15 +57,15 @@ OTHERWISE = {
     "an error with a list of all known words, or without a list": (
         "unknown kinematics", "formulation misspelled", "unknown theory", "theory of no contact",
         "theory of a pair that was forgotten", "check of an unknown probe", "check of an unknown quantity",
-        "unknown linear solver", "unknown command", "mesh maker misspelled", "unknown parameter of a sweep",
+        "unknown linear solver", "unknown command", "mesh generator misspelled", "unknown parameter of a sweep",
         "a linear solver that is not there",
     ),
     "an error in the assembly, or a third coordinate that is dropped silently": (
-        "3D model of a plane mesh", "3D mesh for an axisymmetric model", "the file has a mesh in space",
+        "3D model of a plane mesh", "3D mesh for an axisymmetric model", "the file has a 3D mesh",
         "component that a plane mesh lacks", "a support in z of a plane model",
     ),
     "the job ends successfully, with displacements of 1e10 or NaN": (
-        "one body is not held", "no body is held", "bodies that hang together at one node",
+        "one body is not held", "no body is held", "bodies connected at a single node",
     ),
     "no message: the last value is used, or both are added": ("supports contradict", "supports that contradict each other"),
     "no message: no node is ever in contact, and the bodies pass through each other": (
@@ -74,15 +74,15 @@ OTHERWISE = {
     ),
     "an error about the type of an element": (
         "contact side is a solid", "pressure on a solid", "a pressure on points", "a body force on facets",
-        "contact inside a body", "the file has lines only", "a mesh of facets only", "faces in space for a solid",
+        "contact inside a body", "the file has lines only", "a mesh of facets only", "3D faces without solids",
     ),
     "nodes are tied to themselves: a singular matrix, or bodies that stick together": (
         "both sides are the same", "sides share nodes", "one group on both sides", "sides that overlap",
     ),
     "the number is used: the solution does not converge or is wrong": (
         "friction is negative", "friction that is negative", "tolerance is negative", "a penalty of zero",
-        "theory with nu above a half", "size of a mesh is negative", "a tolerance that lets anything pass", "a criterion of zero",
-        "a criterion that lets anything pass",
+        "theory with nu above a half", "size of a mesh is negative", "a tolerance that accepts everything", "a criterion of zero",
+        "a criterion that accepts everything",
         "a negative limit of updates", "a negative number of halvings", "a negative number of updates",
         "tied with a penalty",
     ),
@@ -105,16 +105,16 @@ OTHERWISE = {
     ),
     "negative volumes: a stiffness that is too small or indefinite, often without a message": (
         "the mesh in the file lies at r < 0", "the mesh in the file is folded", "nodes at r < 0", "an inverted cell",
-        "a folded cell", "a folded mesh in space whose cells were turned", "a cell in the file is flat", "a degenerate cell",
+        "a folded cell", "a folded 3D mesh with reoriented cells", "a cell in the file is flat", "a degenerate cell",
     ),
     "no message: the body is twice as stiff there": (
-        "a cell in the file stands there twice", "a cell stands there twice",
+        "a duplicate cell in the file", "a duplicate cell",
     ),
     "an invalid memory access: a crash, or arbitrary numbers": (
         "a cell names a point that is not there", "a group names a cell that is not there",
     ),
     "no message, or a line in a long list: the body has a crack": (
-        "nodes that were not merged", "nodes were not merged", "nodes nearly lie where others are",
+        "nodes that were not merged", "nodes were not merged", "nodes nearly coincide",
         "a fine mesh merged with a coarse one",
     ),
     "no message: stresses are wrong near the cell": (
@@ -127,7 +127,7 @@ OTHERWISE = {
     "no message: pressures follow the facets, not the curve": ("pressures that follow facets instead of arcs",),
     "no message: programs do not know units, and results are wrong by a factor of a thousand or a million": (
         "E of one body in Pa, of the other in MPa", "E in Pa where MPa is named", "E in GPa where Pa is named",
-        "units that do not fit each other", "E in Pa with a force and mm", "a pressure in Pa with E in MPa",
+        "inconsistent units", "E in Pa with a force and mm", "a pressure in Pa with E in MPa",
         "a displacement in mm of a model in m", "E is in Pa where the case names MPa",
         "the loads are in another unit than E",
     ),
@@ -169,7 +169,7 @@ OTHERWISE = {
         "a contact group lacks facets", "a contact group against an obstacle lacks facets",
     ),
     "no message: the result of another problem than the intended one": (
-        "friction in percent", "bodies begin deeper inside each other than they are pushed",
+        "friction in percent", "the initial penetration exceeds the prescribed approach",
         "a load without a ramp beside one that has one",
     ),
 }  # fmt: skip
