@@ -30,11 +30,11 @@ class FastcontactError(Exception):
 
 
 class MeshError(FastcontactError):
-    """The mesh cannot be used: a bad cell, a missing group, a wrong number."""
+    """The mesh cannot be used: an invalid cell, a missing group, a wrong number."""
 
 
 class ModelError(FastcontactError):
-    """The model is incomplete or contradicts itself (materials, supports, loads)."""
+    """The model is incomplete or contradictory (materials, supports, loads)."""
 
 
 class ContactError(FastcontactError):
@@ -57,7 +57,7 @@ class ConvergenceError(FastcontactError):
     history : list of dict
         One entry per iteration of the failed step: residual, active constraints, displacement change.
     smaller_steps_help : bool
-        Whether the step may converge in parts.
+        Whether smaller load steps may converge.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class ConvergenceError(FastcontactError):
 
 
 class FastcontactWarning(UserWarning):
-    """Something doubtful about a model or its result, with its number."""
+    """A doubtful model or result; the message states a number."""
 
     def __str__(self) -> str:
         return printable(super().__str__())

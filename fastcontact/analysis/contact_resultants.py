@@ -71,16 +71,17 @@ class ContactResultants:
     Attributes
     ----------
     force : ndarray (dim,)
-        On the secondary side [force].
+        Resultant force on the secondary side [force].
     normal_force : float
-        Sum of the normal components of the nodal forces, whatever their directions [force]. Multiplied by a coefficient of
-        friction, it is what a press fit holds, where the vector sum cancels.
+        Sum of the nodal forces, each along its own normal [force]. Multiplied by the coefficient of friction, it is
+        the friction capacity of a press fit, whose resultant force vanishes.
     moment : ndarray (1,) or (3,)
         Moment of the contact forces about the middle of the contact, see `contact_moment`; zero in axisymmetry
         [force times length].
     area : float
-        Area of contact: tributary areas of the closed nodes, in finite strain on the deformed facets; in the plane a length
-        times unit thickness, in axisymmetry of the full circle [length^2]. Accurate to a row of facets at the edge.
+        Contact area: sum of the tributary areas of the closed nodes, in finite strain on the deformed facets; in the
+        plane a length times unit thickness, in axisymmetry over the full circle [length^2]. Accurate to a row of
+        facets at the edge.
     centre : ndarray (dim,)
         Centre of pressure of the normal forces; NaN without contact [length]. In axisymmetry it lies on the axis, and its
         radial component is NaN.

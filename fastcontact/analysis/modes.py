@@ -50,34 +50,34 @@ def modes(
     nodal_diameters: int | str | Sequence[int] | None = None,
     linear_solver: str = "auto",
 ) -> Modes:
-    """Return the lowest frequencies and shapes of small vibrations, about a settled load step or at rest.
+    """Return the lowest natural frequencies and mode shapes about the equilibrium of a load step, or at rest.
 
-    What contact has closed stays closed, what sticks does not slip, what slides or is open is free; supports, relations,
-    couplings and springs hold, with what they prescribe kept, and pretension sections keep their length. Stresses of the step
-    stiffen, as in a string, or soften; at finite strains the bodies are those deformed, and pressures follow them. Obstacles
-    that forces drive have no mass.
+    Closed nodes remain closed, sticking nodes do not slip, sliding nodes are free along the surface, and open nodes
+    are free. Supports, multi-point constraints, couplings and springs act with their prescribed values, and pretension
+    sections keep their length. The stresses of the step stiffen or soften the bodies; in finite strain the modes are
+    those of the deformed bodies under follower pressures. Force-driven obstacles have no mass.
 
     Parameters
     ----------
     model : Model
-        Its materials need densities. Free bodies are fine.
+        Its materials need densities. Bodies may be free.
     step : StepResult, optional
-        Of this model, from `solve` or a result file. Without one the model is at rest and without stress, and contact holds
-        nothing but tied and bilateral pairs.
+        A step of this model, from `solve` or a result file. Without it the model is free of stress, and only tied and
+        bilateral pairs connect bodies.
     n : int
-        How many, of each number of nodal diameters; modes in pairs count once.
+        Number of modes, for each number of nodal diameters; a pair of modes counts once.
     stress_stiffening : bool
-        Whether stresses of the step count.
+        Whether to include the stresses of the step.
     hold_sliding : bool
-        Whether nodes that slide in the step are held along the surface, too, as friction does as soon as small motions turn
-        the slip round. Without, what friction alone holds and slides everywhere, as a bolt that is pressed on all round may,
-        is free to turn.
+        Whether to treat nodes that slide in the step as sticking, as friction does when a vibration reverses the slip.
+        Otherwise a body that slides along its whole circumference, such as a tightened bolt, is free to rotate.
     nodal_diameters : int, sequence of int or "all", optional
-        Of the whole ring that a model with one cyclic symmetry stands for: from 0 to half the number of sectors. Modes are
-        then those of the ring: all but those of 0 and of half the sectors come in pairs of one frequency. Without, motions
-        are alike in all sectors, as of 0 nodal diameters; a warning tells so.
+        Numbers of nodal diameters of the whole ring, for a model with one cyclic symmetry: from 0 to half the number
+        of sectors. The modes are then those of the ring; except for 0 and half the number of sectors they occur in
+        pairs of equal frequency. By default the motion is the same in all sectors, as with 0 nodal diameters, and a
+        warning is given.
     linear_solver : str
-        As for `solve`: by factors the Lanczos method, by multigrid conjugate gradients (LOBPCG).
+        As for `solve`: the Lanczos method with a direct solver, conjugate gradients (LOBPCG) with multigrid.
 
     Returns
     -------
@@ -86,10 +86,10 @@ def modes(
     Raises
     ------
     ModelError
-        If a density is missing, the step is of another mesh or of bodies that yield, the step is not stable, or there are
-        fewer than n modes.
+        If a density is missing, the step belongs to another mesh, bodies yield, the equilibrium is unstable, or there
+        are fewer than n modes.
     ConvergenceError
-        If the iteration does not end.
+        If the eigenvalue iteration does not converge.
 
     Examples
     --------

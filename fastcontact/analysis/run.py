@@ -76,7 +76,7 @@ def solve(
     Warns
     -----
     FastcontactWarning
-        What is doubtful about the model and, at the end, about the result, with numbers; steps keep the messages.
+        If the model or, at the end, the result is doubtful; each warning states a number and is stored in the steps.
 
     Examples
     --------
@@ -129,11 +129,11 @@ def solve_steps(
     criteria: Criteria | None = None,
     resume: Sequence[StepResult] = (),
 ) -> Iterator[StepResult]:
-    """Solve a model step by step: a new step is computed when it is asked for, and none is kept.
+    """Solve a model step by step: each step is computed when it is requested, and none is kept.
 
-    Of a long analysis `solve` returns all steps, 80 bytes a point and step in 2D, 120 in 3D. Here what the caller keeps
-    stays in memory, and an analysis may be ended at any step. Parameters, errors and warnings are those of `solve`; a
-    wrong model is told at once.
+    `solve` returns all steps, which take 80 bytes per point and step in 2D, 120 in 3D. Here only the steps that the
+    caller keeps stay in memory, and the analysis may be stopped after any step. Parameters, errors and warnings are those
+    of `solve`; an invalid model is refused at once.
 
     Returns
     -------

@@ -21,8 +21,9 @@ from fastcontact.results.step import StepResult
 def support_forces(model: Model, step: StepResult) -> dict[str, Array]:
     """Return the resultant support force of each group with supports.
 
-    Unlike `StepResult.reaction`, it excludes the forces of multi-point constraints and of springs to the ground. A component
-    that several groups support at a node is counted for the first of them, so that the sum over the groups is complete.
+    Unlike `StepResult.reaction`, it excludes the forces of multi-point constraints and of springs to the ground. A
+    component that several groups support at a node is assigned to the first of them, so that the sum over the groups
+    is complete.
 
     Parameters
     ----------
@@ -88,7 +89,7 @@ def multipliers(reaction: Array, rows: Sequence[csr_array], held: Mask) -> list[
 
 @typed(ModelError)
 def spring_forces(model: Model, step: StepResult) -> dict[str, Array]:
-    """Return the tension (m,) in springs by name, such as ``"spring on 'TOP'"`` [force].
+    """Return the tensions (m,) of the springs by name, such as ``"spring on 'TOP'"`` [force].
 
     Parameters
     ----------

@@ -81,9 +81,9 @@ class _PartialSlip:
 class CattaneoMindlinLine(_PartialSlip):
     """Two cylinders under a normal and a tangential force per unit length (Cattaneo 1938; Mindlin 1949).
 
-    Formulas as in Johnson (1985), section 7.2(a). Fields are Coulomb's coefficient `friction`, the present
-    `tangential_force` and the largest so far, `tangential_force_peak`, equal while loading [force/length], and the normal
-    contact `normal`, a `HertzLine`.
+    Formulas as in Johnson (1985), section 7.2(a). Fields are the coefficient of friction `friction`, the current
+    `tangential_force` and the largest one so far, `tangential_force_peak`, which are equal during loading
+    [force/length], and the normal contact `normal`, a `HertzLine`.
     """
 
     normal: HertzLine

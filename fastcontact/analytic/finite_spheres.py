@@ -29,7 +29,7 @@ class FiniteHalfSpheres:
     E, R : float
         Young's modulus [pressure] and radius [length] of both; nu is 0.3.
     approach, force : float
-        Approach of the two flat faces, which may slide sideways [length]; force over the full circle [force].
+        Approach of the two flat faces, which are free to move sideways [length]; force over the full circle [force].
     pressure_max, radius : float
         Pressure at the centre per reference area [pressure], contact radius on the reference geometry [length].
     """

@@ -154,14 +154,14 @@ def thick_sphere(
 
 @dataclass(frozen=True)
 class PressFit:
-    """An inner body pressed into an outer one.
+    """Press fit of an inner body in an outer one.
 
-    Radii are nominal: the interference is taken to be small against them.
+    Radii are nominal: the interference is assumed to be small.
 
     Attributes
     ----------
     interference, pressure : float
-        Radius of the inner body less that of the hole, before fitting [length]; contact pressure [pressure].
+        Radius of the inner body minus that of the hole, before fitting [length]; contact pressure [pressure].
     inner, outer : LameShell
         The two bodies, with their displacements and stresses.
     """
@@ -198,7 +198,7 @@ def press_fit_cylinders(
     inner_radius, interface_radius, outer_radius : float
         Radii, increasing; `inner_radius` 0 is a solid shaft [length].
     interference : float
-        Radius of the shaft less that of the hole [length].
+        Radius of the shaft minus that of the hole [length].
     kinematics : str
         "plane_strain" or "plane_stress"; the latter also holds for long cylinders with free ends.
 

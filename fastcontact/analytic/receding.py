@@ -21,12 +21,12 @@ _LARGEST_LOAD = 10.0  # half-width of the load over thickness
 class RecedingLayer:
     """Contact of a layer under a strip load with a half plane (Keer, Dundurs and Tsai 1972).
 
-    The contact does not depend on the size of the force.
+    The contact width does not depend on the force.
 
     Attributes
     ----------
     thickness, load_half_width : float
-        Thickness of the layer, on whose top the force is spread evenly over ``|x| <= load_half_width`` [length].
+        Thickness of the layer, and half-width of the uniform load ``|x| <= load_half_width`` on its top [length].
     force, radius : float
         Force per unit length [force/length], and half-width c of the contact [length].
     series : tuple of float
@@ -41,7 +41,7 @@ class RecedingLayer:
 
     @property
     def half_width(self) -> float:
-        """Half-width c of the contact, another word for `radius` [length]."""
+        """Half-width c of the contact, an alias of `radius` [length]."""
         return self.radius
 
     @property
@@ -136,7 +136,7 @@ def receding_layer(
     thickness, force : float
         Thickness of the layer [length], and force per unit length [force/length].
     load_half_width : float
-        The force is spread evenly over ``|x| <= load_half_width``, at most ten thicknesses; 0 is a line force [length].
+        Half-width of the uniform load, at most ten thicknesses; 0 is a line force [length].
     kinematics : str
         "plane_strain" or "plane_stress".
 

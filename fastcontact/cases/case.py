@@ -53,21 +53,21 @@ class Case:
     probes : dict of str to int
         Point number by probe name.
     theories : dict of str to dict
-        By contact pair: ``"theory"`` and, where given, ``"mesh_converged"``, objects of `fastcontact.analytic`; and
-        ``"share"``, the part of the theory's contact that the model holds: 0.25 for a quarter of it.
+        By contact pair: ``"theory"`` and optionally ``"mesh_converged"``, objects of `fastcontact.analytic`; and
+        ``"share"``, the modelled fraction of the theory's contact, e.g. 0.25 for a quarter.
     checks : list of Check
     units : dict of str to str
         Names of the units of length, force and pressure, for labels.
     approach : dict of str to float
-        Approach of the theory by contact pair, where it was given [length].
+        Approach of the theory by contact pair, if given [length].
     folder : pathlib.Path
-        In which the files lie that the case names, absolute.
+        Folder of the files that the case names, absolute.
     sensitivities : list of (tuple, list of tuple)
         Quantities and their parameters, see `fastcontact.sensitivities`.
     modes : dict, optional
-        Arguments of `fastcontact.modes` about the last step; None where none are asked for.
+        Arguments of `fastcontact.modes` about the last step; None without ``[modes]``.
     deck : Deck, optional
-        The input deck of which the case was made.
+        The input deck from which the case was built.
     """
 
     name: str
@@ -90,7 +90,7 @@ class Case:
     deck: Deck | None = None
 
     def finished(self, step: StepResult) -> StepResult:
-        """Return a step of the model as results have it: of a deck with forces of the whole thickness."""
+        """Return a step of the model as in results; for a deck with forces for the whole thickness."""
         return step if self.deck is None else self.deck.finished(step)
 
 
@@ -100,9 +100,9 @@ def read_case(path: str | Path) -> Case:
     Raises
     ------
     CaseError
-        If the file is missing, no TOML, or has an unknown key or a wrong value; the message names file and key.
+        If the file is missing, is not TOML, or has an unknown key or an invalid value; the message names file and key.
     FastcontactError
-        If its mesh or model is wrong.
+        If its mesh or model is invalid.
     """
     path = case_path(path)
     if path.suffix.lower() == DECK:
@@ -185,9 +185,9 @@ def build_case(
 ) -> Case:
     """Build a case from the parsed data of a case file, as `tomllib` returns them.
 
-    Its mesh file lies relative to `folder`; a `mesh` replaces the one that ``[mesh]`` names. Result files keep the `text`;
-    studies take it too, or make one of the data.
-    Raises CaseError if a key is unknown or a value wrong, FastcontactError if the mesh or the model is wrong.
+    The path of its mesh file is relative to `folder`; `mesh` replaces the mesh of ``[mesh]``. Result files and studies
+    store `text`; studies otherwise generate it from the data. CaseError if a key is unknown or a value invalid,
+    FastcontactError if the mesh or the model is invalid.
     """
     check_keys("", data, {**TOP, **dict.fromkeys(LISTS, list)})
     check_settings(data)

@@ -88,29 +88,31 @@ OF_PROBES: dict[str, tuple[str, Callable[[StepResult, int], Any]]] = {
 
 @dataclass(frozen=True)
 class Check:
-    """A comparison of a number of the last step with a theory or a documented value.
+    """Comparison of a number of the last step with a theory or a documented value.
 
     Attributes
     ----------
     name, quantity : str
         `quantity` is ``"PROBE.pressure"``, ``"PROBE.shear"``, ``"PROBE.von_mises"``, ``"PROBE.stress.yy"`` or
         ``"PROBE.displacement.x"``; or ``"PAIR.force"`` and its component ``"PAIR.force.x"``, on the secondary side;
-        ``"PAIR.pressure_max"``; ``"PAIR.radius"`` or ``"PAIR.stick_radius"``, in the middle of their brackets;
-        ``"PAIR.moment.z"`` about the middle of the contact; ``"PAIR.torque"`` of a turning obstacle about its axis;
-        ``"PAIR.wear_max"``, the deepest wear; ``"PAIR.heat"`` that crosses to the primary side, and ``"PROBE.temperature"``.
+        ``"PAIR.pressure_max"``; ``"PAIR.radius"`` or ``"PAIR.stick_radius"``, the mean of their brackets;
+        ``"PAIR.moment.z"`` about the middle of the contact; ``"PAIR.torque"`` of a rotating obstacle about its axis;
+        ``"PAIR.wear_max"``, the largest depth of wear; ``"PAIR.heat"``, the heat flow to the primary side; and
+        ``"PROBE.temperature"``.
     tolerance : float
-        Of the relative deviation.
+        Largest admissible relative deviation.
     theory : str
-        Contact pair whose theory has the target; empty for a documented value.
+        Contact pair whose theory provides the target; empty for a documented value.
     of : str
-        Name of the target in the theory, such as ``"stick_radius"`` or ``"normal.pressure_max"``. The target of a
-        stress is minus the number, since pressures are positive in compression.
+        Name of the target in the theory, such as ``"stick_radius"`` or ``"normal.pressure_max"``. For a stress, the
+        sign of the target is reversed, since pressures are positive in compression.
     value : float, optional
         The documented value.
     source : str
-        Where that is documented.
+        Source of the documented value.
     factor : float
-        What the number is multiplied with first; by default 4 for the force on a quarter of the theory's contact.
+        Factor by which the number is multiplied first; by default e.g. 4 for the force on a quarter of the theory's
+        contact.
     """
 
     name: str
@@ -136,7 +138,7 @@ class Check:
         return -number if ".stress." in self.quantity and self.theory else number
 
     def described(self) -> str:
-        """Return what is compared with what, in one line."""
+        """Return a description of the comparison in one line."""
         source = f" ({self.source})" if self.source else ""
         against = f"the theory's {self.of}" if self.theory else f"{self.value:g}{source}"
         return f"{self.quantity} against {against} within {self.tolerance:g}"

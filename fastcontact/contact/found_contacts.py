@@ -38,9 +38,9 @@ class FoundContact:
     Attributes
     ----------
     name : str
-        Name of the pair: both bodies, and a number where they have several faces.
+        Name of the pair: both bodies, and a number if they have several pairs.
     bodies : (str, str)
-        The secondary and the primary body: the cell group that is all of it, or ``"body 1"`` and so on.
+        Names of the secondary and the primary body: the cell group of the body, or ``"body 1"`` and so on.
     secondary, primary : str
         Groups of facets in `FoundContacts.mesh`.
     facets : (int, int)
@@ -48,7 +48,7 @@ class FoundContact:
     spacing : (float, float)
         Distance between nodes of each side, the geometric mean over the facing part [length].
     gap : (float, float)
-        The least and the largest gap, negative where bodies overlap [length].
+        Smallest and largest gap, negative if bodies overlap [length].
     reason : str
         Why this side is the secondary one.
     """
@@ -129,13 +129,13 @@ def find_contacts(
     groups: Sequence[str] | None = None,
     moduli: Mapping[str, ArrayLike] | None = None,
 ) -> FoundContacts:
-    """Find the surfaces of different bodies that face each other, and which side of each pair should be the secondary one.
+    """Find the surfaces of different bodies that face each other, and choose the secondary side of each pair.
 
     Sample points of all outer facets are projected on the closest facet of all other bodies. Two facets face each other
-    if the distance along their normals is small enough and the normals are opposed. A secondary body whose facing
-    surface has corners of 45 degrees or more gets one pair for each smooth face, since a side of a pair has one normal
-    at each node. The secondary side is the one with the finer mesh; of equally fine ones that of the softer body, else
-    the smaller one.
+    if the distance along their normals is small enough and the normals are opposed. A surface with corners of 45
+    degrees or more is split into one pair for each smooth face, since a side of a pair has one normal at each node.
+    The secondary side is the one with the finer mesh; between equally fine sides it is that of the softer body,
+    otherwise the smaller one.
 
     Parameters
     ----------
@@ -144,22 +144,22 @@ def find_contacts(
         Largest gap or overlap [length]. By default smooth faces of two bodies form a pair if their distance is somewhere
         at most the size of the larger of two facets; the pair extends as far as their normals are opposed.
     angle : float
-        By how much normals may differ from opposite ones, more than 0 and less than 90 [degrees].
+        Largest deviation of the normals from opposite directions, more than 0 and less than 90 [degrees].
     groups : sequence of str, optional
-        Groups of solid cells that are bodies, by default all sets of cells that nodes connect. Between the cells of one body
-        there is no contact.
+        Groups of solid cells that form the bodies; by default the connected sets of cells. Self-contact of a body is
+        not searched.
     moduli : mapping of str to array_like (n_cells,), optional
         Moduli of the solid cells, by element [pressure]; `Model.add_contacts` takes them from the materials.
 
     Returns
     -------
     FoundContacts
-        Its mesh has groups for both sides of every pair.
+        Their mesh has groups for both sides of every pair.
 
     Raises
     ------
     ContactError
-        If a number does not fit, groups share cells, or a group holds no solid cells.
+        If a number is out of range, groups share cells, or a group holds no solid cells.
 
     Examples
     --------

@@ -33,34 +33,34 @@ SYMMETRIC = 1e-9
 
 @dataclass(frozen=True)
 class Orthotropic(Material):
-    """Orthotropic linear elasticity: wood, rolled sheet, a laminate, a composite.
+    """Orthotropic linear elasticity, for wood, rolled sheet, laminates and composites.
 
-    ModelError, with the condition that is broken, unless the elastic energy is positive for any strain.
+    ModelError, with the violated condition, unless the elastic energy is positive for every strain.
 
     Parameters
     ----------
     E : (float, float, float)
-        Young's moduli E1, E2, E3 along the material's axes [pressure]. Each of these, of nu and of G may also be a function
-        or an array where it varies, as E of `LinearElastic`.
+        Young's moduli E1, E2, E3 along the material axes [pressure]. Like E of `LinearElastic`, each of these, of nu
+        and of G may be a function or an array.
     nu : (float, float, float)
-        Poisson's ratios nu12, nu13, nu23 [-]: nu12 is minus the strain along 2 over that along 1, for a stress along 1.
-        The others follow: nu21 = nu12 E2 / E1.
+        Poisson's ratios nu12, nu13, nu23 [-]: nu12 is minus the strain along 2 divided by that along 1 under a
+        uniaxial stress along 1; nu21 = nu12 E2 / E1.
     G : (float, float, float)
         Shear moduli G12, G13, G23 [pressure].
     axes : sequence or callable, optional
-        The material's axes, by default those of the mesh (in axisymmetry: radius, axis, circumference). Two or three vectors
-        (x, y, z) at right angles, of any length; in the plane also the first one, (x, y), alone. Or a function from
-        positions (n, dim) [length] to unit vectors in rows (n, 3, 3), such as `CylindricalAxes`, taken at the quadrature
-        points of each cell. Or an array (n_cells, 3, 3) of such vectors for each cell of the material or of the mesh.
+        Material axes, by default those of the mesh (in axisymmetry: radius, axis, circumference): two or three
+        orthogonal vectors (x, y, z) of any length, in the plane also the first one, (x, y), alone; a function from
+        positions (n, dim) [length] to unit vectors in rows (n, 3, 3), such as `CylindricalAxes`, evaluated at the
+        quadrature points; or an array (n_cells, 3, 3) for the cells of the material or of the mesh.
     density : float, callable or ndarray (n,), optional
         Mass per volume [mass / length^3].
     expansion : float, callable, ndarray (n,) or three of them, optional
-        Coefficients of thermal expansion, one for all or one along each axis [1 / temperature]; functions or arrays where
-        they vary.
+        Coefficients of thermal expansion, one for all or one along each axis [1 / temperature]; numbers, functions or
+        arrays.
     incompatible_modes : bool
-        As of `LinearElastic`; by default cells have them.
+        As of `LinearElastic`, but by default True.
     conductivity : float, callable, ndarray (n,) or three of them, optional
-        Of heat, one for all or one along each axis [power / (length temperature)].
+        Thermal conductivity, one for all or one along each axis [power / (length temperature)].
 
     Notes
     -----
@@ -109,14 +109,14 @@ class Orthotropic(Material):
         density: Constant | None = None,
         expansion: Constant | Sequence[Constant] | None = None,
     ) -> Orthotropic:
-        """Return a material that is isotropic across its first axis, such as one with fibres along it.
+        """Return a transversely isotropic material, such as one with fibres along its first axis.
 
         Parameters
         ----------
         E_along, E_across : float
             Young's moduli along the first axis and across it [pressure].
         nu_along : float
-            Minus the strain across over that along the first axis, for a stress along it [-].
+            Minus the strain across divided by that along the first axis, under a uniaxial stress along it [-].
         nu_across : float
             Poisson's ratio in the plane of isotropy [-]; its shear modulus is E_across / (2 (1 + nu_across)).
         G_along : float
@@ -169,14 +169,15 @@ class Orthotropic(Material):
 
 @dataclass(frozen=True)
 class Anisotropic(Material):
-    """Linear elasticity with any moduli.
+    """Anisotropic linear elasticity.
 
     ModelError unless the matrix is symmetric and positive definite.
 
     Parameters
     ----------
     D : array_like (6, 6)
-        Stresses 11, 22, 33, 12, 23, 13 of strains 11, 22, 33, 2*12, 2*23, 2*13 in the material's axes [pressure].
+        Stiffness matrix from strains 11, 22, 33, 2*12, 2*23, 2*13 to stresses 11, 22, 33, 12, 23, 13 in the material
+        axes [pressure].
     axes : sequence or callable, optional
         As of `Orthotropic`: unit vectors in rows (3, 3) [-], or a function.
     density : float, callable or ndarray (n,), optional

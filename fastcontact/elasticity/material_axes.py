@@ -22,8 +22,8 @@ PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 class CylindricalAxes:
     """Material axes around a line: 1 radial, 2 tangential, 3 along the line.
 
-    In the plane, the line crosses it at `origin`. In axisymmetry, the line is the axis: give ``direction=(0, 1, 0)``.
-    ModelError if a vector has not three components, or the direction no length.
+    In the plane, the line crosses the plane at `origin`. In axisymmetry, the line must be the axis: ``direction=(0, 1,
+    0)``. ModelError if a vector does not have three components, or the direction is zero.
 
     Parameters
     ----------

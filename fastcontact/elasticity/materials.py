@@ -336,26 +336,27 @@ class LinearElastic(Material):
     Parameters
     ----------
     E : float, callable or ndarray (n,)
-        Young's modulus [pressure], positive. Where it varies, a function from positions (n, dim) [length] to numbers (n,),
-        such as `Tabulated`; or an array, with a number for each solid cell of the groups that have the material, for each of
-        the mesh, in the order of ``mesh.solids``, or for each point of the mesh. A column (n, 1) is always one for cells.
+        Young's modulus [pressure], positive: a number; a function from positions (n, dim) [length] to numbers (n,),
+        such as `Tabulated`; or an array with a number for each solid cell of the groups of the material, for each
+        solid cell of the mesh, in the order of ``mesh.solids``, or for each point of the mesh. A column (n, 1) always
+        refers to cells.
     nu : float, callable or ndarray (n,)
-        Poisson's ratio, -1 < nu < 0.5 [-]; as E.
+        Poisson's ratio, -1 < nu < 0.5 [-]; like E.
     volumetric : str
-        How elements take the dilatation, the change of volume: ``"plain"`` as it is; ``"mean_dilatation"`` its mean in
-        each quadrangle, hexahedron, wedge and pyramid (in quadratic ones a linear function), so that they do not lock
-        where the material is nearly incompressible. ``"auto"``: the latter from nu = 0.49 on. Nothing changes in
-        triangles and tetrahedra, and in plane stress.
+        Treatment of the dilatation: ``"plain"`` uses the full dilatation; ``"mean_dilatation"`` projects it on its
+        mean in each quadrangle, hexahedron, wedge and pyramid (in quadratic ones on a linear function), so that they
+        do not lock if the material is nearly incompressible; ``"auto"`` selects the latter from nu = 0.49 on. It has
+        no effect on linear triangles and tetrahedra and in plane stress.
     density : float, callable or ndarray (n,), optional
-        Mass per volume [mass / length^3], for gravity and centrifugal loads; zero or more; as E.
+        Mass per volume [mass / length^3], for gravity, centrifugal loads and modes; zero or more; like E.
     expansion : float, callable or ndarray (n,), optional
-        Coefficient of thermal expansion [1 / temperature]; as E.
+        Coefficient of thermal expansion [1 / temperature]; like E.
     incompatible_modes : bool
-        Whether linear quadrangles and hexahedra have incompatible modes, so that thin parts of them bend without locking in
-        shear, and do not lock in volume either; nothing changes in other elements and in axisymmetry. Where they have them
-        they have no mean dilatation. They cost three times the assembly and ten times the recovery of stress.
+        Whether linear quadrangles and hexahedra have incompatible modes, which avoid shear locking in bending and
+        volumetric locking, in place of a mean dilatation. It has no effect on other elements and in axisymmetry.
+        Assembly then costs three times and stress recovery ten times as much.
     conductivity : float, callable or ndarray (n,), optional
-        Of heat [power / (length temperature)], positive; as E.
+        Thermal conductivity [power / (length temperature)], positive; like E.
 
     Examples
     --------

@@ -68,16 +68,17 @@ class ElasticPlastic(NonlinearElastic):
     E, nu : float
         Young's modulus [pressure] and Poisson's ratio [-].
     yield_stress : float
-        In uniaxial tension, before any plastic strain [pressure].
+        Initial yield stress in uniaxial tension [pressure].
     hardening : sequence of (float, float)
-        Isotropic hardening: equivalent plastic strains [-], ascending from zero, and yield stresses there [pressure], linear
-        in between and constant beyond the last; none by default, which is perfect plasticity. The first pair may be left out:
-        it is (0, `yield_stress`).
+        Isotropic hardening: pairs of equivalent plastic strain [-], ascending from zero, and yield stress [pressure],
+        interpolated linearly and constant beyond the last; by default perfect plasticity. The first pair, (0,
+        `yield_stress`), may be omitted.
     kinematic : float
         Modulus of linear kinematic hardening: slope of the stress over the plastic strain in uniaxial tension (Prager,
         1956) [pressure].
     volumetric : str
-        As of `LinearElastic`; ``"auto"`` projects the dilatation wherever elements can, since plastic flow keeps the volume.
+        As of `LinearElastic`; ``"auto"`` always projects the dilatation, if the element allows it, since plastic flow
+        preserves the volume.
     density, expansion, conductivity : float, optional
         As of `LinearElastic`.
 
@@ -170,7 +171,8 @@ class NeoHookean(Hyperelastic):
     Parameters
     ----------
     E, nu : float
-        Young's modulus [pressure] and Poisson's ratio [-] of small strains: mu = E / (2 (1 + nu)), K = E / (3 (1 - 2 nu)).
+        Young's modulus [pressure] and Poisson's ratio [-] at small strains: mu = E / (2 (1 + nu)), K = E / (3 (1 - 2
+        nu)).
     volumetric, density, expansion, conductivity
         As of `LinearElastic`: from nu = 0.49 on the dilatation is projected, so that elements do not lock.
 
@@ -220,7 +222,7 @@ class MooneyRivlin(Polynomial):
     Parameters
     ----------
     C10, C01 : float
-        [pressure]; the shear modulus of small strains is 2 (C10 + C01).
+        Constants [pressure]; the shear modulus at small strains is 2 (C10 + C01).
     bulk : float
         Bulk modulus K [pressure].
     volumetric, density, expansion, conductivity
@@ -257,7 +259,7 @@ class Yeoh(Polynomial):
     Parameters
     ----------
     C10, C20, C30 : float
-        [pressure]; the shear modulus of small strains is 2 C10.
+        Constants [pressure]; the shear modulus at small strains is 2 C10.
     bulk : float
         Bulk modulus K [pressure].
     volumetric, density, expansion, conductivity
@@ -295,7 +297,7 @@ class Ogden(Hyperelastic):
     Parameters
     ----------
     mu : float or sequence of float
-        Of each term [pressure]; their sum is the shear modulus of small strains.
+        Modulus of each term [pressure]; the sum is the shear modulus at small strains.
     alpha : float or sequence of float
         Exponents [-], none of them zero.
     bulk : float

@@ -50,10 +50,10 @@ def stress_at_points(
     displacement : ndarray (n_points, dim)
         Of all points [length].
     averaged : ndarray of bool (n_materials,), optional
-        Which materials have a mean dilatation, see `dilatation`, or incompatible modes (`MaterialField.treatment`); none by
-        default.
+        Materials with a mean dilatation, see `dilatation`, or incompatible modes (`MaterialField.treatment`); by
+        default none.
     offset : StressOffset, optional
-        What stresses have by temperature and initial states.
+        Stresses due to temperatures and initial states.
     """
     stress = CellStress(mesh, kinematics, moduli, displacement, averaged, offset)
     return {
@@ -75,8 +75,8 @@ def nodal_stress(
 ) -> Array:
     """Return the stress (n_points, n_components) [pressure] at the nodes: `nodal_average` of `stress_at_points`.
 
-    Stresses at points are computed for a few cells at a time, to save memory. Arguments as for `stress_at_points`.
-    With `sides` the average is over the cells of one material, (n_places, n_components) in their order.
+    Arguments are as for `stress_at_points`. Stresses at points are computed for a few cells at a time, which takes less
+    memory. With `sides` the average is over the cells of one material, (n_places, n_components) in their order.
     """
     stress = CellStress(mesh, kinematics, moduli, displacement, averaged, offset)
     places = mesh.cells if sides is None else sides.cells
@@ -128,7 +128,7 @@ class NodalAverage:
 def stress_at_element_nodes(at_points: dict[str, Array]) -> dict[str, Array]:
     """Return by solid element the stress (n_cells, n_nodes, n_components) [pressure] at the nodes of each cell.
 
-    By `Element.extrapolation` from `at_points` (n_cells, n_q, n_components) [pressure], as SIEF_ELNO of code_aster.
+    By `Element.extrapolation` from `at_points` (n_cells, n_q, n_components) [pressure], like SIEF_ELNO of code_aster.
     """
     return {
         name: np.einsum("aq,cqi->cai", elements.get(name).extrapolation, values) for name, values in at_points.items()
@@ -187,7 +187,7 @@ def _with_components(stress: Array) -> Array:
 
 @typed(ModelError)
 def equivalent_strain(strain: Array) -> Array:
-    """Return the equivalent strain (...) [-] of `strain` (..., n_components) [-], of an isotropic material von Mises / 3 G.
+    """Return the equivalent strain (...) [-] of `strain` (..., n_components) [-], the von Mises stress over 3 G if isotropic.
 
     Components xx, yy, zz, 2xy, in 3D also 2yz, 2xz.
     """

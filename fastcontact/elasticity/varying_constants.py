@@ -24,17 +24,17 @@ AXES = ("x", "y", "z", "radius")
 @typed(ModelError)
 @dataclass(frozen=True)
 class Tabulated:
-    """A function of one coordinate, by a table: straight between its places, constant before the first and after the last.
+    """A tabulated function of one coordinate: piecewise linear, and constant beyond both ends.
 
-    For material constants, temperatures, pressures and other values that may be functions of the position.
-    ModelError unless places and values are finite numbers, and places ascend.
+    For material constants, temperatures, pressures and other values that may be functions of position. ModelError
+    unless coordinates and values are finite and coordinates ascend.
 
     Parameters
     ----------
     along : str
-        ``"x"``, ``"y"``, ``"z"``, or ``"radius"``: the distance from the axis z, in the plane from the origin.
+        ``"x"``, ``"y"``, ``"z"``, or ``"radius"``, the distance from the z axis, in the plane from the origin.
     table : sequence of (float, float)
-        Place [length] and value [unit of the quantity] in each row.
+        Coordinate [length] and value [unit of the quantity] in each row.
 
     Examples
     --------

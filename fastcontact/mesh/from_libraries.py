@@ -29,7 +29,7 @@ def from_meshio(mesh: Any) -> Mesh:
     """Return the mesh that meshio holds, with its groups.
 
     Groups are its cell and point sets, the tags of Gmsh and Medit, and arrays of 0 and 1 called ``cell_group:...`` and
-    ``point_group:...``. Cells that are inside out are turned; a flat mesh in 3D coordinates becomes a 2D one.
+    ``point_group:...``. Inverted cells are reoriented; a flat mesh in 3D coordinates becomes a 2D one.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def from_meshio(mesh: Any) -> Mesh:
     Raises
     ------
     MeshError
-        If it has no cells, or of a kind that fastcontact does not know, or its arrays do not fit together.
+        If it has no cells or unknown cells, or its arrays are inconsistent.
 
     Examples
     --------
@@ -61,9 +61,9 @@ def from_meshio(mesh: Any) -> Mesh:
 def from_pyvista(grid: Any) -> Mesh:
     """Return the cells of a PyVista data set as a mesh, with its groups.
 
-    Groups are its arrays of truth values, by their names, and those of 0 and 1 called ``cell_group:...``,
-    ``point_group:...`` (mesh files) or ``group_...`` (result files). Cells that are inside out are turned; a flat mesh in 3D
-    coordinates becomes a 2D one. Surfaces of a solid are no cells of such a data set: see `Mesh.with_facet_group`.
+    Groups are its boolean arrays, and arrays of 0 and 1 called ``cell_group:...``, ``point_group:...`` (mesh files) or
+    ``group_...`` (result files). Inverted cells are reoriented; a flat mesh in 3D coordinates becomes a 2D one. Such a
+    data set has no facet cells on the surface of a solid; `Mesh.with_facet_group` adds them.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def from_pyvista(grid: Any) -> Mesh:
     Raises
     ------
     MeshError
-        If it has no cells, or of a kind that fastcontact does not know.
+        If it has no cells or unknown cells.
 
     Examples
     --------
@@ -106,20 +106,20 @@ def from_pyvista(grid: Any) -> Mesh:
 def from_gmsh() -> Mesh:
     """Return the mesh of the model that is open in gmsh, with its physical groups.
 
-    As in Gmsh's own files, cells that belong to no physical group are left out if there are any groups. Cells that are inside
-    out are turned; a flat mesh in 3D coordinates becomes a 2D one.
+    As in files of Gmsh, cells without a physical group are omitted if there are any groups. Inverted cells are
+    reoriented; a flat mesh in 3D coordinates becomes a 2D one.
 
     Raises
     ------
     FileError
         If the package gmsh is not installed.
     MeshError
-        If no model is open, or it has no mesh yet, or cells that fastcontact does not know.
+        If no model is open, it has no mesh, or it has unknown cells.
 
     Warns
     -----
     FastcontactWarning
-        If solid cells are left out, with their number.
+        If solid cells are omitted, with their number.
 
     Examples
     --------

@@ -61,7 +61,7 @@ class MeshQuality:
 
 @typed(MeshError)
 def quality(mesh: Mesh) -> MeshQuality:
-    """Return the quality figures of a mesh.
+    """Return quality measures of a mesh.
 
     Examples
     --------

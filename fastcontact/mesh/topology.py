@@ -49,11 +49,11 @@ def corner_volumes(mesh: Mesh, name: str) -> Array:
 
 @typed(MeshError)
 def oriented(mesh: Mesh) -> tuple[Mesh, int]:
-    """Return the mesh with every solid cell oriented as it should be, and how many cells were turned.
+    """Return the mesh with all solid cells oriented, and the number of reoriented cells.
 
-    Two-dimensional cells run counter-clockwise; in three dimensions the normals of facets point outward. MeshError if a
-    cell that was inside out lies on the same side of a facet as its neighbour: the mesh is folded there, and turning the
-    cell would hide that.
+    Two-dimensional cells run counter-clockwise; in three dimensions the normals of facets point outward. MeshError if
+    an inverted cell lies on the same side of a facet as its neighbour: the mesh is folded there, and reorienting the
+    cell would hide this.
     """
     measure = corner_areas if mesh.dim == 2 else corner_volumes
     cells, turned = dict(mesh.cells), 0
@@ -210,9 +210,9 @@ class OrderedLine:
 
 @typed(MeshError)
 def ordered_line(mesh: Mesh, group: str, start: str | int | None = None) -> OrderedLine:
-    """Return the nodes of a line group in order, as code_aster's NOEUD_ORDO and ABSC_CURV.
+    """Return the ordered nodes and the abscissa of a line group, like code_aster's NOEUD_ORDO and ABSC_CURV.
 
-    MeshError if the group holds no lines, branches, closes on itself, is in pieces, or `start` is not one of its ends.
+    MeshError if the group holds no lines, branches, is closed or disconnected, or `start` is not one of its ends.
 
     Parameters
     ----------

@@ -44,10 +44,11 @@ PUBLIC = (
 class Model(ModelSupports):
     """An elastic contact problem.
 
-    Methods check what they are given at once, and `check` the whole: a MeshError, ModelError or ContactError says in one
-    line what is wrong and how to mend it. Prescribed values are numbers, or functions from reference positions (n, dim)
-    [length] to numbers (n,). A `ramp` is a history of its own, as pairs (instant, multiplier) or a `Ramp`, whose table
-    counts; without one the history is that of the analysis. Normals and areas are those of the reference configuration.
+    Methods check their arguments, and `check` checks the whole model: a MeshError, ModelError or ContactError states
+    in one line the cause and the remedy. Prescribed values are numbers, or functions from reference positions (n, dim)
+    [length] to numbers (n,). A `ramp` is a separate history, as pairs (instant, multiplier) or a `Ramp`, whose table
+    is used; by default the history is that of the analysis. Normals and areas are those of the reference
+    configuration.
 
     Parameters
     ----------
@@ -58,15 +59,16 @@ class Model(ModelSupports):
     case_text : str
         Text kept in result files beside the numbers, usually the case file.
     strain : {"small", "finite"}
-        ``"finite"``: the bodies may stretch and turn (total Lagrangian): `NeoHookean` and its like, and `LinearElastic` as
-        Saint Venant-Kirchhoff's law, for small strains under large rotations. Pressures follow the deformed surface, other
-        loads keep their directions and reference areas; stresses are Cauchy's.
+        ``"finite"``: finite strains and rotations (total Lagrangian), with hyperelastic materials such as
+        `NeoHookean`, or with `LinearElastic` as the Saint Venant-Kirchhoff law for small strains and large rotations.
+        Pressures follow the deformed surface, other loads keep their directions and reference areas; stresses are
+        Cauchy stresses.
     reference_temperature : float
-        Where heat is conducted: of the bodies before any load, without thermal strain [temperature].
+        With heat conduction, the initial temperature of the bodies, without thermal strain [temperature].
     units : str or mapping of str to str
-        Names of the units of length, force and pressure that all numbers are in, ``"mm, N, MPa"``, or by ``"length"``,
-        ``"force"``, ``"pressure"``: tables, reports, pictures and result files show them, a warning tells if force / length^2
-        is no pressure. They change no number, and none need be given.
+        Names of the units of length, force and pressure, ``"mm, N, MPa"``, or by ``"length"``, ``"force"``,
+        ``"pressure"``. Tables, reports, pictures and result files show them, and a warning is given if force /
+        length^2 is not the unit of pressure. They are optional and change no number.
 
     Examples
     --------
@@ -94,7 +96,7 @@ class Model(ModelSupports):
         return html_table(rows, caption=head)
 
     def describe(self) -> str:
-        """Return a description of the model in words, one line each for kinematics, materials, supports, loads and contact.
+        """Return a description of the model, one line each for kinematics, materials, supports, loads and contact.
 
         Examples
         --------

@@ -91,9 +91,9 @@ class Ramp:
     Parameters
     ----------
     instants : sequence or array of float
-        Load factors (pseudo-times) at which a step ends, ascending.
+        Ascending load factors (pseudo-times) at the ends of the steps.
     table : sequence of (float, float)
-        Points (instant, multiplier of the loads) of the function, ascending instants.
+        Points (instant, multiplier of the loads) of the function, with ascending instants.
 
     Examples
     --------
@@ -141,7 +141,7 @@ History = Ramp | Iterable[Iterable[float]] | None
 def linear_ramp(steps: int = 20, end: float = 1.0) -> Ramp:
     """Return a ramp of equal steps from zero load to full load at `end`.
 
-    ModelError if `steps` is not a whole number from 1 to a million or `end` is not positive.
+    ModelError if `steps` is not an integer from 1 to a million or `end` is not positive.
 
     Examples
     --------

@@ -36,7 +36,7 @@ def write_med_results(path: PathLike, mesh: Mesh, steps: Iterable[StepResult], *
     path : path-like
     mesh : Mesh
     steps : iterable of StepResult
-        Taken one after the other, so a generator will do.
+        Consumed one by one, so that a generator is possible.
     mesh_name : str
         Name of the mesh in the file, at most 64 bytes.
 

@@ -44,7 +44,7 @@ def open_results(path: PathLike) -> Results:
     Parameters
     ----------
     path : path-like
-        A file that ``ResultWriter`` wrote, or is still writing: then the steps complete by now are seen.
+        A file that ``ResultWriter`` wrote or is still writing, in which case all complete steps are visible.
 
     Returns
     -------
@@ -64,9 +64,9 @@ def open_results(path: PathLike) -> Results:
 
 
 class Results(Sequence[StepResult]):
-    """The steps of a result file, each read when it is used, and what the file says beside them.
+    """The steps of a result file, read on access, and further data of the file.
 
-    Steps are plain NumPy data: they stay valid when the file is closed.
+    Steps are plain NumPy data and remain valid when the file is closed.
 
     Attributes
     ----------
@@ -77,22 +77,23 @@ class Results(Sequence[StepResult]):
     mesh : Mesh
         The mesh with its groups.
     kinematics, case_text : str
-        Kinematics of the analysis and the case file, empty if there was none; that of the last steps if it changed.
+        Kinematics of the analysis, and text of the case file, empty if there was none; that of the last steps if it
+        changed.
     versions : dict of str to str
         Versions of the packages that computed the results.
     load_factors : ndarray (n_steps,)
         Pseudo-time of each step [-].
     units : dict of str to str
-        Names of units where the model or the case file names them, as of a `StepResult`; else empty.
+        Names of units from the model or the case file, as in `StepResult`; otherwise empty.
     warnings : tuple of str
-        Every warning of the run and its steps, once.
+        All distinct warnings of the run and its steps.
     log : object
         Log of the run, None if there is none; ``{"failed_step": history}``, the iterations of the step (or the part of
         it) that failed, if the run did not converge.
     complete : bool
-        Whether the run came to its end: False after a crash, and while it goes on.
+        Whether the run has finished: False after a crash and during the run.
     error : str
-        What stopped the run, empty if nothing did or nobody could write it down.
+        Error that stopped the run; empty if there was none or it could not be written.
     """
 
     def __init__(self, path: PathLike, *, repeat: bool | None = None) -> None:
@@ -227,7 +228,7 @@ class Results(Sequence[StepResult]):
         return html_table(rows, (), str(self.path)) + last
 
     def close(self) -> None:
-        """Close the file; the steps already read stay valid, no further ones can be read."""
+        """Close the file; steps already read remain valid, further ones cannot be read."""
         if self._file is not None:
             self._file.close()
         self._raw.close()
@@ -255,8 +256,8 @@ class Results(Sequence[StepResult]):
     def to_pandas(self) -> pandas.DataFrame:
         """Return the contact tables of all steps as one ``pandas.DataFrame``.
 
-        A row is a secondary node of a contact pair in a step: columns ``step``, ``load_factor``, ``contact``, then those of
-        `contact_table`; ``attrs["units"]`` names the units of columns that have one.
+        There is a row for each secondary node, contact pair and step, with the columns ``step``, ``load_factor``,
+        ``contact`` and those of `contact_table`; ``attrs["units"]`` holds units by column.
 
         Raises
         ------
@@ -345,12 +346,12 @@ class Results(Sequence[StepResult]):
 
     @property
     def point_field_names(self) -> list[str]:
-        """Names of the point fields that vary with the step; earlier versions wrote fewer."""
+        """Names of the point fields stored for each step; earlier versions wrote fewer."""
         return [name for name in (*layout.POINT_FIELDS, *layout.HEAT_FIELDS) if name in self._file["VTKHDF/PointData"]]
 
     @property
     def cell_field_names(self) -> list[str]:
-        """Names of the cell fields that vary with the step."""
+        """Names of the cell fields stored for each step."""
         static = {*layout.cell_fields(self.mesh), *layout.MATERIAL_FIELDS, "material"}
         return [name for name in self._file["VTKHDF/CellData"] if name not in static]
 

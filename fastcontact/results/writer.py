@@ -47,37 +47,38 @@ INDICES = 1 << 18
 
 @typed(FileError)
 class ResultWriter:
-    """A result file to which one step after the other is written.
+    """A result file to which steps are appended.
 
-    The file is begun at once: errors show before any step is computed. From then on it can be opened at any time, by viewers
-    too, and shows all steps so far, even after an exception or a crash. Several threads may share a writer: its methods
-    wait for each other.
+    The file is created at once, so that errors appear before any step is computed. It can then be opened at any time,
+    also by viewers, and contains all steps so far, even after an exception or a crash. Several threads may share a
+    writer.
 
     Parameters
     ----------
     path : path-like
-        File to write; the suffix ``.vtkhdf`` is the one that viewers know.
+        File to write; viewers recognise the suffix ``.vtkhdf``.
     mesh : Mesh or model
-        The mesh, or any object with `mesh` and `kinematics`, and maybe `case_text`, such as a ``Model``.
+        A mesh, or any object with `mesh` and `kinematics`, and optionally `case_text`, such as a ``Model``.
     kinematics : str
         Kinematics of a bare mesh; a model brings its own.
     case_text : str
-        The case file, kept as it is.
+        Text of the case file to store.
     overwrite : bool
         Whether an existing result file may be replaced.
     cell_fields : iterable of str
-        Names of further `StepResult.cell_fields` of every step, beside those of the model; viewers show them, the XDMF
-        sidecar does not.
+        Names of further `StepResult.cell_fields` of every step, in addition to those of the model; viewers show them,
+        the XDMF sidecar does not.
     resume : bool
-        Whether to keep the steps of an existing file of this mesh and write after them. A file that is missing or holds no
-        complete step is begun. The file is not changed before there is something to add.
+        Whether to keep the steps of an existing file of this mesh and append to them. A file that is missing or has no
+        complete step is created. An existing file is not changed before a step is added.
     synchronise : bool, optional
         Whether each step is on the disk when `write` returns, so that it survives a loss of power; by default from ten
-        seconds after the file was begun, so that short runs are not slowed. Steps always survive the end of the process.
+        seconds after the creation of the file, so that short runs are not slowed. Steps always survive the end of the
+        process.
     background : bool
-        Whether a step is written while the next one is computed. It is then complete when the next `write`, `wait` or `close`
-        returns, which also raise what went wrong with it; `n_steps` counts those that are. A copy of the step is in memory
-        until then, so that the arrays of the caller may change.
+        Whether a step is written while the next one is computed. It is then complete when the next `write`, `wait` or
+        `close` returns, which also raise the errors of the previous write; `n_steps` counts complete steps. A copy of
+        the step is kept in memory until then, so that the caller's arrays may change.
 
     Attributes
     ----------
@@ -86,13 +87,12 @@ class ResultWriter:
     n_steps : int
         Number of steps in the file.
     done : sequence of StepResult
-        The steps that the file held at first, each read when it is used, for ``solve(..., resume=out.done)``; none without
-        `resume`.
+        The steps of the existing file, read on access, for ``solve(..., resume=out.done)``; empty without `resume`.
 
     Raises
     ------
     FileError
-        If the file cannot be written, exists and must not be replaced, is no result file, has another writer, or is
+        If the file cannot be written, exists and must not be replaced, is not a result file, has another writer, or is
         to be resumed but belongs to another mesh.
     ModelError
         If `mesh` is neither a mesh nor a model.
@@ -184,13 +184,13 @@ class ResultWriter:
             self._finish(run)
 
     def write(self, step: StepResult) -> None:
-        """Append a step; when this returns the step is safe from a crash of the process, unless it is in the background.
+        """Append a step. When this returns, the step survives a crash of the process, unless `background` is set.
 
         Raises
         ------
         FileError
-            If the file is closed, the step does not follow those before it, belongs to another case or does not fit the
-            mesh, or the disk takes no more.
+            If the file is closed, the step does not follow the previous one, belongs to another case or does not fit
+            the mesh, or if the disk is full or fails.
         """
         with self._turn:
             self.wait()
@@ -210,7 +210,7 @@ class ResultWriter:
         Raises
         ------
         FileError
-            If the disk took no more.
+            If the disk was full or failed.
         """
         if self._background is not None:
             with self._turn:
@@ -255,14 +255,14 @@ class ResultWriter:
         Parameters
         ----------
         log : str, list or dict, optional
-            Log of the whole run: whatever JSON can hold.
+            Log of the whole run, as JSON data.
         warnings : iterable of str
             Warnings of the run that belong to no step.
 
         Raises
         ------
         FileError
-            If the disk takes no more.
+            If the disk is full or fails.
         """
         try:
             self.wait()

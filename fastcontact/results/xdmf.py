@@ -22,15 +22,15 @@ TAIL = "</Grid></Domain></Xdmf>\n"
 def write_xdmf(result_path: PathLike, xdmf_path: PathLike) -> None:
     """Write an XDMF file that refers to the steps of a result file, for ParaView before 5.12.
 
-    The XDMF file holds no numbers, only their places in the result file: move the two together. It shows the steps that
-    were complete when it was written.
+    The XDMF file only refers to the data in the result file: keep the two together. It shows the steps that were
+    complete when it was written.
 
     Parameters
     ----------
     result_path : path-like
         File of ``ResultWriter``.
     xdmf_path : path-like
-        File to write, suffix ``.xdmf``; replaced at once if it exists.
+        File to write, suffix ``.xdmf``; replaced atomically if it exists.
 
     Raises
     ------

@@ -34,11 +34,11 @@ class Curve:
     Parameters
     ----------
     x, y : array_like (n,)
-        Coordinates, in the units of the axes; points with a value that is not finite are left out.
+        Coordinates, in the units of the axes; points that are not finite are omitted.
     legend : str
         Text in the legend; empty for none.
     style : {"line", "symbols", "line+symbols"}
-        A line for theory, symbols for what was computed at nodes.
+        A line for theory, symbols for nodal values.
 
     Raises
     ------
@@ -72,14 +72,14 @@ def write_agr(
     path : path-like
         File to write, suffix ``.agr``; replaced if it exists.
     curves : sequence of Curve
-        Drawn in this order, the last on top.
+        Curves in drawing order, the last on top.
     title, subtitle, xlabel, ylabel : str
-        Plain text: Grace's own markup in it is shown as it stands; Greek letters come out as such.
+        Plain text; markup of Grace in it is escaped, and Greek letters are supported.
 
     Raises
     ------
     CaseError
-        If no curve has a point to show.
+        If no curve has a finite point.
     FileError
         If the file cannot be written.
 

@@ -46,27 +46,28 @@ def adaptive_study(
     on_round: Callable[[Round], None] | None = None,
     progress: bool = False,
 ) -> AdaptiveStudy:
-    """Refine the mesh of a case where its error is large, until a quantity is accurate enough.
+    """Refine the mesh of a case adaptively until a quantity is accurate enough.
 
-    Every round solves the case, estimates the error of each cell (`estimate_error`), weights it with its influence on the
-    quantity, and divides the cells that carry most of it in four. The error of the quantity is estimated from its changes.
+    Every round solves the case, estimates the error of each cell (`estimate_error`), weights it with its influence on
+    the quantity, and divides the cells with the largest contributions in four. The error of the quantity is estimated
+    from its changes.
 
     Parameters
     ----------
     case : Case or path-like
-        In two dimensions, of triangles and quadrangles. The first mesh is level 0 of its ``[study]``, otherwise its own.
+        A case in two dimensions, with triangles and quadrangles. The first mesh is level 0 of its ``[study]``,
+        otherwise its own mesh.
     quantity : str
-        What must be accurate, e.g. ``"force"``, ``"pressure_max"``, ``"C1.stress.yy"``.
+        The quantity of interest, e.g. ``"force"``, ``"pressure_max"``, ``"C1.stress.yy"``.
     tolerance : float
-        Relative error wanted [-].
+        Target relative error [-].
     element, formulation : str, optional
-        By default the last of ``study.combinations``, or the case's own.
-    max_dofs, max_rounds : int
-        Limits at which refinement stops in any case.
+        By default the last of ``study.combinations``, or those of the case. max_dofs, max_rounds : int Limits at which
+        the refinement stops.
     on_round : callable, optional
         Called with every `Round`.
     progress : bool
-        Write a line on standard error that is drawn anew after every round, on terminals and in notebooks.
+        Show the progress on standard error, updated after every round, on terminals and in notebooks.
 
     Returns
     -------

@@ -40,37 +40,39 @@ def convergence_study(
     on_progress: Callable[[Progress], None] | None = None,
     progress: bool = False,
 ) -> Study:
-    """Solve a case or a Python model on finer and finer meshes; fit order and limit; separate model error from mesh error.
+    """Solve a case or a Python model on successively finer meshes, fit limit and order, separate model and mesh error.
 
-    Meshes of a case come from the generator that it names, its sizes halved on every level, or from uniform refinement of
-    its mesh file, arcs kept round; see the table ``[study]`` of case files. Of a function they are what it makes.
+    The meshes of a case come from its generator, with sizes halved on every level, or from uniform refinement of its
+    mesh file with arcs kept circular; see the table ``[study]`` of case files. The meshes of a function are those that
+    it generates.
 
     Parameters
     ----------
     case : Case, path-like or callable
-        A function of the mesh size returns a `Model`, which is solved in 20 equal steps, or what `solve` returns.
+        A function receives the mesh size and returns a `Model`, which is solved in 20 equal steps, or the result of
+        `solve`.
     levels : int or sequence of float
-        Of a case the number of meshes; a limit needs three, a reliable one five. Of a function the mesh sizes, any length
-        that goes to zero as the mesh is refined [length].
+        For a case the number of meshes; a limit needs three, a reliable one five. For a function the mesh sizes, any
+        length that tends to zero as the mesh is refined [length].
     elements, formulations : sequence of str, optional
-        Of a case, compared in all combinations; ``["all"]`` for all; by default what ``[study]`` names, or the case's own.
+        For a case, compared in all combinations; ``["all"]`` for all; by default those of ``[study]``, or of the case.
     quantities : sequence of str, or dict of str to callable
-        Further ones to fit, such as ``"C1.stress.yy"``, ``"C1.displacement.y"``, ``"C1.pressure"``; of a function, functions
-        of the last `StepResult` that return a number, by name, or names of standard quantities. One whose argument is called
-        ``steps`` gets the list of all steps.
+        Further quantities to fit, such as ``"C1.stress.yy"``, ``"C1.displacement.y"``, ``"C1.pressure"``. For a
+        function, names of standard quantities, or functions by name that receive the last `StepResult` and return a
+        number; a function whose argument is called ``steps`` receives the list of all steps.
     executor : concurrent.futures.Executor, optional
-        Where to run: by default processes of this machine, or e.g. ``Client.get_executor()`` of Dask or an
-        ``MPIPoolExecutor`` of mpi4py. It is not shut down here.
+        Executor of the runs, e.g. ``Client.get_executor()`` of Dask or an ``MPIPoolExecutor`` of mpi4py, which is not
+        shut down; by default processes of this machine.
     workers : int, optional
-        Number of these processes, by default one for each processor, of a function 1, which runs everything in this one.
-        More than one start by importing the script they are called from: there the call belongs under
-        ``if __name__ == "__main__":``.
+        Number of processes, by default one for each processor, for a function 1, which runs everything in this
+        process. Several processes import the calling script, where the call must be under ``if __name__ ==
+        "__main__":``.
     store : path-like, optional
-        Folder of finished runs of a case: those found there are not run again; new ones are added.
+        Folder of finished runs of a case, which are reused; new ones are added.
     on_progress : callable, optional
         Called with a `Progress` after every run.
     progress : bool
-        Write a line on standard error that is drawn anew after every run, on terminals and in notebooks.
+        Show the progress on standard error, updated after every run, on terminals and in notebooks.
 
     Returns
     -------
@@ -84,7 +86,7 @@ def convergence_study(
     Warns
     -----
     FastcontactWarning
-        If the meshes of a function do not get finer as its sizes get smaller.
+        If the meshes of a function do not become finer as its sizes decrease.
 
     Examples
     --------

@@ -38,7 +38,7 @@ class ErrorEstimate:
     cells : ndarray (n_solids,)
         Error of every solid cell, in the order of ``mesh.solids`` [energy^(1/2)].
     contact : ndarray (n_solids,)
-        The part that stems from the contact surface [energy^(1/2)].
+        Contribution of the contact surface [energy^(1/2)].
     energy : float
         Energy norm of the solution [energy^(1/2)].
 
@@ -58,12 +58,12 @@ class ErrorEstimate:
 
     @property
     def total(self) -> float:
-        """Error of the whole solution."""
+        """Error of the solution."""
         return float(np.linalg.norm(self.cells))
 
     @property
     def relative(self) -> float:
-        """Error of the whole solution over its energy norm [-]."""
+        """Error of the solution divided by its energy norm [-]."""
         return self.total / math.hypot(self.energy, self.total) if self.total else 0.0
 
 

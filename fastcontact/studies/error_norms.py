@@ -43,18 +43,18 @@ class Theory(Protocol):
 
 @dataclass(frozen=True)
 class ErrorNorms:
-    """Norms of an error, and of the theory itself to compare them with.
+    """Norms of an error, and of the theory for comparison.
 
-    The energy norm of stresses s is the square root of the integral of s : C^-1 : s, C being the elastic moduli: the
-    root of twice the elastic energy [(force length)^(1/2)]. That of displacements is the square root of the integral of
+    The energy norm of stresses s is the square root of the integral of s : C^-1 : s with the elastic moduli C, that is
+    of twice the elastic energy [(force length)^(1/2)]. The norm of displacements is the square root of the integral of
     their square (L2) [length^(1 + dim/2)]. In axisymmetry integrals run over the full circle.
 
     Attributes
     ----------
     energy, displacement : float
-        Of the solution minus the theory.
+        Norms of the solution minus the theory.
     energy_of_theory, displacement_of_theory : float
-        Of the theory.
+        Norms of the theory.
 
     Examples
     --------
@@ -73,12 +73,12 @@ class ErrorNorms:
 
     @property
     def relative_energy(self) -> float:
-        """Energy norm of the error over that of the theory [-]."""
+        """Energy norm of the error divided by that of the theory [-]."""
         return self.energy / self.energy_of_theory
 
     @property
     def relative_displacement(self) -> float:
-        """L2 norm of the error of displacements over that of the theory [-]."""
+        """L2 norm of the error of displacements divided by that of the theory [-]."""
         return self.displacement / self.displacement_of_theory
 
 
@@ -100,19 +100,19 @@ def error_against(
     Parameters
     ----------
     theory : Theory
-        Anything with methods ``displacement(points)`` and ``stress(points)``, such as `analytic.hertz_box`.
+        An object with methods ``displacement(points)`` and ``stress(points)``, such as `analytic.hertz_box`.
     model : Model
-        Its mesh, kinematics and materials.
+        The model, of which mesh, kinematics and materials are used.
     displacement : array_like (n_points, dim)
-        Of the solution, e.g. ``fc.solve(model)[-1].displacement`` [length].
+        Displacement of the solution, e.g. ``fc.solve(model)[-1].displacement`` [length].
     groups : sequence of str or str, optional
-        Solid cells to integrate over, by default all.
+        Groups of solid cells to integrate over, by default all.
     n_points : int, optional
-        Points along each direction of a cell, three more than the order of the element by default: more than
-        the stiffness needs, so that the error is that of the solution.
+        Quadrature points along each direction of a cell; by default three more than the order of the element, so that
+        the quadrature error is negligible.
     rise : ndarray (n_points,), optional
-        Of the temperature at every point of the mesh, see `Model.temperature_rise` [temperature]. Initial stresses and
-        strains of the model count in full.
+        Temperature rise at every point of the mesh, see `Model.temperature_rise` [temperature]. Initial stresses and
+        strains of the model are included in full.
 
     Raises
     ------

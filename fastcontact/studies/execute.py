@@ -38,17 +38,17 @@ class Progress:
     Attributes
     ----------
     label : str
-        The run that has just ended.
+        Label of the run that has just finished.
     done, total : int
-        Runs that have ended, and all.
+        Number of finished runs, and of all runs.
     left : tuple of str
-        Labels of the runs still to come.
+        Labels of the remaining runs.
     seconds : float
-        Time the run took [s]; 0 if it was found in the store.
+        Duration of the run [s]; 0 if its result came from the store.
     error : str
-        Why it failed; empty if it did not.
+        Reason of a failure; empty if there was none.
     stored : bool
-        Whether it was found in the store.
+        Whether the result came from the store.
     """
 
     label: str

@@ -45,10 +45,10 @@ class Limit:
     order, order_uncertainty : float
         Fitted order of convergence in h, and its standard deviation; NaN if the values do not change.
     n_levels : int
-        Number of meshes that were fitted.
+        Number of meshes in the fit.
     converging : bool
-        Whether the values settle: the last change is smaller than nine tenths of the median of those before, or than a
-        twentieth of the largest; if not, there may be no limit.
+        Whether the values settle: the last change is smaller than nine tenths of the median of the earlier changes, or
+        than a twentieth of the largest one. Otherwise there may be no limit.
     """
 
     value: float
@@ -71,7 +71,7 @@ def fit_limit(h: ArrayLike, values: ArrayLike) -> Limit:
     h : array_like (n,)
         Mesh sizes, all different, n >= 3 [length].
     values : array_like (n,)
-        The quantity on each mesh, in its own unit; meshes where it is not finite are left out.
+        The quantity on each mesh, in its own unit; meshes with a value that is not finite are omitted.
 
     Returns
     -------
@@ -80,7 +80,7 @@ def fit_limit(h: ArrayLike, values: ArrayLike) -> Limit:
     Raises
     ------
     CaseError
-        If fewer than three meshes are left, or mesh sizes are not positive and different.
+        If fewer than three meshes remain, or mesh sizes are not positive and distinct.
 
     Examples
     --------

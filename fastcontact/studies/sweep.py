@@ -49,23 +49,25 @@ def parameter_sweep(
     on_progress: Callable[[Progress], None] | None = None,
     progress: bool = False,
 ) -> Sweep:
-    """Solve a case or a Python model for all combinations of some parameters' values.
+    """Solve a case or a Python model for all combinations of parameter values.
 
     Parameters
     ----------
     case : Case, path-like or callable
-        A function of the parameters returns a `Model`, which is solved in 20 equal steps, or what `solve` returns.
+        A function receives the parameters and returns a `Model`, which is solved in 20 equal steps, or the result of
+        `solve`.
     parameters : mapping of str to sequence, or sequence
-        Values by parameter; of a function by argument, or of its first argument alone. Of a case, a parameter is the path of
-        a number in the case file, e.g. ``"contact.hertz.friction"``, ``"material[0].E"`` or ``"mesh.size"`` (tables in a list
-        count from 0), or a name of ``[study.parameters]``, which stands for several paths that change together.
+        Values by parameter; for a function by argument, or a sequence for its first argument. For a case, a parameter
+        is the path of a number in the case file, e.g. ``"contact.hertz.friction"``, ``"material[0].E"`` or
+        ``"mesh.size"`` (tables in a list are numbered from 0), or a name of ``[study.parameters]``, which sets several
+        linked values.
     quantities
-        Further ones to show, as in `convergence_study`.
+        Further quantities, as in `convergence_study`.
     element, formulation : str, optional
-        By default the last of ``study.combinations``, or the case's own.
+        By default the last of ``study.combinations``, or those of the case.
     level : int, optional
-        Refinement, as in `convergence_study`; by default 2 where ``[study]`` gives the meshes of level 0, otherwise the
-        mesh of the case.
+        Refinement level, as in `convergence_study`; by default 2 if ``[study]`` defines the meshes of level 0,
+        otherwise the mesh of the case.
     executor, workers, store, on_progress, progress
         As in `convergence_study`.
 

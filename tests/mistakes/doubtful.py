@@ -271,7 +271,7 @@ DOUBTS = [
         ),
     ),
     Doubt(
-        "nodes nearly lie where others are",
+        "nodes nearly coincide",
         lambda: generate.union(
             block((0.5, 1.0), (2, 2), name="A"), block((0.5, 1.0), (2, 2), origin=(0.5 + 1e-7, 0.0), name="B")
         ),
@@ -289,7 +289,7 @@ DOUBTS = [
         ),
     ),
     Doubt(
-        "bodies begin deeper inside each other than they are pushed",
+        "the initial penetration exceeds the prescribed approach",
         lambda: raised(-0.02),
         of(STEEL, BLOCKS, PAIR),
         (

@@ -65,26 +65,27 @@ def _as_step(number: int, frequency: float, u: Array, stress: Array) -> StepResu
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Modes(Shapes):
-    """Modes of a model: a sequence of shapes, each a `StepResult` for pictures and files, that prints as a table.
+    """Modes of a model: a sequence of mode shapes as `StepResult`, for pictures and files, that prints as a table.
 
     Attributes
     ----------
     frequencies : ndarray (n,)
-        Ascending, for each number of nodal diameters [1 / time]; about zero for rigid motions, negative for shapes that
-        grow by themselves.
+        Ascending, for each number of nodal diameters [1 / time]; about zero for rigid-body modes, negative for
+        unstable modes.
     eigenvalues : ndarray (n,)
         Squares of the angular frequencies [1 / time^2].
     shapes : ndarray (n, n_points, dim)
-        Displacements of unit modal mass, ``shape . M shape = 1``, of the whole ring where nodal diameters were asked for
-        [1 / mass^(1/2)].
+        Mode shapes of unit modal mass, ``shape . M shape = 1``; with nodal diameters, M is that of the whole ring [1 /
+        mass^(1/2)].
     participation : ndarray (n, dim)
-        Of a uniform acceleration along each axis: ``shape . M e`` [mass^(1/2)].
+        Participation factors ``shape . M e`` along each axis e [mass^(1/2)].
     mass : ndarray (dim,)
-        Of all that moves along each axis [mass]; in axisymmetry zero along the radius.
+        Mass that can move along each axis [mass]; in axisymmetry zero along the radius.
     nodal_diameters : ndarray of int (n,), optional
-        Of each mode; None where none were asked for.
+        Number of nodal diameters of each mode; None if none were requested.
     twins : ndarray of int (n,), optional
-        The mode of the same frequency a quarter of a wave further round the ring; the mode itself where it is alone.
+        Number of the mode of equal frequency that is shifted by a quarter of a wave; the number of the mode itself if
+        its frequency is simple.
 
     Examples
     --------
@@ -125,7 +126,7 @@ class Modes(Shapes):
         return _as_step(number, self.frequencies[number], u.copy(), stress)
 
     def whole_ring(self) -> RingModes:
-        """Return the same modes on the mesh of the whole ring; ModelError if no nodal diameters were asked for."""
+        """Return the same modes on the mesh of the whole ring; ModelError if no nodal diameters were requested."""
         if self._sectors is None:
             raise ModelError(
                 "shapes of the whole ring need modes with nodal_diameters, of a model with cyclic symmetry"
@@ -172,7 +173,7 @@ class RingModes(Shapes):
     Attributes
     ----------
     modes : Modes
-        Of the sector.
+        Modes of the sector.
     mesh : Mesh
         All sectors, the modelled one first; their ends are not merged.
     kinematics : str

@@ -39,17 +39,17 @@ class Deck:
     title : str
         First line of ``*HEADING``.
     model : Model
-        Contact pairs are named ``SECONDARY/PRIMARY``, groups after the sets and surfaces of the deck. Plane models
-        have a unit of thickness.
+        Contact pairs are named ``SECONDARY/PRIMARY``, groups like the sets and surfaces of the deck. Plane models have
+        unit thickness.
     ramp : Ramp
-        Step k of the deck ends at the load factor k.
+        Step k of the deck ends at load factor k.
     criteria : Criteria
     notes : tuple of str
-        What lines mean here where that is not plain: what has no effect, what is solved in another way.
+        Keywords and parameters without effect, and those that are treated differently from Abaqus or CalculiX.
     thickness : float
-        Of a plane model [length]; forces that `solve` returns are those of all of it.
+        Thickness of a plane model [length]; `solve` returns forces for the whole thickness.
     modes : dict, optional
-        What ``*FREQUENCY`` asks for, as arguments of `fastcontact.modes` about the last step; None without.
+        Arguments of `fastcontact.modes` about the last step, from ``*FREQUENCY``; None without it.
 
     Examples
     --------
@@ -80,11 +80,11 @@ class Deck:
         Returns
         -------
         list of StepResult
-            With the load factor k at the end of step k. Displacements are along the global axes; reactions are the forces of
-            supports alone, without those of equations and couplings; forces of plane models are those of the whole thickness.
+            Step k of the deck ends at load factor k. Displacements are along the global axes; reactions are the forces
+            of supports, without those of equations and couplings; forces of plane models are for the whole thickness.
 
-        Errors and warnings are those of `fastcontact.solve`; where the deck asks for NLGEOM and small strains are solved, a
-        FastcontactWarning tells the largest strain and rotation, which linear kinematics leave out the squares of.
+        Errors and warnings are those of `fastcontact.solve`. If the deck requests NLGEOM but small strains are used, a
+        FastcontactWarning states the largest strain and rotation, whose squares linear kinematics neglect.
         """
         steps: list[StepResult] = []
         for step in self.solve_steps(**options):
@@ -94,14 +94,14 @@ class Deck:
         return steps
 
     def solve_steps(self, **options: Any) -> Iterator[StepResult]:
-        """Solve step by step, as `fastcontact.solve_steps` does; results are those of `solve`."""
+        """Solve step by step, like `fastcontact.solve_steps`; the results are those of `solve`."""
         for step in solve_steps(self.model, self.ramp, **{"criteria": self.criteria, **options}):
             yield self.finished(step)
 
     def points_of(self, name: str) -> Numbers:
-        """Return the sorted point numbers (n,) of a node set, in any case; of sets of parts ``Instance.set``.
+        """Return the sorted point numbers (n,) of a node set, in upper or lower case; for sets of parts ``Instance.set``.
 
-        MeshError if there is none of that name.
+        MeshError if there is no such set.
         """
         wanted = name.replace('"', "").strip().upper()
         for group in self.model.mesh.point_groups:

@@ -42,9 +42,9 @@ LEANING = 0.38
 
 @dataclass(eq=False)
 class Formulation(ABC):
-    """A contact formulation bound to one pair of surfaces; it does not change after it is made.
+    """A contact formulation bound to one pair of surfaces; instances are immutable.
 
-    Sub-classes are dataclasses; their further fields are the options that a user may set by name.
+    Subclasses are dataclasses; their further fields are options of the formulation.
 
     Parameters
     ----------

@@ -33,7 +33,7 @@ from fastcontact.round_off import SINGLE_PRECISION
 
 @dataclass(eq=False)
 class SegmentMortar(PressureFieldFormulation):
-    """Mortar contact with exact integration over cut lines; further parameters as in `PressureFieldFormulation`.
+    """Mortar contact with exact integration over segments of lines; further parameters as in `PressureFieldFormulation`.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class SegmentMortar(PressureFieldFormulation):
         self._rho = self.augmentation * self.modulus / float(lengths.min())
 
     def unilateral(self, at: Configuration) -> Constraints:
-        """Cut and pair on the displaced configuration and return the gaps of the integration points."""
+        """Intersect the facets on the deformed configuration and return the gaps of the integration points."""
         deformed = self.points + at.displacement
         assert isinstance(self.primary, Surface)
         block, borders = self.secondary.blocks[0], self.options.borders(self.secondary)

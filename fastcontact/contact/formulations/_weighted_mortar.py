@@ -57,7 +57,7 @@ class WeightedMortar(Formulation):
     Parameters
     ----------
     normals : str or sequence of float
-        Normals that the normal of a node averages: ``"facet"``, those of the primary facets that it faces; ``"averaged"``,
+        Normals that are averaged to that of a node: ``"facet"``, those of the opposite primary facets; ``"averaged"``,
         their nodal means. ``"secondary"`` and vectors as in `Formulation`.
     multipliers : str
         ``"dual"`` or, between faces, ``"standard"``.
@@ -133,7 +133,7 @@ class WeightedMortar(Formulation):
         )
 
     def unilateral(self, at: Configuration) -> Constraints:
-        """Cut and pair on the displaced configuration and return one mean gap per node."""
+        """Intersect the facets on the deformed configuration and return one weighted gap per node."""
         deformed = self.points + at.displacement
         overlap = self._overlap(deformed, at.pose)
         covered = [mass.sum(axis=2) @ T.T for T, mass in zip(self._test, overlap.mass, strict=True)]

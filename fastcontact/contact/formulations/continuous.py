@@ -36,14 +36,15 @@ class Continuous(PressureFieldFormulation):
     Parameters
     ----------
     integration : str
-        ``"gauss"``, ``"simpson"`` (on each half or quarter of a quadratic facet) or ``"node"``, where no node penetrates the
-        other side, even on the axis, where it has no area. On triangles the closed seven-point rule replaces Simpson's.
-        Corner nodes of six-node triangles and eight-node quadrangles have no positive areas, so ``"node"`` is refused there.
+        ``"gauss"``, ``"simpson"`` (on each half or quarter of a quadratic facet) or ``"node"``, with which no node
+        penetrates the other side, not even on the axis, where its area is zero. On triangles a seven-point rule
+        replaces Simpson's. On six-node triangles and eight-node quadrangles, whose corners have no positive areas,
+        ``"node"`` is refused.
     n_gauss : int, optional
-        Gauss points in each direction of a facet, on triangles 3, 6, 12 or 16 points in all for 2 to 5; by default 3 on
-        linear and 4 on quadratic facets. They must determine the field.
+        Gauss points in each direction of a facet (on triangles, 2 to 5 stand for 3, 6, 12 or 16 points in total); by
+        default 3 on linear and 4 on quadratic facets. They must determine the pressure field.
     normals : str or sequence of float
-        ``"averaged"`` by default: with normals that jump between facets, the pairing opposite a node may not converge.
+        ``"averaged"`` by default: with discontinuous normals, the pairing of a point opposite a node may not converge.
     """
 
     normals: Normals | None = "averaged"

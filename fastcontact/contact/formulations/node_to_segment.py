@@ -37,8 +37,8 @@ class NodeToSegment(Formulation):
     Parameters
     ----------
     opposite : str
-        ``"facet"``: the gap to the primary facet that a node faces. ``"node"``: the gap to the nearest primary node, for
-        matching meshes with little sliding (APPARIEMENT='NODAL' of code_aster).
+        ``"facet"``: gap to the opposite primary facet. ``"node"``: gap to the nearest primary node, for matching
+        meshes with little sliding (APPARIEMENT='NODAL' of code_aster).
     """
 
     opposite: str = "facet"

@@ -24,10 +24,10 @@ BEYOND, LEAN = 0.05, 0.27
 class MeshedSurface:
     """A rigid surface given by a group of facets of a mesh.
 
-    Normals point out of the obstacle, towards the body: to the right of a line's direction in two dimensions, to where
-    a face's nodes run counter-clockwise in three; facets on the outside of solid cells of their mesh point out of these.
-    Distances are exact, from the closest point of the facets as they are curved. Beyond the border of an open surface
-    there is nothing to touch.
+    Normals point out of the obstacle, towards the body: in two dimensions to the right of a line's direction, in three
+    to the side from which the nodes of a face run counter-clockwise; facets on the outside of solid cells of their
+    mesh point out of these. Distances are exact, to the closest point of the curved facets. Beyond the border of an
+    open surface there is no contact.
 
     Parameters
     ----------
@@ -36,10 +36,10 @@ class MeshedSurface:
     group : str
         A group of facets.
     flip : bool
-        Whether to turn all normals round.
+        Whether to reverse all normals.
     crease : float
-        Facets that meet at this angle or less count as one smooth surface, whose normals are continuous across facets; at
-        larger angles the edge is sharp [degrees]. With 0 each facet keeps its own normals.
+        Facets that meet at this angle or less form a smooth surface with continuous normals; at larger angles the edge
+        is sharp [degrees]. With 0 each facet has its own normals.
 
     Raises
     ------

@@ -297,7 +297,7 @@ def read_med_field(path: PathLike, field: str) -> tuple[Array, Array]:
     Returns
     -------
     times : ndarray (n_instants,)
-        In the order of the file's step numbers [-]: the load factor in files of fastcontact.
+        Times in the order of the step numbers of the file [-]; load factors in files of fastcontact.
     values : ndarray (n_instants, n_points, n_components)
         NaN at points without a value; in the unit of the field, e.g. [length] for ``"DEPL"``.
 

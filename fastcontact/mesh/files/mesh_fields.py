@@ -32,8 +32,8 @@ def read_field(
 ) -> Array:
     """Return a field of a file as an array over the cells or points of a mesh.
 
-    It can serve as a constant of a material: ``fc.LinearElastic(E=fc.read_field(mesh, "scan.vtu", "E"), nu=0.3)``. Points and
-    cells are matched by position, so that the file may contain others, in any order.
+    The array can be a material constant: ``fc.LinearElastic(E=fc.read_field(mesh, "scan.vtu", "E"), nu=0.3)``. Points
+    and cells are matched by position, so that the file may contain further ones, in any order.
 
     Parameters
     ----------
@@ -41,18 +41,19 @@ def read_field(
     file : path-like
         MED, VTKHDF, ``.vtu``, ``.vtk`` or another format of meshio.
     field : str
-        Its name in the file.
+        Name of the field in the file.
     over : {"cells", "points"}
-        Where the values of the field are.
+        Whether the field is given on cells or at points.
     groups : str or sequence of str, optional
-        Groups of solid cells that the file has values for; all by default.
+        Groups of solid cells for which the file has values; by default all.
     instant : float, optional
-        Which time of a file with several [-].
+        The time to read from a file with several [-].
 
     Returns
     -------
     ndarray (n_cells, 1) or (n_points,)
-        Of the solid cells of the groups, or of all points; where the groups have none, the mean [unit of the field].
+        Values [unit of the field] of the solid cells of the groups, or of all points; points outside the groups have
+        the mean.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """Mesh generators with named groups, and operations on meshes.
 
-A generator is a function of plain numbers, strings and tuples that returns a `Mesh`; those in ``GENERATORS`` can be used in
-case files and on the command line. An argument out of range raises MeshError.
+A generator is a function of plain numbers, strings and tuples that returns a `Mesh`; those listed in ``GENERATORS`` are
+available in case files and on the command line. An argument out of range raises MeshError.
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ def block(
     name: str = "BLOCK",
     distortion: float = 0.0,
 ) -> Mesh:
-    """Rectangle in equal cells; in space see `box`.
+    """Rectangle of equal cells; for three dimensions see `box`.
 
     Groups of cells: `name` (all of it), BOTTOM, RIGHT, TOP, LEFT. Groups of points: BOTTOM_LEFT, BOTTOM_RIGHT,
     TOP_RIGHT, TOP_LEFT.
@@ -40,7 +40,7 @@ def block(
     size : (float, float)
         Width and height [length].
     divisions : (int, int)
-        Cells along the width and the height; triangles are halves of them.
+        Cells along the width and the height; triangles are halves of these.
     element : {"tri3", "tri6", "quad4", "quad8", "quad9"}
         Element of the solid.
     origin : (float, float)
@@ -108,7 +108,7 @@ def block_on_block(
     divisions_lower, divisions_upper : (int, int)
         Cells along the widths and the heights.
     shift : float
-        x of the upper block's left side; the lower one's stands at 0. The blocks must face each other [length].
+        x of the left side of the upper block; that of the lower block is 0. The blocks must overlap in x [length].
     distortion : float
         How far inner nodes are moved, 0 to 0.24 of a cell, in a fixed pattern.
 

@@ -20,7 +20,7 @@ Facet = frozenset[int]
 
 @typed(MeshError)
 def cut(mesh: Mesh, group: str, normal: Sequence[float] | None = None) -> Mesh:
-    """Return the mesh cut open along a group of facets: both sides get nodes of their own, at the same places.
+    """Return the mesh cut along a group of facets: both sides get separate nodes at the same positions.
 
     Parameters
     ----------
@@ -28,19 +28,19 @@ def cut(mesh: Mesh, group: str, normal: Sequence[float] | None = None) -> Mesh:
     group : str
         Facets between solids, through a whole body: the cut ends at its surface.
     normal : sequence of float (dim,), optional
-        The side it points to gets the new nodes [-]. By default across the plane that fits the facets best, with its largest
-        component positive.
+        Direction to the side that gets the new nodes [-]. By default the normal of the plane fitted to the facets,
+        with its largest component positive.
 
     Returns
     -------
     Mesh
-        `group` are the facets of the old side, ``"<group> opposite"`` those of the new one, in the same order. New nodes
-        belong to the groups of points of the old ones; facets on the new side follow their solids.
+        `group` holds the facets of the old side, ``"<group> opposite"`` those of the new one, in the same order. New
+        nodes belong to the point groups of the old ones; facets on the new side follow their solids.
 
     Raises
     ------
     MeshError
-        If there is no such group of facets, if some do not lie between two solids, or if the cut ends inside of a body.
+        If there is no such group of facets, if some do not lie between two solids, or if the cut ends inside a body.
 
     Examples
     --------

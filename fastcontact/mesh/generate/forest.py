@@ -45,16 +45,16 @@ class _Leaves:
 
 @typed(MeshError)
 class Forest:
-    """A mesh that can be refined locally, as often as wanted.
+    """A mesh that can be refined locally any number of times.
 
-    MeshError if a cell is of another kind, or a curve's group has no facet on the curve.
+        MeshError if a cell is of another type, or the group of a curve has no facet on the curve.
 
     Parameters
     ----------
     mesh : Mesh
         Two-dimensional: line2, tri3, quad4.
     curves : iterable of Curve
-        True shapes of the boundary: new points on facets that lie on a curve are put on it.
+        Exact shapes of the boundary: new points of facets on a curve are moved onto it.
 
     Examples
     --------
@@ -85,7 +85,7 @@ class Forest:
 
     @property
     def solids(self) -> list[str]:
-        """Kinds of solid leaves, in the order in which `refine` takes their marks."""
+        """Element types of the solid leaves, in the order of the marks of `refine`."""
         return [name for name in self._leaves if name != "line2"]
 
     @property
@@ -94,12 +94,12 @@ class Forest:
         return sum(len(self._leaves[name].corners) for name in self.solids)
 
     def refine(self, marked: Mask) -> None:
-        """Divide the marked solid leaves in four, and others so that no edge is divided more than once on one side.
+        """Divide the marked solid leaves in four, and others so that neighbours differ by at most one level.
 
         Parameters
         ----------
         marked : ndarray of bool (n_leaves,)
-            By kind as in `solids`, leaves of one kind in the order of `mesh()`'s origins.
+            By element type as in `solids`; leaves of one type in the order of the origins of `mesh()`.
         """
         starts = np.cumsum([0, *(len(self._leaves[name].corners) for name in self.solids)])
         marks = {name: marked[a:b] for name, a, b in zip(self.solids, starts[:-1], starts[1:], strict=True)}
@@ -182,7 +182,8 @@ class Forest:
     def mesh(self) -> tuple[Mesh, AnyArray]:
         """Return the mesh of all leaves, and the leaf (n,) of each of its solid cells, in the order of `Mesh.solids`.
 
-        Groups of cells hold the descendants of their cells; a new point joins the groups that hold both ends of its edge.
+        Cell groups contain the descendants of their cells; a new point belongs to the point groups of both ends of its
+        edge.
         """
         blocks: dict[str, list[AnyArray]] = {}
         roots: dict[str, list[AnyArray]] = {}

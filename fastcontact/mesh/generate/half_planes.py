@@ -36,10 +36,10 @@ def graded_block(
 ) -> Mesh:
     """Block under an indenter: x >= 0, and y >= 0 in three dimensions, its top at height 0, finest at the origin.
 
-    It stands for a half plane or half space in contact with a rigid obstacle: with 8 contact radii of width and depth the
-    pressure is wrong by a few thousandths. The height is the last coordinate, as for obstacles. Groups of cells: BLOCK, TOP,
-    CONTACT (the finely meshed part of the top), BOTTOM, SIDE, SYMMETRY_X (x = 0) and, in three dimensions, SYMMETRY_Y
-    (y = 0). Group of points: POLE (the origin).
+    It represents a half plane or half space in contact with a rigid obstacle: with a width and depth of 8 contact
+    radii the error of the pressure is a few thousandths. The height is the last coordinate, as for obstacles. Groups
+    of cells: BLOCK, TOP, CONTACT (the finely meshed part of the top), BOTTOM, SIDE, SYMMETRY_X (x = 0) and, in three
+    dimensions, SYMMETRY_Y (y = 0). Group of points: POLE (the origin).
 
     Parameters
     ----------
@@ -108,9 +108,9 @@ def punched_block(
 ) -> Mesh:
     """Block under a flat punch, the half x >= 0, its top at y = 0, finest at the punch's edge.
 
-    A grid line stands at the edge. The body stands for a half plane or half space: its far sides change the results by about
-    `punch_radius` over `extent`, in plane problems by twice as much. Groups of cells: BLOCK, TOP, PUNCHED (the top under the
-    punch), BOTTOM, SIDE, SYMMETRY_X (x = 0). Groups of points: POLE (the origin) and EDGE.
+    A grid line passes through the edge. The body represents a half plane or half space: its finite size changes the
+    results by about `punch_radius` over `extent`, in plane problems by twice as much. Groups of cells: BLOCK, TOP,
+    PUNCHED (the top under the punch), BOTTOM, SIDE, SYMMETRY_X (x = 0). Groups of points: POLE (the origin) and EDGE.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def punched_block(
     edge_size : float, optional
         Edges at the punch's edge and below the whole top, punch_radius/200 by default [length].
     growth : float
-        Length of an edge over that of its neighbour nearer to the punch's edge, more than 1.
+        Ratio of the lengths of adjacent edges away from the punch's edge, more than 1.
 
     Examples
     --------
@@ -158,10 +158,10 @@ def crowned_blocks(
 ) -> Mesh:
     """Two blocks above each other whose facing sides are parabolas of radius R that touch at the origin.
 
-    Both represent half planes. They are whole, x < 0 as well, for tangential loads, and mirror each other, so that nodes
-    match and equal materials do not couple pressure and shear. Groups of cells: LOWER, UPPER, CONT_LOWER,
-    CONT_UPPER (their facing sides around the origin), FAR_LOWER, FAR_UPPER (the flat sides far from it). Groups of
-    points: POLE_LOWER, POLE_UPPER (two points at the origin).
+    Both represent half planes. They include x < 0, for tangential loads, and mirror each other, so that nodes match
+    and equal materials do not couple pressure and shear. Groups of cells: LOWER, UPPER, CONT_LOWER, CONT_UPPER (their
+    facing sides around the origin), FAR_LOWER, FAR_UPPER (the flat sides far from it). Groups of points: POLE_LOWER,
+    POLE_UPPER (two points at the origin).
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def crowned_blocks(
     contact_size : float
         That length [length].
     growth : float
-        Length of an edge beyond over that of its neighbour nearer to the origin, more than 1.
+        Ratio of the lengths of adjacent edges beyond, more than 1.
 
     Examples
     --------

@@ -38,8 +38,8 @@ def half_spheres(
     """Two half-spheres that touch at the origin, each a quarter disc in the (r, y) plane.
 
     The lower body has its centre at A1 = (0, -R), the end of its flat edge at B1 = (R, -R), its pole at C1 = (0, 0)
-    and D1 half-way along the arc; the upper body is its mirror image in y = 0. The poles C1 and C2 are two points
-    at one place. Nothing is random: equal arguments give equal meshes.
+    and D1 half-way along the arc; the upper body is its mirror image in y = 0. The poles C1 and C2 are two points at
+    the same position. Equal arguments give equal meshes.
 
     Groups of cells: SPHBAS, SPHHAU (lower, upper body), A1A2 (axis of both), A1B1, A2B2 (flat edges), CONT1, CONT2
     (arcs C1-D1, C2-D2), D1B1, D2B2 (the rest of the arcs). Groups of points: A1 B1 C1 D1 A2 B2 C2 D2; with
@@ -48,8 +48,8 @@ def half_spheres(
     Parameters
     ----------
     element : {"tri3", "tri6", "quad4", "quad8", "quad9"}
-        Triangles fill the discs freely; quadrangles stand in three blocks per body. The middle nodes of quadratic
-        elements lie on the circle.
+        Triangles form an unstructured mesh, quadrangles three structured blocks per body. The mid-side nodes of
+        quadratic elements lie on the circle.
     R : float
         Radius [length].
     size, contact_size : float, optional
@@ -59,7 +59,7 @@ def half_spheres(
         Triangles only: distance from the pole up to which `contact_size` holds, 0 by default [length].
     arc_sizes : (float, float), optional
         Quadrangles only: segments of the arc at its pole and at D, in geometric progression between; R/250 and R/25 by
-        default. The number of segments is whole, so both are shorter in the end by one common factor [length].
+        default. Both are reduced by a common factor so that the number of segments is an integer [length].
     segments : int, optional
         Quadrangles only: segments on the sides of the square A-M, on D-B and on the radial lines M-C, N-D and P-B;
         15 by default.
@@ -100,7 +100,7 @@ def quarter_disc(
     element, R, size, contact_size, contact_radius, arc_sizes, segments, radial_sizes
         As for `half_spheres`.
     body : {"lower", "upper"}
-        Which one.
+        The body to generate.
 
     Examples
     --------

@@ -43,11 +43,9 @@ class Circle:
     Parameters
     ----------
     centre : (float, float)
-        [length].
-    radius : float
-        Greater than 0 [length].
+        Centre [length]. radius : float Greater than 0 [length].
     group : str, optional
-        Group of facets that lie on it; by default all outer facets whose ends do.
+        Group of facets that lie on it; by default all outer facets whose ends lie on it.
 
     Examples
     --------
@@ -80,17 +78,17 @@ class Circle:
 def to_quadratic(mesh: Mesh, curves: Iterable[Curve] = (), *, centre_nodes: bool = False) -> Mesh:
     """Return the mesh with a mid node on every edge: tri3 to tri6, quad4 to quad8 or quad9, hex8 to hex20 ...
 
-    A mid node stands half-way between its ends, but on the curve where the edge belongs to a facet of the curve's group
-    and both its ends lie on the curve. Points keep their numbers, mid nodes follow, then centre nodes. MeshError if a
-    cell is quadratic already, `centre_nodes` is given for a 3D mesh, a curve's group has no edge on the curve, or a cell
-    is folded by its curved side (its Jacobian is not positive at a quadrature point).
+    A mid node lies half-way between the ends of its edge, or on the curve if the edge belongs to a facet of the
+    curve's group and both ends lie on the curve. Points keep their numbers; mid nodes follow, then centre nodes.
+    MeshError if a cell is quadratic already, `centre_nodes` is given for a 3D mesh, the group of a curve has no edge
+    on the curve, or a curved side makes the Jacobian of a cell nonpositive at a quadrature point.
 
     Parameters
     ----------
     mesh : Mesh
         Cells of linear elements.
     curves : iterable of Curve
-        True shapes of the boundary, for example `Circle`.
+        Exact shapes of the boundary, for example `Circle`.
     centre_nodes : bool
         Whether quadrangles get a centre node (quad9); 2D only.
 

@@ -83,17 +83,18 @@ def _pattern(name: str) -> _Pattern:
 def refined(mesh: Mesh, curves: Iterable[Curve] = ()) -> Mesh:
     """Return the mesh with every line divided in two and every triangle and quadrangle in four.
 
-    New points stand where the parent's shape functions put them; on a curve if they belong to a facet of the curve's
-    group all of whose nodes lie on it. Points keep their numbers. Cell groups hold the children of their cells; a new
-    point joins every point group that holds all nodes of its edge (or, inside a cell, of the cell). MeshError if a cell
-    is of another kind, a curve's group has no facet on the curve, or a child is folded by its curved side.
+    New points are interpolated by the shape functions of the parent cell, or lie on a curve if they belong to a facet
+    of the curve's group with all nodes on the curve. Points keep their numbers. Cell groups contain the children of
+    their cells; a new point belongs to every point group that holds all nodes of its edge (or, inside a cell, of the
+    cell). MeshError if a cell is of another type, the group of a curve has no facet on the curve, or a curved side
+    makes a child invalid.
 
     Parameters
     ----------
     mesh : Mesh
         Two-dimensional; tri3, tri6, quad4, quad8, quad9, line2, line3.
     curves : iterable of Curve
-        True shapes of the boundary, for example `Circle`; see also `circles`.
+        Exact shapes of the boundary, for example `Circle`; see also `circles`.
 
     Examples
     --------
@@ -213,9 +214,9 @@ def _point_groups(mesh: Mesh, new: _NewPoints) -> dict[str, AnyArray]:
 
 @typed(MeshError)
 def linearised(mesh: Mesh) -> Mesh:
-    """Return the mesh on its corners alone: tri6 to tri3, quad8 and quad9 to quad4, line3 to line2.
+    """Return the linear mesh on the corners: tri6 to tri3, quad8 and quad9 to quad4, line3 to line2.
 
-    Points that no cell uses any more are dropped; the others keep their order.
+    Points that no cell uses any more are removed; the others keep their order.
 
     Examples
     --------
@@ -247,10 +248,10 @@ def linearised(mesh: Mesh) -> Mesh:
 
 @typed(MeshError)
 def circles(mesh: Mesh) -> list[Circle]:
-    """Return the circles on which groups of outer facets lie, one a group, so that `refined` can keep to them.
+    """Return the circles on which groups of outer facets lie, one per group, for use in `refined`.
 
-    A circle through the nodes is found by least squares. It counts if all nodes lie on it to rounding, there are more than
-    three, and the line turns gently: four corners of a square lie on a circle, too.
+    A circle is fitted to the nodes by least squares. It is accepted if more than three nodes lie on it up to round-off
+    and the line has no sharp corners, since the corners of a square lie on a circle, too.
 
     Examples
     --------

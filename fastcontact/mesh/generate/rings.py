@@ -30,14 +30,14 @@ def rings(
 ) -> Mesh:
     """Quarter of two rings that touch at the interface radius, centred at the origin, x >= 0 and y >= 0.
 
-    The rings fit without play: give their contact a ``clearance`` below 0 for an interference. Groups of cells: INNER,
-    OUTER, CONT_INNER, CONT_OUTER (both sides of the interface), BORE, RIM, SYMMETRY_X (x = 0 of both), SYMMETRY_Y
-    (y = 0 of both).
+    The rings fit without clearance: for an interference, give their contact a negative ``clearance``. Groups of cells:
+    INNER, OUTER, CONT_INNER, CONT_OUTER (both sides of the interface), BORE, RIM, SYMMETRY_X (x = 0 of both),
+    SYMMETRY_Y (y = 0 of both).
 
     Parameters
     ----------
     element : {"tri3", "tri6", "quad4", "quad8", "quad9"}
-        Element of both solids; mid nodes of curved sides stand on their circles.
+        Element of both solids; mid nodes of curved sides lie on their circles.
     inner_radius, interface_radius, outer_radius : float
         Increasing [length].
     divisions_inner, divisions_outer : (int, int)

@@ -39,9 +39,9 @@ def sphere_on_block(
 ) -> Mesh:
     """Lower half of a sphere on a block, the quarter x >= 0, z >= 0 of both.
 
-    The sphere touches the block at the origin, its centre stands at (0, R, 0). The meshes do not match; both are
-    finest at the contact. Groups of cells: SPHERE, BLOCK, SYMMETRY_X, SYMMETRY_Z (x = 0 and z = 0 of both), SPHERE_TOP
-    (y = R), CONT_SPHERE (around the pole, up to 45 degrees along x and along z), SPHERE_SIDE (the rest of the sphere),
+    The sphere touches the block at the origin; its centre is (0, R, 0). The meshes do not match; both are finest at
+    the contact. Groups of cells: SPHERE, BLOCK, SYMMETRY_X, SYMMETRY_Z (x = 0 and z = 0 of both), SPHERE_TOP (y = R),
+    CONT_SPHERE (around the pole, up to 45 degrees along x and along z), SPHERE_SIDE (the rest of the sphere),
     CONT_BLOCK (top of the block), BLOCK_SIDE, BLOCK_BOTTOM. Groups of points: POLE_SPHERE, POLE_BLOCK (two points at
     the origin), CENTRE (of the sphere).
 
@@ -61,8 +61,8 @@ def sphere_on_block(
         Distance from the pole up to which `contact_size` holds, R/10 by default; half as deep below the surfaces
         [length].
     growth : float
-        Increase of the edges over the distance beyond, until they reach `size`. It bounds the accuracy that a smaller
-        `contact_size` brings.
+        Increase of the edge length per distance beyond, until it reaches `size`. It limits the accuracy that a smaller
+        `contact_size` can reach.
 
     Examples
     --------
@@ -98,7 +98,7 @@ def sphere_octant(
 ) -> Mesh:
     """Lower half of a sphere, the quarter x >= 0, z >= 0: the upper body of `sphere_on_block`, with its groups.
 
-    An inner block stands at the centre, a rounded cube, and three between it and the surface.
+    The mesh has a rounded cube at the centre, and three blocks between it and the surface.
 
     Parameters
     ----------

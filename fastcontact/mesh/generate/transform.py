@@ -30,7 +30,7 @@ def renamed(mesh: Mesh, names: Names) -> Mesh:
     ----------
     mesh : Mesh
     names : mapping or callable
-        New name by old name. A name that a mapping lacks stays; None drops the group. Groups that get the same
+        New name by old name. Names that a mapping lacks are kept; None removes the group. Groups that get the same
         name are united.
 
     Examples
@@ -53,7 +53,7 @@ def renamed(mesh: Mesh, names: Names) -> Mesh:
 
 @typed(MeshError)
 def mirrored(mesh: Mesh, axis: str, at: float = 0.0, rename: Names | None = None) -> Mesh:
-    """Return the mirror image; cells and facets are turned so that they stay oriented as they were.
+    """Return the mirror image; cells and facets keep their orientation.
 
     MeshError if the mesh has no such axis.
 
@@ -63,7 +63,7 @@ def mirrored(mesh: Mesh, axis: str, at: float = 0.0, rename: Names | None = None
     axis : {"x", "y", "z"}
         Coordinate that is reflected.
     at : float
-        Where the mirror stands on that axis [length].
+        Position of the mirror plane on that axis [length].
     rename : mapping or callable, optional
         New names of groups, as in `renamed`.
 
@@ -122,7 +122,7 @@ def transformed(mesh: Mesh, *, translate: ArrayLike | None = None, scale: float 
 
 @typed(MeshError)
 def union(*meshes: Mesh) -> Mesh:
-    """Return one mesh of several: points one after the other, none merged, groups of the same name united.
+    """Return the union of several meshes: no points are merged, and groups of the same name are united.
 
     MeshError if there is no mesh or the dimensions differ.
 
@@ -174,16 +174,16 @@ def _renumbering(mesh: Mesh, starts: dict[str, int]) -> AnyArray:
 
 @typed(MeshError)
 def merge_points(mesh: Mesh, tolerance: float) -> Mesh:
-    """Return the mesh with points closer than `tolerance` welded into one, the first of them.
+    """Return the mesh with points closer than `tolerance` merged into the first of them.
 
-    Points are welded wherever they lie, also where two bodies only touch. Chains of close points become one. MeshError
-    if two nodes of one cell fall together: the tolerance is larger than an edge.
+    All close points are merged, also where two bodies only touch; chains of close points become one. MeshError if two
+    nodes of one cell would coincide, since the tolerance exceeds the length of an edge.
 
     Parameters
     ----------
     mesh : Mesh
     tolerance : float
-        Largest distance of points that are the same, at least 0 [length].
+        Largest distance of points to merge, at least 0 [length].
 
     Examples
     --------

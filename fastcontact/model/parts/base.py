@@ -175,6 +175,6 @@ class ModelBase:
         return related
 
     def holding_rows(self) -> csr_array:
-        """Return the rows (m, n_dofs) of constraints and springs; their product with free motions is 0."""
+        """Return rows (m, n_dofs) [unit of the caller] of constraints and springs, zero on free rigid-body modes."""
         relations = stacked_rows(self.relations, self.n_dofs)
         return csr_array(vstack([relations, stacked(self.springs, self.n_dofs)], format="csr"))

@@ -369,8 +369,8 @@ class ModelContact(ModelConnections):
     def bind(self, pair: ContactPair, held: HeldMotions | None = None, *, sectors_alike: bool = True) -> Formulation:
         """Return the formulation of a contact pair on this mesh; see `add_contact` for the errors.
 
-        `held` are the motions of nodes prescribed by supports and constraints, if known; `sectors_alike` tells whether
-        pressures are equal at both ends of a sector.
+        `held` are the nodal motions that supports and multi-point constraints prescribe, if known; `sectors_alike`
+        states whether pressures are equal at both ends of a sector.
         """
         check_known("contact formulation", pair.formulation, FORMULATIONS, ContactError)
         kind = FORMULATIONS[pair.formulation].variant(self.mesh.dim, pair.options)

@@ -44,8 +44,8 @@ class ModelHeat(ModelMaterials):
         ramp : Ramp or iterable of (float, float), optional
             History of the rise above `Model.reference_temperature`.
         begins, ends : float, optional
-            Ends of load steps between which it is prescribed, by default always. One that begins later goes from the
-            temperatures that it finds to the next point of its `ramp` [-].
+            Load factors of ends of load steps between which it is prescribed, by default always [-]. A temperature
+            that begins later changes from the current values to the next point of its `ramp`.
 
         Examples
         --------
@@ -130,7 +130,7 @@ class ModelHeat(ModelMaterials):
         ramp : Ramp or iterable of (float, float), optional
             History of the rise of the ambient temperature above `Model.reference_temperature`.
         begins, ends : float, optional
-            Ends of load steps between which it acts, by default always [-].
+            Load factors of ends of load steps between which it acts, by default always [-].
 
         Examples
         --------
@@ -147,12 +147,12 @@ class ModelHeat(ModelMaterials):
 
     @property
     def conducts(self) -> bool:
-        """Whether heat is conducted: with a heat load, a prescribed temperature, or a contact conductance."""
+        """Whether heat conduction is solved: with a heat load, a prescribed temperature, or a contact with a conductance."""
         return bool(self.heat_loads) or any("conductance" in pair.options for pair in self.contact)
 
     @property
     def cell_fields(self) -> tuple[str, ...]:
-        """Names of the `StepResult.cell_fields` in steps of this model: those of nonlinear bodies, and of heat."""
+        """Names of the `StepResult.cell_fields` of this model, for nonlinear bodies and heat conduction."""
         return (*super().cell_fields, *(HEAT_FLUX[: self.mesh.dim] if self.conducts else ()))
 
     @property
@@ -161,11 +161,11 @@ class ModelHeat(ModelMaterials):
         return any(material.expansion is not None for material, _ in self.materials)
 
     def conduction(self) -> Conduction:
-        """Return the solid cells as conductors of heat."""
+        """Return the conduction of the solid cells."""
         return Conduction(self.mesh, self.kinematics, [m for m, _ in self.materials], self.material_of_cells())
 
     def same_temperature(self) -> Indices:
-        """Return for each node (n_points,) the first one of equal temperature: at ends of periods and sides of sections."""
+        """Return for each node (n_points,) the first node of equal temperature, at ends of periods and sides of sections."""
         cuts = [(cut.nodes, cut.opposite) for cut in self.pretensions]
         representative = same_place([*self.periodic_interfaces, *cuts], self.mesh.n_points)  # type: ignore[list-item]
         return np.arange(self.mesh.n_points) if representative is None else representative
@@ -173,7 +173,8 @@ class ModelHeat(ModelMaterials):
     def fixed_temperatures(self) -> tuple[Mask, dict[Table | None, Array]]:
         """Return which nodes (n_points,) have a prescribed temperature, and their rises at multiplier 1 by history.
 
-        Nodes of equal temperature are represented by that of `same_temperature`. ModelError if two values differ at a node.
+        Nodes with the same temperature are represented by the first one, see `same_temperature`. ModelError if two
+        prescribed temperatures differ at a node.
         """
         fixed, given = np.zeros(self.mesh.n_points, bool), np.zeros(self.mesh.n_points)
         by_ramp: dict[Table | None, Array] = {}
@@ -198,7 +199,7 @@ class ModelHeat(ModelMaterials):
         return fixed, by_ramp
 
     def check_heat(self) -> None:
-        """Raise ModelError if heat conduction is undetermined, or data are missing."""
+        """Raise ModelError if the heat problem is not uniquely solvable or lacks data."""
         for pair in self.contact:
             if "friction_heat" in pair.options and not self.conducts:
                 raise ModelError(

@@ -221,10 +221,9 @@ class ModelInitialStates(ModelLoads):
         )
 
     def temperature_rise(self, factors: Sequence[float]) -> Array | None:
-        """Return the temperature rise (n_points,) [temperature], None without temperatures.
+        """Return the temperature rise (n_points,) [temperature]; None without temperatures.
 
-        `factors` are the multipliers of all added temperatures, as ``step.iterations["temperature_factors"]`` of a step
-        result.
+        `factors` holds a multiplier for each temperature, like ``step.iterations["temperature_factors"]`` of a step result.
         """
         if not self.temperatures or not len(factors):
             return None
@@ -234,7 +233,7 @@ class ModelInitialStates(ModelLoads):
         return np.asarray(np.sum(rises, axis=0))
 
     def expanding_rise(self, temperature_factors: Sequence[float], temperature: Array | None) -> Array | None:
-        """Return the temperature rise (n_points,) for thermal expansion [temperature]; None without any.
+        """Return the temperature rise (n_points,) of thermal expansion [temperature]; None without it.
 
         `temperature_factors` and `temperature` (n_points,) [temperature] are those of `stress_offset`.
         """
@@ -246,10 +245,10 @@ class ModelInitialStates(ModelLoads):
         self, temperature_factors: Sequence[float] = (), initial_factors: Sequence[float] = (),
         field: MaterialField | None = None, temperature: Array | None = None,
     ) -> StressOffset | None:  # fmt: skip
-        """Return the stress due to temperatures and initial states, in addition to that of displacements; None without any.
+        """Return the stresses of temperatures and initial states, to add to those of displacements; None without any.
 
-        The factors are those of a step result, `StepResult.iterations`; `field` is the `material_field`, if known;
-        `temperature` (n_points,) [temperature] is that of the step result, if heat is conducted.
+        The factors are those of `StepResult.iterations`; `field` is the `material_field`, if known; `temperature`
+        (n_points,) [temperature] is that of the step result, with heat conduction.
         """
         rise, states = self.expanding_rise(temperature_factors, temperature), []
         if len(initial_factors):
@@ -259,9 +258,9 @@ class ModelInitialStates(ModelLoads):
         return (field or self.material_field()).offset(rise, states, self.mesh.n_points)
 
     def thermal_forces_by_ramp(self) -> dict[Table | None, Array]:
-        """Return the nodal forces (n_points, dim) of thermal expansion at multiplier 1 by history [force].
+        """Return by history the nodal forces (n_points, dim) of thermal strains at multiplier 1 [force].
 
-        Raises ModelError if a heated material has no expansion.
+        ModelError if a heated material has no coefficient of expansion.
         """
         by_ramp: dict[Table | None, Array] = {}
         if not self.temperatures:
@@ -280,9 +279,9 @@ class ModelInitialStates(ModelLoads):
         return by_ramp
 
     def expansion_forces(self, field: MaterialField, rise: Array) -> Array:
-        """Return the nodal forces (n_points, dim) [force] of the thermal expansion by a temperature rise.
+        """Return the nodal forces (n_points, dim) [force] of the thermal strains of a temperature rise.
 
-        `rise` (n_points,) [temperature] is the rise over the reference.
+        `rise` (n_points,) [temperature] is relative to the reference.
         """
         return self._forces_of(field, field.offset(rise))
 

@@ -58,22 +58,22 @@ class ModelMaterials(ModelBase):
         return nonlinear_bodies(self.mesh, self.kinematics, self.strain, field)
 
     def refuse_nonlinear(self, feature: str) -> None:
-        """Raise ModelError if bodies are nonlinear, because `feature` only supports linear elasticity."""
+        """Raise ModelError if bodies are nonlinear, since `feature` is limited to linear elasticity."""
         nonlinear = [type(law).__name__ for law, _ in self.materials if isinstance(law, NonlinearElastic)]
         if self.nonlinear:
             named = nonlinear[0] if nonlinear else f"strain='{self.strain}'"
             raise ModelError(f"{feature} there for linear elasticity alone, not with {named}")
 
     def material_numbers(self) -> tuple[Array, dict[str, Numbers]]:
-        """Return moduli (n_moduli, 4, 4), in 3D (n_moduli, 6, 6) [pressure], and the row of every solid cell by element.
+        """Return moduli (n_moduli, 4, 4), in 3D (n_moduli, 6, 6) [pressure], and by element the row of each solid cell.
 
-        The first rows are those of the materials; varying materials have additional ones, for the middle of each cell.
+        The first rows are those of the materials; materials that vary have further rows for the centre of each cell.
         """
         field = self.material_field()
         return field.moduli, field.rows
 
     def material_field(self) -> MaterialField:
-        """Return the materials of all solid cells; ModelError if a cell has none, or two."""
+        """Return the materials of all solid cells; ModelError if a cell has none or two."""
         return material_field(
             self.mesh, self.kinematics, [material for material, _ in self.materials], self.material_of_cells()
         )
@@ -96,7 +96,7 @@ class ModelMaterials(ModelBase):
         return numbers
 
     def averaged_materials(self) -> Mask:
-        """Return which moduli (n_moduli,) have a mean dilatation; none in plane stress, where elements do not lock."""
+        """Return which moduli (n_moduli,) have a mean dilatation; none in plane stress, which does not lock."""
         return self.material_field().averaged
 
     def _check_material(self, index: int, group: str | None, given: Numbers) -> None:

@@ -214,7 +214,7 @@ class ModelSupports(ModelContact):
 
     @property
     def axis_nodes(self) -> Indices:
-        """Nodes (k,) on the axis of an axisymmetric model, where x is zero by symmetry; none in other models."""
+        """Nodes (k,) on the axis of an axisymmetric model, where x is fixed without a support; otherwise empty."""
         return axis_nodes(self.mesh) if self.kinematics == "axisymmetric" else np.empty(0, np.intp)
 
     def _tell_axis(self) -> None:

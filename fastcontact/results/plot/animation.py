@@ -64,30 +64,30 @@ def animate(
     units: Units = UNKNOWN,
     view: tuple[float, float] = (25.0, -60.0),
 ) -> MovingPicture:
-    """Write the deformed shape at all load steps as a moving picture; its colours and axes stand still.
+    """Write an animation of the deformed shape over all load steps, with fixed axes and colour scale.
 
     Parameters
     ----------
     mesh : Mesh
     steps : sequence of StepResult
     path : str or path
-        File to write: ``.gif``, or where the program ffmpeg is installed ``.mp4``, ``.mkv``, ``.webm``.
+        File to write: ``.gif``, or ``.mp4``, ``.mkv``, ``.webm`` if the program ffmpeg is installed.
     field, scale, mirrored, units, view
         As in `deformed_shape`.
     pictures_per_second : int
-        How fast it goes [1/s].
+        Frame rate [1/s].
     title : str
-        Title of every picture, below which the load factor stands.
+        Title of every frame, followed by the load factor.
 
     Returns
     -------
     MovingPicture
-        Which shows itself where it ends a cell of a notebook.
+        The animation, displayed at the end of a notebook cell.
 
     Raises
     ------
     FastcontactError
-        If there are no steps, the suffix is another one, ffmpeg is missing or fails.
+        If there are no steps, the suffix is unknown, or ffmpeg is missing or fails.
     FileError
         If the file cannot be written.
 

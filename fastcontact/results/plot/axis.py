@@ -38,7 +38,7 @@ def axis_stress(
     units: Units = UNKNOWN,
     ax: Axes | None = None,
 ) -> Axes:
-    """Plot the stresses at the nodes on the axis of a contact over the depth under its surface.
+    """Plot the stresses at the nodes on the axis of a contact over the depth below its surface.
 
     The axis passes through the middle of the contact, along the normal there; in axisymmetry it is that of the bodies.
 

@@ -45,10 +45,10 @@ def contact_map(
     units: Units = UNKNOWN,
     axes: Sequence[Axes] | None = None,
 ) -> Sequence[Axes]:
-    """Plot the pressure over the secondary surface of a contact, and shear or slip beside it where there is any.
+    """Plot the pressure on the secondary surface of a contact and, with friction, the shear or slip beside it.
 
-    The undeformed surface is seen along its mean normal. Closed nodes are dots, open ones are not marked; where there is
-    shear or slip, the nodes that slide are orange and arrows show its direction.
+    The undeformed surface is projected along its mean normal. Dots mark closed nodes; in the map of shear or slip,
+    sliding nodes are orange and arrows show the direction.
 
     Parameters
     ----------
@@ -58,13 +58,13 @@ def contact_map(
     everything : bool
         Draw the whole surface; by default the closed part and its surroundings.
     beside : {"shear", "slip", "slip_total"}
-        What is drawn beside the pressure; see `ContactResult`.
+        Quantity drawn beside the pressure; see `ContactResult`.
     title, units
         As in `pressure_profile`.
     axes : matplotlib Axes, two where there is shear, optional
 
-    Returns a tuple of Axes: of the pressure, and where there is any of the shear or slip. Raises FastcontactError if the
-    mesh is not three-dimensional, its surface is not that of the contact, or what is closed of it goes around a body.
+    Returns a tuple of Axes, of the pressure and, with friction, of the shear or slip. FastcontactError if the mesh is
+    not three-dimensional, does not contain the contact surface, or if the closed part of it goes around a body.
 
     Examples
     --------

@@ -26,13 +26,13 @@ Array = NDArray[np.float64]
 def contacts(
     found_contacts: FoundContacts, *, view: tuple[float, float] = (25.0, -60.0), ax: Axes | None = None
 ) -> Axes:
-    """Draw the contacts that `find_contacts` has found: a colour for each, the secondary side strong, the primary one pale.
+    """Plot the contact pairs of `find_contacts`, one colour each, with the secondary side darker than the primary one.
 
     Parameters
     ----------
     found_contacts : FoundContacts
     view : (float, float)
-        In 3D, height of the eye over the x-y plane and its direction around z [degrees].
+        In 3D, elevation and azimuth of the view [degrees].
     ax : matplotlib Axes, optional
         In 3D with ``projection="3d"``.
 

@@ -37,18 +37,18 @@ def history(
 ) -> Sequence[Axes]:
     """Plot force and contact radius of a contact pair over the load.
 
-    Where the force cancels all round, as in a press fit, it is the sum of the normal forces.
+    If the resultant vanishes, as in a press fit, the sum of the normal forces is plotted.
 
     Parameters
     ----------
     steps, pair
         Steps of an analysis, name of a contact pair.
     law : object with ``at_approach(d)``, optional
-        A theory, drawn where `approach` is given.
+        A theory, drawn if `approach` is given.
     approach : float, optional
         Approach of the bodies at load factor 1 [length]; the abscissa is then the approach.
     share : float
-        Part of the theory's contact that the model holds [-]: 0.25 for a quarter of it.
+        Modelled fraction of the theory's contact [-], e.g. 0.25 for a quarter.
     title, units
         As in `pressure_profile`.
     axes : two matplotlib Axes, optional

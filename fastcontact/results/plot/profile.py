@@ -31,9 +31,9 @@ def pressure_profile(
     units: Units = UNKNOWN,
     ax: Axes | None = None,
 ) -> Axes:
-    """Plot the contact pressure over the distance from the middle of the contact, with theory beside it.
+    """Plot the contact pressure over the distance from the middle of the contact, with theory for comparison.
 
-    In plane problems the distance is that along the surface, with a sign where nodes lie on both sides of the middle; see
+    In plane problems the distance is the arc length, with a sign if nodes lie on both sides of the middle; see
     `ContactResult.place`.
 
     Parameters
@@ -48,8 +48,8 @@ def pressure_profile(
         `normal_stress`.
     title : str
     units : mapping
-        Names of the units of ``length``, ``force`` and ``pressure`` for the labels, by default those of the model (none
-        where it names none); see `UNITS`.
+        Names of the units of ``length``, ``force`` and ``pressure`` for the labels, by default those of the model, if
+        any; see `UNITS`.
     ax : matplotlib Axes, optional
 
     Examples

@@ -55,9 +55,9 @@ def section(
     units: Units = UNKNOWN,
     ax: Axes | None = None,
 ) -> Axes:
-    """Plot a plane section through a mesh in three dimensions, coloured by a field, its largest value on it marked.
+    """Plot a plane section through a 3D mesh, coloured by a field, with the largest value marked.
 
-    The section is that through the undeformed bodies, drawn where its material has moved to, seen along the normal.
+    The plane cuts the undeformed bodies; the section is drawn in its deformed position, projected along the normal.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def section(
     field, scale, edges, title, units
         As in `deformed_shape`; edges are the lines along which the plane cuts facets.
     zoom : float, optional
-        Half the width of the part to draw, around the marked place [length].
+        Half the width of the part to draw, around the largest value [length].
     ax : matplotlib Axes, optional
 
     Raises

@@ -61,7 +61,7 @@ def deformed_shape(
     view: tuple[float, float] | None = None,
     ax: Axes | None = None,
 ) -> Axes:
-    """Plot the deformed mesh, in 3D what is seen of its surface, coloured by a field, its largest value marked.
+    """Plot the deformed mesh (in 3D its visible surface), coloured by a field, with the largest value marked.
 
     Parameters
     ----------
@@ -73,18 +73,18 @@ def deformed_shape(
     scale : float
         Factor on the displacements.
     edges : bool, optional
-        Draw the cells' edges; by default up to 5000 cells, or facets of the surface in 3D.
+        Whether to draw edges; by default up to 5000 cells, or facets of the surface in 3D.
     mirrored : bool
-        In 2D, draw the other half beyond x = 0, too: the full section of an axisymmetric body.
+        In 2D, also draw the mirror image at x = 0: the full section of an axisymmetric body.
     zoom : float, optional
-        In 2D, half the width of the part to draw, around the marked place [length]; FastcontactError in 3D.
+        In 2D, half the width of the part to draw, around the largest value [length]; FastcontactError in 3D.
     limits : (float, float), optional
-        Values of the first and the last colour, in the unit of the field.
+        Limits of the colour scale, in the unit of the field.
     title, units
         As in `pressure_profile`.
     view : (float, float), optional
-        In 3D, height of the eye over the x-y plane and its direction around z [degrees]; by default (25, -60), or the first
-        of eight corners, of a box around the body, from which the extreme value is seen.
+        In 3D, elevation and azimuth of the view [degrees]; by default (25, -60), or the first of eight corners of the
+        bounding box from which the largest value is visible.
     ax : matplotlib Axes, optional
         In 3D with ``projection="3d"``.
 

@@ -12,7 +12,7 @@ from fastcontact.results.step import StepResult
 
 
 def view(results: Any, step: StepResult, *, scale: float = 1.0, title: str = "", screenshot: str | None = None) -> None:
-    """Show the deformed mesh coloured by its von Mises stress in a window that can be turned.
+    """Show the deformed mesh coloured by its von Mises stress in an interactive window.
 
     Parameters
     ----------
@@ -23,12 +23,12 @@ def view(results: Any, step: StepResult, *, scale: float = 1.0, title: str = "",
         Factor on the displacements.
     title : str
     screenshot : str, optional
-        Picture to write instead of opening a window.
+        Picture file to write instead of opening a window.
 
     Raises
     ------
     FastcontactError
-        If PyVista is not installed, or a window is asked for without a display.
+        If PyVista is not installed, or there is no display for a window.
 
     Examples
     --------
