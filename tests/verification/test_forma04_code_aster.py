@@ -4,6 +4,7 @@ import csv
 
 import numpy as np
 import pytest
+from pairwise import first_of
 
 import fastcontact as fc
 
@@ -40,7 +41,7 @@ def test_two_geometry_updates_reproduce_code_aster(letter, tolerance, meshes, co
         assert np.abs(last.stress[number] - stress).max() < 1e-9 * np.abs(stress).max()
 
 
-@pytest.mark.parametrize("letter", ["a", "c"])
+@pytest.mark.parametrize("letter", first_of(1, ["a", "c"]))
 def test_converged_geometry_does_not_depend_on_the_number_of_steps(letter, meshes, forma04):
     model = forma04(meshes[letter])
     one, twenty = (fc.solve(model, fc.linear_ramp(n))[-1] for n in (1, 20))
@@ -51,7 +52,7 @@ def test_converged_geometry_does_not_depend_on_the_number_of_steps(letter, meshe
     assert np.abs(one.stress - twenty.stress).max() < 1e-8 * np.abs(twenty.stress).max()
 
 
-@pytest.mark.parametrize("letter", ["a", "c"])
+@pytest.mark.parametrize("letter", first_of(1, ["a", "c"]))
 def test_multigrid_gives_the_same_values(letter, meshes, forma04):
     model = forma04(meshes[letter])
     last = fc.solve(model, fc.linear_ramp(2), linear_solver="amg", linear_tolerance=1e-10)[-1]
@@ -91,6 +92,7 @@ def test_continuous_contact_on_quadratic_triangles(meshes, forma04):
     assert smooth_deviation(contact) < 0.02
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("integration", ["gauss", "simpson", "node"])
 @pytest.mark.parametrize("letter", ["a", "b", "c"])
 def test_no_integration_rule_leaves_a_multiplier_undetermined(integration, letter, meshes, forma04):

@@ -6,6 +6,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 from models import elastic_model
+from pairwise import first_of
 from stepping import Stepping
 
 import fastcontact as fc
@@ -154,7 +155,7 @@ def test_two_bodies_in_space(formulation, friction, solver):
     check_resumed(make, fc.linear_ramp(3), FRICTION if friction else FRICTIONLESS, linear_solver=solver)
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize("friction", first_of(1, [0.3, 0.0]))
 def test_a_stiff_secondary_side_by_multigrid(friction):
     def make():
         parts = []
@@ -227,7 +228,7 @@ def test_steps_cut_in_halves(solver, updates, friction):
 
 
 def test_after_every_step():
-    check_resumed(lambda: spheres("continuous"), UP_AND_DOWN, FRICTIONLESS, after=(1, 2, 3, 4), linear_solver="amg")
+    check_resumed(lambda: spheres("continuous"), UP_AND_DOWN, FRICTIONLESS, after=(1, 3), linear_solver="amg")
 
 
 def test_bodies_on_springs():

@@ -237,7 +237,7 @@ def test_a_pipe_is_no_result_file(whole, path, capsys):
 
 
 @pytest.mark.skipif(importlib.util.find_spec("resource") is None, reason="needs resource limits")
-@pytest.mark.parametrize("extra", [[], ["--resume"]], ids=["anew", "resumed"])
+@pytest.mark.parametrize("extra", [pytest.param([], marks=pytest.mark.slow), ["--resume"]], ids=["anew", "resumed"])
 def test_a_disk_that_is_full_stops_the_run(extra, whole, path, capsys, monkeypatch):
     """Simulated by a limit for the size of files."""
     import resource

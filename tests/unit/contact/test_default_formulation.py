@@ -30,6 +30,7 @@ def named(mesh, prefix):
     return renamed(mesh, {group: f"{prefix}_{group}" for group in mesh.group_names})
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("swapped", [False, True])
 @pytest.mark.parametrize("element", ["quad4", "tri6", "quad8", "quad9"])
 def test_rings_that_match_turn_by_nothing(element, swapped):
@@ -54,6 +55,7 @@ def test_rings_that_match_turn_by_nothing(element, swapped):
     assert np.abs(X[:, 0] * u[:, 1] - X[:, 1] * u[:, 0]).max() < 1e-6 * 100.0
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("swapped", [False, True])
 @pytest.mark.parametrize("part", [0.0, 0.1, 0.5])
 def test_what_matches_at_first_is_right_after_sliding(part, swapped):
@@ -79,6 +81,7 @@ def test_what_matches_at_first_is_right_after_sliding(part, swapped):
     assert force(1, "quad4") == pytest.approx(force(2, "quad8"), rel=0.03)
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("swapped", [False, True])
 @pytest.mark.parametrize("element", ["tri3", "quad4", "tri6", "quad8", "quad9"])
 @pytest.mark.parametrize("upper", [8, 11])
@@ -91,6 +94,7 @@ def test_a_uniform_pressure_in_the_plane(element, upper, swapped):
     np.testing.assert_allclose(solved(model).pressure, 0.01 * E, rtol=1e-8)
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("swapped", [False, True])
 @pytest.mark.parametrize("element", ["tet4", "hex8", "tet10", "hex20", "hex27"])
 @pytest.mark.parametrize("upper", [3, 4])

@@ -73,7 +73,7 @@ def recorded(path: Path, n_steps: int, monkeypatch: pytest.MonkeyPatch) -> tuple
     return writes, ends
 
 
-@pytest.mark.parametrize("apart", [4, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("apart", [12, pytest.param(1, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("n_steps", "from_step"), [(2, 0), (65, 64)])
 def test_every_write_may_be_the_last_one(
     n_steps: int, from_step: int, apart: int, path: Path, monkeypatch: pytest.MonkeyPatch

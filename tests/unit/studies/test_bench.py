@@ -92,7 +92,9 @@ def test_what_a_function_calls_outside_of_the_package_is_its_own():
     assert found == pytest.approx({"a/b.py/f": 1.0 + 3.0 + 0.3, "c.py/g": 2.0 + 1.0 + 0.1, "other": 0.5})
 
 
-@pytest.mark.parametrize("name", [pytest.param(s, marks=SLOW if s == "startup" else ()) for s in sorted(SUBJECTS)])
+@pytest.mark.parametrize(
+    "name", [pytest.param(s, marks=SLOW if s in ("startup", "study", "contact") else ()) for s in sorted(SUBJECTS)]
+)
 def test_smallest_size_runs_and_is_recorded(name, tmp_path, capsys):
     path = tmp_path / "run.json"
     assert main(["bench", name, "--smallest", "--json", str(path)]) == 0
@@ -106,6 +108,7 @@ def test_smallest_size_runs_and_is_recorded(name, tmp_path, capsys):
     assert name in capsys.readouterr().out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "problem",
     [

@@ -40,6 +40,7 @@ def fake(tmp_path, reaction):
     return path
 
 
+@pytest.mark.slow
 def test_our_own_column(tmp_path):
     text, figures = run(tmp_path, "forma04", "--only", "fastcontact")
     (found,) = figures["runs"]
