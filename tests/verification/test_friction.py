@@ -59,18 +59,6 @@ def test_tractions_stay_on_or_inside_the_cone(formulation):
             assert shear[sliding] == pytest.approx(0.3 * contact.pressure[sliding], rel=1e-9)
 
 
-def test_multigrid_solves_friction_too():
-    mesh = fc.generate.block_on_block(divisions_lower=(6, 2), divisions_upper=(3, 3), element="quad4")
-    results = []
-    for solver in ("direct", "amg"):
-        model = elastic_model(mesh, "plane_strain", LOWER_BOTTOM="xy")
-        model.prescribe("UPPER_TOP", x=2e-5, y=-1e-4)
-        model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", friction=0.3)
-        results.append(fc.solve(model, fc.linear_ramp(2), linear_solver=solver, linear_tolerance=1e-12)[-1])
-    one, other = results
-    assert np.abs(one.stress - other.stress).max() < 1e-7 * np.abs(one.stress).max()
-
-
 def pressed_and_drawn(friction=0.3, nu=0.49):
     """A large block pressed against a rigid parabola, then drawn sideways.
 

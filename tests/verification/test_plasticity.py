@@ -149,19 +149,6 @@ def test_unloading_is_elastic_and_leaves_a_dent() -> None:
     assert steps[-1].work["plastic_work"] == pytest.approx(steps[1].work["plastic_work"], rel=0.02)
 
 
-def test_a_restart_repeats_every_bit(tmp_path) -> None:
-    steps, model = indented("quad8", "continuous")
-    with fc.ResultWriter(tmp_path / "dent.vtkhdf", model) as out:
-        for step in fc.solve(model, [0.2, 0.4, 0.6]):
-            out.write(step)
-    stopped = fc.open_results(tmp_path / "dent.vtkhdf")
-    again = fc.solve(model, 5, resume=stopped)
-    for one, other in zip(steps, again, strict=True):
-        assert np.array_equal(one.displacement, other.displacement)
-        assert np.array_equal(one.stress, other.stress)
-    assert np.array_equal(stopped[-1].cell_fields["plastic_strain"], steps[2].cell_fields["plastic_strain"])
-
-
 def flattened(instants: list[float], size: float):
     """Press a ball on a rigid flat; return forces over that at yield at multiples of the interference at yield."""
     R, modulus, ratio, limit = 1.0, 1000.0, 0.3, 1.0
