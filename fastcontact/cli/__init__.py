@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import os
 import signal
 import sys
+import threading
 from collections.abc import Sequence
 
 INTERRUPTED = 130  # as shells have it
@@ -42,7 +44,15 @@ def entry_point() -> None:
         sys.unraisablehook = lambda found: None  # finalisers of what was left half made
     else:
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # nothing is left to say: Ctrl-C ends at once
+        _end_at_once(code)
     sys.exit(code)
+
+
+def _end_at_once(code: int) -> None:
+    """End the process without freeing its memory object by object, which takes a tenth of a short run."""
+    if threading.active_count() == 1:
+        atexit._run_exitfuncs()
+        os._exit(code)
 
 
 def _open_standard_files() -> None:
