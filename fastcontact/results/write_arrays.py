@@ -192,8 +192,9 @@ def append_tables(
         _append_sides(group, mesh, number, step.material_stress)
     contact = [[name, contact.formulation] for name, contact in step.contact.items()]
     text = as_json({**notes, "contact": contact, "iterations": step.iterations, "warnings": list(step.warnings)})
-    row = (step.index, step.load_factor, len(group["notes"]), len(text))
-    _extend(group["notes"], np.frombuffer(text.encode("ascii"), np.uint8))
+    table = group["notes"]
+    row = (step.index, step.load_factor, len(table), len(text))
+    _extend(table, np.frombuffer(text.encode("ascii"), np.uint8))
     _set_row(group["steps"], number, np.array(row, layout.STEP_ROW))
 
 
@@ -262,22 +263,24 @@ def _new_pair(parent: Any, name: str, dim: int, further: Iterable[str]) -> Any:
 
 def _append_contact(pair: Any, number: int, contact: ContactResult | None) -> None:
     """Append a pair's state; a step without it gets a row of zeros."""
-    row = np.zeros((), pair["steps"].dtype)
+    rows, steps = pair["rows"], pair["steps"]
+    row = np.zeros((), steps.dtype)
     if contact is not None:
-        table = np.zeros(len(contact.points), pair["rows"].dtype)
+        table = np.zeros(len(contact.points), rows.dtype)
         for name in table.dtype.names or ():
             table[name] = getattr(contact, name)
-        row["first"], row["count"] = len(pair["rows"]), len(table)
+        row["first"], row["count"] = len(rows), len(table)
         for name in set(row.dtype.names or ()).difference(layout.PLACES):
             value = getattr(contact, name)
             row[name] = np.nan if value is None else value
-        _extend(pair["rows"], table)
+        _extend(rows, table)
         if "primary" in pair:  # missing in older files
-            faced = np.zeros(len(contact.primary_points), pair["primary"].dtype)
+            primary = pair["primary"]
+            faced = np.zeros(len(contact.primary_points), primary.dtype)
             faced["points"], faced["force_vectors"] = contact.primary_points, contact.primary_force_vectors
-            row["primary_first"], row["primary_count"] = len(pair["primary"]), len(faced)
-            _extend(pair["primary"], faced)
-    _set_row(pair["steps"], number, row)
+            row["primary_first"], row["primary_count"] = len(primary), len(faced)
+            _extend(primary, faced)
+    _set_row(steps, number, row)
 
 
 def _append_sides(parent: Any, mesh: Mesh, number: int, sides: MaterialStress) -> None:
