@@ -11,11 +11,9 @@ from functools import cached_property
 from types import ModuleType
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fastcontact.arrays import Array
+from fastcontact.arrays import Array, Indices
 
-Indices = NDArray[np.int64]
 Function = Callable[[Array], Array]
 
 # Names of facets by the dimension of the cell and the number of nodes of the facet.

@@ -8,10 +8,9 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._tools.argument_types import typed
-from fastcontact.arrays import AnyArray, Array
+from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.generate.forest import RED
@@ -218,7 +217,7 @@ def linearised(mesh: Mesh) -> Mesh:
         used[block] = True
     number = np.cumsum(used) - 1
     merged: dict[str, AnyArray] = {}
-    order: list[NDArray[np.int64]] = []
+    order: list[Indices] = []
     for linear in dict.fromkeys(elements.get(name).linear for name in cells):
         parts = [name for name in cells if elements.get(name).linear == linear]
         merged[linear] = number[np.concatenate([cells[name] for name in parts])]
