@@ -14,8 +14,6 @@ FIRST_RESIDUAL, RESIDUAL = 1e-2, 0.03
 LEAST_FALL, CONTRACTS, STILL = 0.2, 0.7, 2
 # Newton iterations with friction as long as the residual is larger than the last one: errors reverse slips.
 INEXACT_NEWTON_STEPS = 3
-# Pairings after which errors of whole solutions are taken for what they are.
-PATIENT_UPDATES = 25
 # Changes of the displacement, in units of an iterative solver's tolerance, that its solutions alone may make beside what is
 # much stiffer.
 LEFT = 1e3
@@ -84,11 +82,8 @@ class Tolerances:
         """Return which changes of the displacement, whose size is given, linear solutions alone may make [length]."""
         return LEFT * self._solver.tolerance * size if self._solver.iterative else 0.0
 
-    def enough(self, update: int, size: float) -> float:
+    def enough(self, size: float) -> float:
         """Return the change of the displacement, whose size is given, below which the geometry has settled [length]."""
         # Iterative solvers leave a noise of their tolerance, times the contrast of cells; asking for less would never end.
         least = self._solver.tolerance * (self._solver.contrast if self._solver.iterative else 1.0)
-        accuracy = max(self._criteria.geometry, least)
-        if update >= PATIENT_UPDATES:
-            accuracy = max(accuracy, self._solver.error)
-        return max(accuracy * size, self._round_off)
+        return max(max(self._criteria.geometry, least) * size, self._round_off)

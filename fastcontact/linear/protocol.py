@@ -146,9 +146,6 @@ class LinearSolver(Protocol):
     asked : float, optional
         The tolerance that was asked for, where `improve` has lowered it [-].
     counters : Counters
-    error : float
-        By how much solutions for nearly the same right-hand side may differ, in units of their largest component, however
-        small `tolerance` is [-].
     gave_up : str
         Why another way of solving replaced this one; empty where none did.
     contrast : float
@@ -162,7 +159,6 @@ class LinearSolver(Protocol):
     tolerance: float
     counters: Counters
     asked: float | None = None
-    error: float = 0.0
     gave_up: str = ""
     contrast: float = 1.0
     basis_transformation: csr_array | None = None

@@ -134,7 +134,7 @@ class Amg(Multigrid, LinearSolver):
             (self.instead or self._factorise(instead["why"])).put_back(instead)
             return
         if self.instead is not None:  # multigrid was given up later
-            self._factored, self.instead, self.gave_up, self.error = self.instead, None, "", 0.0
+            self._factored, self.instead, self.gave_up = self.instead, None, ""
         put_back_tolerance(self, snapshot)
         if snapshot["precision"] != self.precision:
             self.build_in(snapshot["precision"])
@@ -199,7 +199,7 @@ class Amg(Multigrid, LinearSolver):
         self.gave_up, self.instead = why, self._factored
         # What is asked of later solutions is what factors give.
         self.asked = self.tolerance if self.asked is None else self.asked
-        self.tolerance, self.error = self.instead.tolerance, self.instead.error
+        self.tolerance = self.instead.tolerance
         return self.instead
 
 
