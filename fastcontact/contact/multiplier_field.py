@@ -13,10 +13,8 @@ from scipy.sparse.linalg import SuperLU
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ContactError
+from fastcontact.linear.delassus import MOST_ROWS
 from fastcontact.linear.field_compliance import FieldCompliance
-
-# Closed integration points up to which the dense equations of the continuous formulation are solved, in about a minute.
-MOST_POINTS = 10_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +46,7 @@ class Projection:
 
     def block(self, rows: Indices) -> Array:
         """Return rows and columns `rows` of C, a dense matrix; ContactError where it would be too large to be of use."""
-        if len(rows) > MOST_POINTS:
+        if len(rows) > MOST_ROWS:
             raise ContactError(
                 f"the continuous formulation closes {len(rows)} integration points at once, whose compliance would be a "
                 f"dense matrix of {8e-9 * len(rows) ** 2:.1f} GB: use formulation='mortar' with "

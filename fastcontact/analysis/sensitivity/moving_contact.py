@@ -25,10 +25,9 @@ from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ModelError
+from fastcontact.round_off import DIFFERENCES
 
 REMEDY = "Take another load a little off this one, or differences of two solutions to either side"
-# By how much points are moved, in units of the shortest edge: what central differences leave is then about 1e-10.
-MOVED = 1e-5
 # By how much constants and forces are changed, relative to what is allowed, or to the largest.
 CHANGED = 1e-3
 # What differences to either side may differ by where they are smooth, relative to what turning a facet by an edge makes.
@@ -141,7 +140,7 @@ class MovingContact:
         for block in (block for side in self._surfaces() for block in side.blocks):
             corners = self.problem.model.mesh.points[block.facets]
             edges.append(float(np.linalg.norm(np.ptp(corners, axis=1), axis=1).min()))
-        return MOVED * min(edges)
+        return DIFFERENCES * min(edges)
 
     def _surfaces(self) -> list[Surface]:
         pairs = self.problem.pairs.values()
@@ -170,7 +169,7 @@ class MovingContact:
         line between two facets.
         """
         apart, n = csr_array(0.5 * (forward - backward)), len(self.u)
-        force = float(np.abs(self.solution.multiplier).max(initial=0.0)) * MOVED / self.step
+        force = float(np.abs(self.solution.multiplier).max(initial=0.0)) * DIFFERENCES / self.step
         row = np.repeat(np.arange(apart.shape[0]), np.diff(apart.indptr))
         # Pressures follow forces: where those have no kink, they have none.
         size = np.where(row < n, force, np.where(row < n + len(self.active), 1.0, np.inf))
