@@ -9,9 +9,8 @@ from fastcontact.linear.protocol import LinearSolver
 # Relative residual of the first solution of a step by an iterative solver, and of later ones in units of the relative
 # change of the displacement and of the last residual: more accuracy than the pairing itself has is lost.
 FIRST_RESIDUAL, RESIDUAL = 1e-2, 0.03
-# With friction the residual falls at least to this part of the last one, unless that of the friction law did not fall to
-# CONTRACTS of its last one so many times: loose solutions may be what keeps it.
-LEAST_FALL, CONTRACTS, STILL = 0.2, 0.7, 2
+# With friction the residual falls at least to this part of the last one: loose solutions may be what keeps that of its law.
+LEAST_FALL = 0.2
 # Newton iterations with friction as long as the residual is larger than the last one: errors reverse slips.
 INEXACT_NEWTON_STEPS = 3
 # Changes of the displacement, in units of an iterative solver's tolerance, that its solutions alone may make beside what is
@@ -39,7 +38,6 @@ class Tolerances:
     ) -> None:
         self._solver, self._criteria, self._round_off, self._expected = solver, criteria, round_off, expected
         self._residual = max(solver.tolerance, FIRST_RESIDUAL) if begin_inexact else solver.tolerance
-        self._law_residual, self._still = 1.0, 0
 
     @property
     def inexact(self) -> bool:
@@ -49,14 +47,13 @@ class Tolerances:
     def tighten(self, relative_change: float, law_residual: float = 0.0) -> None:
         """Lower the residual to the forcing term of the last relative change of the displacement.
 
-        Where the friction law is off by more (`law_residual`, over the largest force) and Newton's method goes down, to what
-        that is worth: its next step is no more accurate.
+        Where the friction law is off by more (`law_residual`, over the largest force), to what that is worth: the next step
+        of Newton's method is no more accurate.
         """
         worth = RESIDUAL * min(self._residual, relative_change)
-        self._still = 0 if law_residual < CONTRACTS * self._law_residual else self._still + 1
-        if self._still < STILL and RESIDUAL * law_residual > worth:
+        if RESIDUAL * law_residual > worth:
             worth = min(RESIDUAL * law_residual, LEAST_FALL * self._residual)
-        self._residual, self._law_residual = max(self._solver.tolerance, worth), law_residual
+        self._residual = max(self._solver.tolerance, worth)
 
     def accuracy(self, scale: float, single_iteration: bool) -> Accuracy:
         """Return the accuracy of a solution.

@@ -50,8 +50,6 @@ CHANGE = 15
 # STOOD these were too few, and become twice as many, up to LONGEST_WARM.
 WARM, WARM_LEAST, MOST_WARM = 0.05, 1e-3, 10
 STOOD, LONGEST_WARM = 0.2, 40
-# A nonsymmetric iteration whose residual does not fall to this part in so many iterations stands still for good.
-FALLS, STANDING = 0.99, 40
 # Where the smoother amplifies something, its bound of the spectrum is raised by this factor, at most so often.
 RAISE, RAISES = 1.3, 4
 
@@ -294,22 +292,18 @@ class Multigrid:
         if begun > STOOD * self._cut_short and self._constrained.stiffening > MILD:
             self._most_warm = min(2 * self._most_warm, LONGEST_WARM)
         self._cut_short = np.inf
-        least, fallen = iteration.norm, 0  # the residual when it last fell, and the iterations until then
         while iteration.norm > wanted:
             done = iteration.norm <= enough
             if done and made >= self._most_warm:
                 self._cut_short = begun
                 return
-            stands = made - fallen >= STANDING
-            if stands or made >= self.patience or not iteration.step(multiply, precondition):
+            if made >= self.patience or not iteration.step(multiply, precondition):
                 if done:
                     return
                 left = iteration.norm / enough
                 raise StallError(f"conjugate residuals stand at {left:.1e} times the tolerance after {made} iterations")
             made += 1
             self._count()
-            if iteration.norm < FALLS * least:
-                least, fallen = iteration.norm, made
 
     def _count(self) -> None:
         self.counters.iterations += 1

@@ -39,9 +39,6 @@ from fastcontact.round_off import ROUND_OFF
 log = logging.getLogger("fastcontact")
 # Unknowns up to which a factorisation replaces multigrid.
 FACTORS_UP_TO = AFFORDABLE
-# Equations that stiffen a node by more than this leave the softer body too little of multigrid's tolerance; coupled ones,
-# whose weights are nearly right only, take hundreds of iterations from the second on.
-STIFFENED, STIFFENED_COUPLED = 3e4, 6.0
 # Work in one load step, in iterations, from which on factors are cheaper for certain: so much, and so much for each unknown,
 # by the number of components of a displacement. In 3D a factorisation and a step by it cost 300 and 0.04 where two bodies
 # touch, three times as much in stacks with friction (measured, see bench/README.md).
@@ -147,23 +144,6 @@ class Amg(Multigrid, LinearSolver):
             equations, springs = equations and _elimination(equations, n), springs and Springs.from_dict(springs, n)
             self._change_hierarchy(equations, springs)
         self.hierarchy.bounds = snapshot["bounds"]
-
-    def constrain(self, elimination: Elimination | None, springs: Springs | None = None) -> None:
-        """See `Multigrid.constrain`.
-
-        Raises
-        ------
-        StallError
-            If multigrid would need hundreds of iterations and factors can take over.
-        """
-        super().constrain(elimination, springs)
-        coupled = elimination is not None and elimination.coupled
-        stiffening = self._constrained.stiffening
-        if stiffening > (STIFFENED_COUPLED if coupled else STIFFENED) and self._may_factorise:
-            raise StallError(
-                f"contact makes nodes {stiffening:.1e} times as stiff as they are, where the secondary side is much stiffer "
-                "than the primary one: let the softer body be the secondary side"
-            )
 
     def give_up(self, stalled: StallError | TooManyColumnsError) -> None:
         """Factorise the matrix, since the iteration stalls or columns of its inverse cost more.
