@@ -158,7 +158,7 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
             watch.forget()
         elif moved.change <= tolerances.enough(moved.size):
             return settled
-        elif scatter := watch.seen(fraction, settled.force, moved.change, moved.size, tolerances.noise(moved.size)):
+        elif scatter := watch.seen(fraction, settled.force, moved.change, moved.size):
             _log_scatter(scatter, problem.criteria.geometry)
             return replace(settled, scatter=scatter)
         mixed = None

@@ -3,7 +3,7 @@
 How much round-off there is depends on the condition of the stiffness and of the constraints, which nothing tells beforehand;
 the last displacements show it. An iteration that still converges, however slowly, goes on in one direction: over a window
 its displacements lie as far apart as all changes together. Round-off oscillates: they lie hardly farther apart than one
-change. So does what iterative linear solutions leave, of which is known how large it may be.
+change. So does what iterative linear solutions leave.
 """
 
 from __future__ import annotations
@@ -17,8 +17,6 @@ from fastcontact.arrays import Array
 
 # Updates to look at, and how far apart their displacements may lie in units of the typical change: WINDOW in one direction.
 WINDOW, APART = 8, 4.0
-# Where changes may be what linear solutions leave, fewer will do, closer together: 3 in one direction.
-SHORT_WINDOW, CLOSE = 4, 2.0
 # What may scatter at most: displacements relative to the largest one, nodal contact forces relative to the largest one.
 DISPLACEMENT, FORCE = 1e-6, 1e-5
 # Changes that become smaller than this part of those at the beginning of the window still converge.
@@ -49,7 +47,7 @@ class Watch:
         self._forces: list[Array] = []
         self._changes: list[float] = []
 
-    def seen(self, unknowns: Array, force: Array, change: float, size: float, noise: float = 0.0) -> Scatter | None:
+    def seen(self, unknowns: Array, force: Array, change: float, size: float) -> Scatter | None:
         """Take the displacements `unknowns` (k,) [length] and contact forces (n,) [force] of an update; return their scatter.
 
         Parameters
@@ -59,8 +57,6 @@ class Watch:
             By how much the displacements differ from those before [length].
         size : float
             Of the displacements [length].
-        noise : float
-            Changes up to this may be what an iterative linear solver leaves [length].
 
         Returns
         -------
@@ -74,16 +70,12 @@ class Watch:
         self._forces.append(force.copy())
         self._changes.append(change)
         del self._parts[:-WINDOW], self._forces[:-WINDOW], self._changes[:-WINDOW]
-        last = self._changes[-SHORT_WINDOW:]
-        window, apart = (SHORT_WINDOW, CLOSE) if max(last) <= noise else (WINDOW, APART)
-        if len(self._changes) < window:
+        if len(self._changes) < WINDOW:
             return None
-        changes, half = self._changes[-window:], window // 2
-        scatter = Scatter(
-            _apart(self._parts[-window:]) / size, _apart(self._forces[-window:]) / (largest(force) or 1.0)
-        )
+        changes, half = self._changes, WINDOW // 2
+        scatter = Scatter(_apart(self._parts) / size, _apart(self._forces) / (largest(force) or 1.0))
         declining = np.median(changes[half:]) < DECLINE * np.median(changes[:half])
-        if declining or scatter.displacement * size > apart * float(np.median(changes)):
+        if declining or scatter.displacement * size > APART * float(np.median(changes)):
             return None
         return scatter if scatter.displacement <= DISPLACEMENT and scatter.force <= FORCE else None
 

@@ -13,9 +13,6 @@ FIRST_RESIDUAL, RESIDUAL = 1e-2, 0.03
 LEAST_FALL = 0.2
 # Newton iterations with friction as long as the residual is larger than the last one: errors reverse slips.
 INEXACT_NEWTON_STEPS = 3
-# Changes of the displacement, in units of an iterative solver's tolerance, that its solutions alone may make beside what is
-# much stiffer.
-LEFT = 1e3
 
 
 class Tolerances:
@@ -74,10 +71,6 @@ class Tolerances:
             max_iterations=limit,
             max_newton_steps=1 if limit == 1 else INEXACT_NEWTON_STEPS if self.inexact else None,
         )
-
-    def noise(self, size: float) -> float:
-        """Return which changes of the displacement, whose size is given, linear solutions alone may make [length]."""
-        return LEFT * self._solver.tolerance * size if self._solver.iterative else 0.0
 
     def enough(self, size: float) -> float:
         """Return the change of the displacement, whose size is given, below which the geometry has settled [length]."""
