@@ -151,9 +151,6 @@ class LinearSolver(Protocol):
     contrast : float
         By how much some deformations of a cell are stiffer than others: errors of displacements may exceed residuals by so
         much, and iterations that need not end with exact solutions go on by so much further [-].
-    basis_transformation : csr_array (n, n), optional
-        Rows of mid nodes of quadratic facets: what they move by where corners do, if gaps are weighted with functions that
-        are linear on facets. A hint which motions to eliminate [-].
     """
 
     tolerance: float
@@ -161,7 +158,6 @@ class LinearSolver(Protocol):
     asked: float | None = None
     gave_up: str = ""
     contrast: float = 1.0
-    basis_transformation: csr_array | None = None
 
     @property
     def iterative(self) -> bool:

@@ -142,14 +142,6 @@ class Formulation(ABC):
         """Whether normals are those of single facets, between which points may flip."""
         return isinstance(self.primary, Surface) and self.normals == "facet" and not self.options.tied
 
-    @property
-    def basis_transformation(self) -> csr_array | None:
-        """Values at mid nodes of functions that gaps are weighted with, where these are linear on quadratic facets.
-
-        A matrix (n_points, n_points) with rows of mid nodes and columns of corners [-]; None where there are none.
-        """
-        return None
-
     @classmethod
     def variant(cls, dim: int, options: Mapping[str, Any]) -> type[Formulation]:
         """Return the class that implements this formulation in 2 or 3 dimensions with the options of a user."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 import logging
 
 import numpy as np
-from scipy.sparse import bsr_array, csr_array
+from scipy.sparse import bsr_array
 
 from fastcontact._jit.decorators import check_threads
 from fastcontact.arrays import Array
@@ -74,7 +74,7 @@ class Multigrid:
 
     Attributes
     ----------
-    contrast, basis_transformation
+    contrast
         See `LinearSolver`.
     patience : int
         Nonsymmetric iterations of one solution at most.
@@ -95,7 +95,6 @@ class Multigrid:
         self.tolerance, self.precision = tolerance, precision
         self.counters = Counters()
         self.contrast = 1.0
-        self.basis_transformation: csr_array | None = None
         self.patience, self.work = MAX_NONSYMMETRIC, 0
         self.allowed: int | None = None
         self.begin()
