@@ -1,4 +1,4 @@
-"""Case files: a contact problem as TOML, checked as a whole before anything runs. They hold data, no code."""
+"""Case files: a contact problem as TOML data without code, checked as a whole before anything runs."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 # A quantity or a parameter of sensitivities.
 Asked = tuple[str | int, ...]
-# Suffix of input decks of Abaqus and CalculiX.
+# File suffix of input decks of Abaqus and CalculiX.
 DECK = ".inp"
 
 
@@ -118,13 +118,13 @@ def read_case(path: str | Path) -> Case:
         with in_file(path):
             return build_case(data, name=path.stem, folder=path.parent, text=text)
     except (ArithmeticError, AttributeError, LookupError, MemoryError, RecursionError, TypeError, ValueError) as error:
-        # A value that passed all checks by key: Python's own message is all there is.
+        # A value that passed all checks by key: only Python's message says what is wrong.
         reason = " ".join(str(error).split())[:200] or type(error).__name__
         raise CaseError(f"{path}: a value is of the wrong kind or size ({reason}): see the ready cases") from error
 
 
 def _case_of_deck(path: Path) -> Case:
-    """Return an input deck of Abaqus or CalculiX as a case."""
+    """Return the case made from an input deck of Abaqus or CalculiX."""
     from fastcontact.cases.decks.deck import read_deck
 
     deck = read_deck(path)
@@ -165,8 +165,8 @@ def _parsed(path: Path) -> tuple[str, dict[str, Any]]:
             raise CaseError(
                 f"the case file '{path}' is larger than {toml_text.LARGEST >> 20} MB: put its mesh into a file of its own"
             )
-        text = path.read_text(encoding="utf-8-sig")  # editors of Windows begin texts with a byte order mark
-    except (OSError, ValueError) as error:  # also a name with a zero in it, and no UTF-8
+        text = path.read_text(encoding="utf-8-sig")  # Windows editors begin files with a byte order mark
+    except (OSError, ValueError) as error:  # also a name with a null byte, and text that is not UTF-8
         raise CaseError(f"cannot read the case file '{path}': {_unreadable(path, error)}") from error
     try:
         return text, toml_text.parsed(text)
@@ -175,7 +175,7 @@ def _parsed(path: Path) -> tuple[str, dict[str, Any]]:
 
 
 def _unreadable(path: Path, error: Exception) -> str:
-    """Return why a case file cannot be read, and what to do."""
+    """Return the reason why a case file cannot be read, and a remedy."""
     if path.is_dir():
         return "it is a folder; name a file in it"
     if not path.exists():
@@ -232,7 +232,7 @@ def build_case(
 
 
 def _text(data: dict[str, Any]) -> str:
-    """Return data as the text of a case file, from which studies make their cases; empty where TOML cannot say it."""
+    """Return data as the text of a case file, from which studies make their cases; empty where TOML cannot express it."""
     try:
         return toml_text.written(data)
     except ValueError:
@@ -240,7 +240,7 @@ def _text(data: dict[str, Any]) -> str:
 
 
 def _pairs(data: dict[str, Any], model: Model) -> dict[str, Any]:
-    """Return the table of each contact pair and obstacle; pairs that were found have one in common."""
+    """Return the table of each contact pair and obstacle; pairs found automatically share one."""
     named = data.get("contact", {})
     named = {**(named if isinstance(named, dict) else {}), **data.get("obstacle", {})}
     return {pair.name: named.get(pair.name, data.get("contacts", {})) for pair in model.contact}
@@ -259,7 +259,7 @@ def _checks(
 def _sensitivities(model: Model, data: dict[str, Any]) -> list[tuple[Asked, list[Asked]]]:
     asked_for, entries = [], list(tables("sensitivity", data.get("sensitivity", [])))
     if entries:
-        from fastcontact.analysis.sensitivities import check_asked  # half of the solver
+        from fastcontact.analysis.sensitivities import check_asked  # imports half of the solver
     for i, entry in enumerate(entries):
         where = f"sensitivity[{i}]"
         check_keys(where, entry, SENSITIVITY)
@@ -341,7 +341,7 @@ def _theories(
 
 
 def _share(where: str, data: dict[str, Any]) -> float:
-    """Return the part of the theory's contact that the model holds, 1 by default."""
+    """Return the fraction of the theory's contact that the model represents, 1 by default."""
     check_keys(where, {"share": data.get("share", 1.0)}, {"share": NUMBER})
     share = float(data.get("share", 1.0))
     if not 0.0 < share <= 1.0:

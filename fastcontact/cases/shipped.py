@@ -1,4 +1,4 @@
-"""Ready cases: the case files that come with the package, found by name."""
+"""Ready cases: the case files that come with the package, available by name."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 from fastcontact.errors import CaseError, check_known
 
 _PACKAGE = Path(__file__).resolve().parents[1]
-# The folder in an installed package, and the folder in a checkout.
+# The folders in an installed package and in a checkout.
 _FOLDERS = (_PACKAGE / "data" / "cases", _PACKAGE.parent / "data" / "cases")
 
 

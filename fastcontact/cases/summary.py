@@ -18,9 +18,9 @@ from fastcontact.results.units import units_of_results, valued, with_unit
 if TYPE_CHECKING:
     from fastcontact.analysis.modal.shapes import Modes
 
-# Of contact resultants, those that a summary has.
+# Contact resultants included in a summary.
 RESULTANTS = ("normal_force", "moment", "area", "centre", "mean_gap", "pressure_mean")
-# Numbers that a theory must have to be compared as a whole.
+# Numbers that a theory must provide for a full comparison.
 COMPARED = ("force", "pressure_max", "radius")
 
 
@@ -70,7 +70,7 @@ def summarise(
 
 
 def _sensitivity(case: Case, last: StepResult, quantity: Asked, by: Sequence[Asked]) -> dict[str, Any]:
-    """Return derivatives of a quantity, or why there are none in this state."""
+    """Return the derivatives of a quantity, or the reason why there are none in this state."""
     from fastcontact.analysis.sensitivities import sensitivities
 
     try:
@@ -131,7 +131,7 @@ def _contact(contact: ContactResult, penalty: float | None) -> dict[str, Any]:
 
 
 def _resultants(case: Case, last: StepResult, name: str, steps: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return what `contact_resultants` tell of the last step, with the work of friction of all `steps`."""
+    """Return `contact_resultants` of the last step, with the friction work of all `steps`."""
     (resultants,) = contact_resultants(case.model, [last], name)
     return {
         **{name: _plain(getattr(resultants, name)) for name in RESULTANTS},
@@ -140,17 +140,17 @@ def _resultants(case: Case, last: StepResult, name: str, steps: Sequence[Mapping
 
 
 def _plain(value: Any) -> Any:
-    """Return a number, or an array of them, for JSON."""
+    """Return a number or an array in a form for JSON."""
     return [finite(member) for member in value] if np.ndim(value) else finite(value)
 
 
 def finite(value: float) -> float | None:
-    """Return a number that JSON can hold: None for NaN and infinity."""
+    """Return a number for JSON: None for NaN and infinity."""
     return float(value) if np.isfinite(value) else None
 
 
 def _extremes(step: StepResult) -> dict[str, list[float]]:
-    """Return the smallest and the largest number of the fields of cells."""
+    """Return the smallest and largest values of the cell fields."""
     return {name: _range(values) for name, values in step.cell_fields.items()}
 
 
@@ -170,7 +170,7 @@ def _probe(step: StepResult, point: int) -> dict[str, Any]:
 
 
 def _by_material(step: StepResult, point: int) -> dict[str, list[float]]:
-    """Return the stress of each side at a point where materials meet, by number of the material; else empty."""
+    """Return the stress of each side at a point where materials meet, by material number; otherwise empty."""
     values = step.material_stress.at(point) if step.material_stress is not None else {}
     return {str(number): stress.tolist() for number, stress in values.items()}
 
@@ -191,13 +191,13 @@ def _against_theory(
 
 def _deviations(computed: Mapping[str, float], theory: Any) -> dict[str, Any]:
     """Return the theory's numbers, and the relative deviations of the computed ones from them."""
-    exact = {name: finite(getattr(theory, name)) for name in COMPARED}  # the pressure under a tip has no bound
+    exact = {name: finite(getattr(theory, name)) for name in COMPARED}  # the pressure under a tip is unbounded
     off = {name: finite(computed[name] / value - 1.0) if value else None for name, value in exact.items()}
     return {**exact, "deviation": off}
 
 
 def lines(summary: Mapping[str, Any]) -> list[str]:
-    """Return the summary as lines for a person: contact, maximum of von Mises, theory, checks."""
+    """Return the summary as lines of text: contact, maximum von Mises stress, theory, checks."""
     unit = summary["units"]
     steps = summary["steps"]
     rows = [
@@ -243,7 +243,7 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
 
 
 def _mode_lines(table: Mapping[str, Any]) -> list[str]:
-    """Return the frequencies in lines, one for each number of nodal diameters, where pairs of modes are told once."""
+    """Return lines of frequencies, one for each number of nodal diameters; pairs of modes are listed once."""
     frequencies = table["frequencies"]
     diameters, twins = (
         table.get("nodal_diameters", [None] * len(frequencies)),
@@ -260,7 +260,7 @@ def _mode_lines(table: Mapping[str, Any]) -> list[str]:
 
 
 def count(number: int, noun: str) -> str:
-    """Return a number of things in words: "1 load step", "2 load steps"."""
+    """Return a number with its noun in singular or plural: "1 load step", "2 load steps"."""
     return f"{number} {noun}" + "s" * (number != 1)
 
 
@@ -292,7 +292,7 @@ def _contact_lines(name: str, contact: Mapping[str, Any], unit: Mapping[str, str
 
 
 def _edge(inside: float | None, outside: float | None, unit: Mapping[str, str]) -> str:
-    """Return the radius of a contact as text; `outside` is None where it reaches the end of the surface."""
+    """Return the radius of a contact as text; `outside` is None if it reaches the end of the surface."""
     if inside is None:
         return "open"
     if outside is None:
@@ -349,7 +349,7 @@ def _check_line(check: Mapping[str, Any], unit: Mapping[str, str]) -> str:
 
 
 def _why(check: Mapping[str, Any]) -> list[str]:
-    """Return a line on why a check fails where the theory, and no mesh, is to blame."""
+    """Return a line of explanation if a check fails because of its theory, not the mesh."""
     off = check["mesh_converged_deviation"]
     if check["passed"] or off is None or abs(off) <= check["tolerance"]:
         return []

@@ -1,4 +1,4 @@
-"""Keyword blocks of a deck: keyword, parameters and data lines, each with its file and line; included files in place."""
+"""Keyword blocks of a deck: keyword, parameters and data lines, with file and line numbers; included files in place."""
 
 from __future__ import annotations
 
@@ -10,26 +10,26 @@ from typing import NamedTuple
 
 from fastcontact.errors import CaseError, FileError
 
-# Bytes of a deck and all files it includes, and how many these are: more is an error of whoever wrote it.
+# Largest number of bytes of a deck with all included files, and of such files: a deck with more is taken for an error.
 LARGEST = 1 << 28
 MOST_FILES = 200
-# Characters of a line, a keyword with the lines on which it goes on: both programs end theirs far below.
+# Largest number of characters of a line, or of a keyword with its continuation lines; both programs allow far fewer.
 LONGEST_LINE = 1 << 16
 _TOO_LONG = f"the line has more than {LONGEST_LINE} characters: end it where its entries end"
 LONGEST_QUOTED = 80
-LARGEST_WHOLE = 1 << 53  # beyond, floating-point numbers leave some out
+LARGEST_WHOLE = 1 << 53  # beyond, not every integer is a floating-point number
 
 
 @dataclass(frozen=True, slots=True)
 class Location:
-    """A line of a file, and the keyword to which it belongs."""
+    """A line of a file, with the keyword it belongs to."""
 
     file: str
     line: int
     keyword: str
 
     def refuse(self, text: str) -> CaseError:
-        """Return the error that says what is wrong here."""
+        """Return the error for this location with a text."""
         return CaseError(f"{self}: {text}")
 
     def __str__(self) -> str:
@@ -52,7 +52,7 @@ class Located:
 
 @dataclass(frozen=True, slots=True)
 class Row(Located):
-    """A data line: its entries without blanks around them, and its place."""
+    """A data line: its entries without surrounding blanks, and its location."""
 
     location: Location
     entries: tuple[str, ...]
@@ -63,7 +63,7 @@ class Row(Located):
         return self.entries[index] if index < len(self.entries) else ""
 
     def number(self, index: int, default: float | None = None) -> float:
-        """Return an entry as a number, `default` where there is none; CaseError if it is no number or missing."""
+        """Return an entry as a number, or `default` where it is empty; raises CaseError if it is missing or no number."""
         text = self.text(index)
         if not text:
             if default is None:
@@ -79,7 +79,7 @@ class Row(Located):
         return int(value)
 
     def positive(self, index: int, quantity: str) -> float:
-        """Return an entry as a positive number; `quantity` it is says the error."""
+        """Return an entry as a positive number; the error names the `quantity`."""
         value = self.number(index)
         if not value > 0:
             raise self.refuse(f"the {quantity} {value:g} must be positive")
@@ -88,7 +88,7 @@ class Row(Located):
 
 @dataclass(frozen=True, slots=True)
 class Lines:
-    """The data lines of a keyword in the contents of a file, from a line number on: rows are made when they are asked for."""
+    """The data lines of a keyword in the contents of a file, from a line number on; rows are made on demand."""
 
     location: Location
     contents: bytes = field(repr=False)
@@ -116,7 +116,7 @@ class Block(Located):
 
     @property
     def rows(self) -> list[Row]:
-        """Return the data lines that hold anything."""
+        """Return the data lines that are not empty."""
         return list(self.each())
 
     def each(self) -> Iterator[Row]:
@@ -128,7 +128,7 @@ class Block(Located):
         return [row.number(i) for row in self.each() for i, text in enumerate(row.entries) if text]
 
     def only(self, why: str = "") -> Row:
-        """Return the only data line; CaseError if there are others: constants that depend on `why`."""
+        """Return the only data line; raises CaseError if there are several: constants that depend on `why`."""
         rows = self.rows
         if len(rows) != 1:
             text = f"{len(rows)} data lines where one is needed"
@@ -136,11 +136,11 @@ class Block(Located):
         return rows[0]
 
     def get(self, name: str, default: str = "") -> str:
-        """Return the value of a parameter, `default` where it is not given or has none."""
+        """Return the value of a parameter, or `default` where it is missing or has no value."""
         return self.parameters.get(name) or default
 
     def choice(self, name: str, known: tuple[str, ...]) -> str:
-        """Return the value of a parameter in upper case, the first of `known` by default; CaseError if it is another."""
+        """Return the value of a parameter in upper case, by default the first of `known`; raises CaseError for any other."""
         value = self.get(name, known[0]).upper()
         for option in known:
             if value.replace(" ", "") == option.replace(" ", ""):
@@ -148,7 +148,7 @@ class Block(Located):
         raise self.refuse(f"{name}={value[:LONGEST_QUOTED]} is not supported; known are {', '.join(known)}")
 
     def required(self, name: str) -> str:
-        """Return the value of a parameter; CaseError if there is none."""
+        """Return the value of a parameter; raises CaseError if there is none."""
         value = self.parameters.get(name)
         if not value:
             raise self.refuse(f"the parameter {name} is missing")
@@ -157,7 +157,7 @@ class Block(Located):
 
 @dataclass
 class Source:
-    """The deck that is read: its folder, whether data lines are kept, what was read so far, and which files are open."""
+    """State of reading a deck: its folder, whether data lines are kept, the bytes and files read, and the open files."""
 
     folder: Path
     with_data: bool = True
@@ -167,7 +167,7 @@ class Source:
 
 
 def as_number(location: Location, text: str) -> float:
-    """Return a text as a finite number, also as Fortran writes it (1.D5); CaseError otherwise."""
+    """Return a text as a finite number, also in Fortran notation (1.D5); raises CaseError if it is none."""
     try:
         value = float(text.upper().replace("D", "E")) if text[:1].upper() not in "IN" else float("nan")
     except ValueError:
@@ -178,12 +178,12 @@ def as_number(location: Location, text: str) -> float:
 
 
 def unquoted(text: str) -> str:
-    """Return a name without the quotation marks around it."""
+    """Return a name without its quotation marks."""
     return text[1:-1] if len(text) > 1 and text[0] == text[-1] == '"' else text
 
 
 def folded(name: str) -> str:
-    """Return a name as sets and others are looked up: in upper case, without quotation marks."""
+    """Return a name in the form used for look-up: in upper case, without quotation marks."""
     return name.replace('"', "").strip().upper()
 
 
@@ -202,7 +202,7 @@ def read_blocks(path: Path) -> Iterator[Block]:
 
 
 def files_of_deck(path: Path) -> list[Path]:
-    """Return a deck and the files that it includes, in the order in which they are read; raises like `read_blocks`."""
+    """Return a deck and the files that it includes, in reading order; errors as for `read_blocks`."""
     source = Source(path.resolve().parent, with_data=False)
     for _ in _blocks(path, path.name, source):
         pass
@@ -210,7 +210,7 @@ def files_of_deck(path: Path) -> list[Path]:
 
 
 class _Line(NamedTuple):
-    """A line without blanks around it: its number, and where it begins and the next one does."""
+    """A line without surrounding blanks, with its number and the offsets at which it and the next line begin."""
 
     number: int
     begin: int
@@ -219,7 +219,7 @@ class _Line(NamedTuple):
 
 
 def _contents(path: Path, source: Source) -> bytes:
-    """Return the bytes of a file, with lines that end as those of Unix do."""
+    """Return the bytes of a file with Unix line ends."""
     source.files.append(path)
     try:
         source.size += path.stat().st_size
@@ -234,7 +234,7 @@ def _contents(path: Path, source: Source) -> bytes:
 
 
 def _lines(contents: bytes, begin: int, end: int, number: int = 1) -> Iterator[_Line]:
-    """Yield the lines between two places, one at a time: a list of all would take several times their length."""
+    """Yield the lines between two offsets, one at a time: a list of all would take several times their memory."""
     while begin < end:
         after = contents.find(b"\n", begin, end) + 1 or end
         yield _Line(number, begin, after, contents[begin:after].decode("utf-8", "replace").strip())
@@ -242,7 +242,7 @@ def _lines(contents: bytes, begin: int, end: int, number: int = 1) -> Iterator[_
 
 
 def _blocks(path: Path, name: str, source: Source) -> Iterator[Block]:
-    """Yield the blocks of one file; data lines at its beginning belong to no keyword and are refused."""
+    """Yield the blocks of one file; data lines before the first keyword are refused."""
     source.open.append(path.resolve())
     current: Block | None = None
     contents = _contents(path, source)
@@ -272,7 +272,7 @@ def _blocks(path: Path, name: str, source: Source) -> Iterator[Block]:
 
 
 def _with_lines(block: Block, contents: bytes, last: _Line, end: int, source: Source) -> Block:
-    """Return a block with the lines from the last one of its keyword to a place."""
+    """Return a block with the data lines from the last line of its keyword up to an offset."""
     if not source.with_data or last.end >= end:
         return block
     location = Location(block.location.file, last.number + 1, block.keyword)
@@ -280,7 +280,7 @@ def _with_lines(block: Block, contents: bytes, last: _Line, end: int, source: So
 
 
 def _continued(location: Location, line: _Line, lines: Iterator[_Line]) -> _Line:
-    """Return a keyword line with the lines on which it goes on, after a comma, as one that ends where the last one does."""
+    """Return a keyword line joined with its continuation lines, which follow a line that ends with a comma."""
     while line.text.endswith(","):
         more = next(lines, None)
         if more is None:
@@ -299,7 +299,7 @@ def _keyword(line: str) -> str:
 
 
 def _parts(line: str) -> list[str]:
-    """Return what stands between the commas of a line, without blanks around; quoted names keep their commas."""
+    """Return the entries between the commas of a line, without surrounding blanks; quoted names keep their commas."""
     if '"' not in line:
         return [part.strip() for part in line.split(",")]
     parts = [""]
@@ -331,7 +331,7 @@ def _row(location: Location, line: str) -> Row:
 
 
 def _included(block: Block, name: str, source: Source) -> Iterator[Block]:
-    """Yield the blocks of the file that *INCLUDE names, which must lie below the folder of the deck."""
+    """Yield the blocks of the file that *INCLUDE names; it must lie below the folder of the deck."""
     given = block.required("INPUT")
     for parameter in block.parameters:
         if parameter != "INPUT":

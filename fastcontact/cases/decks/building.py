@@ -1,4 +1,4 @@
-"""From the content of a deck to a model and a ramp."""
+"""Building of a model and a ramp from the content of a deck."""
 
 from __future__ import annotations
 
@@ -39,28 +39,28 @@ from fastcontact.elasticity.nonlinear_materials import NonlinearElastic
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, Table
 
-# What a gap of the undeformed sides may be, relative to the size of the model, and still count as none.
+# Largest gap between the undeformed sides that counts as closed, relative to the size of the model.
 TOUCHING = 1e-6
 LONGEST_RAMP = 100_000
 
 
 class Building:
-    """A model in the making.
+    """A model under construction.
 
     Attributes
     ----------
-    made, found : the assembly and its mesh
+    made, found : the assembly and its mesh under construction
     model : Model
     thickness : float
-        Of a plane model; forces of the model are those of a unit of it [length].
+        Thickness of a plane model; the forces of the model are per unit thickness [length].
     local_supports : list of MultiPointConstraint
-        Relations that are supports: those along local axes, and those that come or go between steps.
+        Constraints that are supports: those along local axes, and those that do not act in all steps.
     linearised : str
-        Why small strains are solved although a step has NLGEOM; empty where not.
+        Reason why small strains are solved although a step has NLGEOM; otherwise empty.
     driven : dict of (int, int) to Table
-        Motions of the nodes of gap elements that belong to no solid, by point and component [length].
+        Prescribed motions of gap-element nodes that belong to no solid, by point and component [length].
     gap_ends : dict of str to dict of int to int
-        By the name of a contact made of gap elements: its nodes, and the nodes behind the gaps.
+        By name of a contact made of gap elements: the node behind the gap for each of its nodes.
     """
 
     def __init__(self, content: Content, case_text: str) -> None:
@@ -100,7 +100,7 @@ class Building:
         self.ramp = self._ramp(conditions)
 
     def _mechanics(self, conditions: Conditions, groups: list[tuple[str, Any, Table]]) -> None:
-        """Add supports, relations, loads, temperatures and springs to the model."""
+        """Add supports, constraints, loads, temperatures and springs to the model."""
         self._supports(conditions)
         self.links += relations_of(self.found, self.model.mesh)
         self.model.relations += self.links
@@ -114,7 +114,7 @@ class Building:
         self._springs()
 
     def _materials(self) -> tuple[list[tuple[Any, str]], float]:
-        """Return materials with groups of solids, and the thickness; every solid needs a section."""
+        """Return the materials with their groups of solids, and the thickness; every solid needs a section."""
         thickness: float | None = None
         for scope in self.made.scopes:
             for section in self.made.part(scope).sections:
@@ -154,7 +154,7 @@ class Building:
         return materials, thickness or 1.0
 
     def _axes(self, section: Section, members: Sequence[Element]) -> Any:
-        """Return the axes of the material of a section with its elements, None for those of the mesh."""
+        """Return the material axes of a section with its elements, None for the axes of the mesh."""
         if not section.orientation:
             return None
         axes = orientation_of(self.content, section.orientation, section.location)
@@ -185,7 +185,7 @@ class Building:
             raise cell.refuse(f"{many} ({without[0].number}){named} has no section, so no material")
 
     def _check_pairs(self) -> None:
-        """Refuse pairs whose surfaces or interaction are not there."""
+        """Refuse pairs with undefined surfaces or an undefined interaction."""
         seen: set[str] = set()
         for pair in self.content.pairs:
             secondary_group(self.found, pair.secondary, pair.location)
@@ -197,7 +197,7 @@ class Building:
             seen.add(folded(pair.name))
 
     def _groups(self, conditions: Conditions) -> list[tuple[str, Any, Table]]:
-        """Make groups of the facets whose pressures change alike; return them with their values and histories."""
+        """Make groups of the facets whose pressures have the same history; return them with values and histories."""
         alike = ByShape[tuple[str, str]]()
         for table, names in conditions.loads.alike():
             for name in names:
@@ -208,7 +208,7 @@ class Building:
         return [(group, value, table) for group, _, _, value, table in loads]
 
     def _point_group(self, kind: str, points: Iterable[int]) -> str:
-        """Return the name of a group of points of the mesh, which is made where there is none."""
+        """Return the name of a group of points of the mesh; it is made if there is none."""
         before = len(self.found.point_groups)
         name = self.found.add_points(f"{kind} {before}", points)
         if name not in self.model.mesh.point_groups:
@@ -241,7 +241,7 @@ class Building:
             self.model.fix(self._point_group("rotation", self.found.rotations.values()), "y")
 
     def _temporary_supports(self, conditions: Conditions, temporary: Sequence[tuple[Component, Acting]]) -> None:
-        """Add the supports that come or go between steps: those alike as one relation."""
+        """Add the supports that do not act in all steps; those with the same times become one constraint."""
         alike: dict[tuple[Acting, Table], list[Component]] = {}
         for name, acting in (entry for entry in temporary if entry[1].begins < entry[1].ends):
             alike.setdefault((acting, conditions.supports.table(name)), []).append(name)
@@ -263,7 +263,7 @@ class Building:
         self.model.relations.append(made)
 
     def _support_row(self, conditions: Conditions, name: Component) -> csr_array:
-        """Return the row (1, n_dofs) of the displacement that a support prescribes [-]."""
+        """Return the constraint row (1, n_dofs) of the displacement that a support prescribes [-]."""
         point, axis, local = name
         dim = self.found.dim
         direction = (conditions.directions[point] if local else np.eye(3))[axis][:dim]
@@ -335,7 +335,7 @@ class Building:
                 self.model.add_contact(f"{secondary}/{primary}", secondary=secondary, primary=primary, **options)
 
     def _at_nodes(self, pair: Pair, secondary: str) -> dict[str, Any]:
-        """Return the options by which some nodes alone of the facets around them are in contact."""
+        """Return the options that restrict contact to some nodes of the facets around them."""
         options: dict[str, Any] = {"excluded": self._point_group("without contact", self.found.loose[secondary])}
         if all(map(all_nodes_carry, self.found.groups[secondary])):
             options["formulation"] = "node_to_segment"
@@ -364,16 +364,16 @@ class Building:
         return {**options, **self._fitted(pair)}
 
     def _tied(self, pair: Pair) -> dict[str, Any]:
-        """Return the options of a tie, through which heat passes where it is computed."""
+        """Return the options of a tie, with a conductance where heat is computed."""
         if not self.content.heat:
             return {"kind": "tied"}
         kind = "gap_only" if self.content.heat == "alone" else "tied"
         return {"kind": kind, "conductance": perfect_conductance(self.content, self.model, pair.location)}
 
     def _fitted(self, pair: Pair, glued: bool = False) -> dict[str, Any]:
-        """Return the clearance that brings the sides to where ADJUST or *CLEARANCE say; refused where no number does.
+        """Return the clearance that closes the sides as ADJUST or *CLEARANCE prescribe; refused where one number cannot.
 
-        CaseError where sides that are `glued` are apart, which they would not be where they do not touch.
+        Raises CaseError if `glued` sides have a gap, across which the layer would not act.
         """
         if not (pair.adjust or glued) and pair.clearance is None:
             return {}
@@ -410,7 +410,7 @@ class Building:
         return {"clearance": lambda points: closing[nodes.query(points)[1]]}
 
     def _ramp(self, conditions: Conditions) -> Ramp:
-        """Return the ends of all steps, of the increments of steps with friction, and the corners of all histories."""
+        """Return the ramp: ends of all steps, of increments of steps with friction, and the corners of all histories."""
         steps = self.content.steps
         instants = {float(number) for number in range(1, len(steps) + 1)}
         if any(pair.options.get("friction") or "cohesion" in pair.options for pair in self.model.contact):
@@ -426,7 +426,7 @@ class Building:
 
 
 def _friction(law: Interaction, n_steps: int) -> dict[str, Any]:
-    """Return the options of a pair for its friction, which *CHANGE FRICTION changes at the beginning of steps."""
+    """Return the friction options of a pair; *CHANGE FRICTION changes them at the beginning of steps."""
     table, sticks = [(0.0, law.friction)], {law.stick} if law.friction else set()
     for before, changed in law.changes:
         if changed.friction < 0.0 or changed.penalty is not None or changed.kind != law.kind:
@@ -446,7 +446,7 @@ def _friction(law: Interaction, n_steps: int) -> dict[str, Any]:
 
 
 def _law(content: Content, material: Material, axes: Any, modes: bool) -> Any:
-    """Return the material of the model along axes, with its expansion and incompatible modes where elements have them."""
+    """Return the material of the model along axes, with its expansion, and with incompatible modes if elements have them."""
     if content.heat == "alone":
         return _with_axes(material, HELD, axes, conductivity=_conductivity(content, material))
     assert material.law is not None
@@ -469,7 +469,7 @@ def _law(content: Content, material: Material, axes: Any, modes: bool) -> Any:
 
 
 def _conductivity(content: Content, material: Material) -> float | tuple[float, ...] | None:
-    """Return the conductivity of a material; CaseError where heat is computed and there is none."""
+    """Return the conductivity of a material; raises CaseError if heat is computed and there is none."""
     block = material.conductivity
     if content.heat:
         if block is None:
@@ -481,7 +481,7 @@ def _conductivity(content: Content, material: Material) -> float | tuple[float, 
 
 
 def _with_axes(material: Material, law: Any, axes: Any, **constants: Any) -> Any:
-    """Return a material with further constants, orthotropic where these differ along the axes."""
+    """Return a material with further constants; it becomes orthotropic where they differ along the axes."""
     if isinstance(law, LinearElastic) and any(isinstance(value, tuple) for value in constants.values()):
         if isinstance(law, NonlinearElastic):
             raise material.refuse(
@@ -494,13 +494,13 @@ def _with_axes(material: Material, law: Any, axes: Any, **constants: Any) -> Any
 
 
 def _parts(step: Step) -> list[float]:
-    """Return the ends of equal increments inside of a step, of its length."""
+    """Return the ends of the equal increments inside a step, as fractions of its length."""
     count = max(1, round(min(MOST_PARTS, step.period / min(step.increment, step.period))))
     return [k / count for k in range(1, count)]
 
 
 def _body_force(kind: str, vector: tuple[float, ...], value: Any, dim: int) -> dict[str, Any]:
-    """Return the components of a body force at the value 1 of its history, of cells with the factor `value`."""
+    """Return the components of a body force where its history is 1, for cells with the factor `value`."""
 
     def times(component: Any) -> Any:
         if not callable(value):
@@ -523,9 +523,9 @@ def _body_force(kind: str, vector: tuple[float, ...], value: Any, dim: int) -> d
 
 
 def nodal_gaps(model: Model, secondary: str, primary: str, without: Sequence[int]) -> tuple[Array, Array]:
-    """Return how far nodes of one side that face the other are from it (n,), and where they are (n, dim) [length].
+    """Return the gaps (n,) of the nodes of one side that face the other, and their positions (n, dim) [length].
 
-    Those `without` contact are left out.
+    Nodes in `without` are left out.
     """
     from fastcontact.contact.configuration import Configuration
     from fastcontact.model.contact_pair import ContactPair

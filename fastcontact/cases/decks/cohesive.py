@@ -1,4 +1,4 @@
-"""Cohesive behaviour of surfaces: *COHESIVE BEHAVIOR, *DAMAGE INITIATION, *DAMAGE EVOLUTION as a cohesive layer."""
+"""Cohesive surfaces of a deck: *COHESIVE BEHAVIOR, *DAMAGE INITIATION and *DAMAGE EVOLUTION as a cohesive layer."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ MODES = {"BK": "bk", "POWER LAW": "power"}
 
 
 def keep(content: Content, current: Interaction, block: Block) -> None:
-    """*COHESIVE BEHAVIOR, *DAMAGE INITIATION, *DAMAGE EVOLUTION: kept until all are there."""
+    """*COHESIVE BEHAVIOR, *DAMAGE INITIATION, *DAMAGE EVOLUTION: stored until all are read."""
     if block.keyword in current.cohesion:
         raise block.refuse(f"surface interaction '{current.name}' has two of it")
     current.cohesion[block.keyword] = block
@@ -25,9 +25,9 @@ def stabilization(content: Content, current: Interaction, block: Block) -> None:
 
 
 def cohesion_of(content: Content, law: Interaction) -> dict[str, Any]:
-    """Return the options of a pair for its cohesive layer; tied without stiffness and damage, none without a layer.
+    """Return the options of a pair for its cohesive layer: a tie without stiffness and damage, none without a layer.
 
-    CaseError where the laws here cannot be those of the deck.
+    Raises CaseError if no law of the package matches the one of the deck.
     """
     blocks = law.cohesion
     if not blocks:
@@ -65,7 +65,7 @@ def cohesion_of(content: Content, law: Interaction) -> dict[str, Any]:
 
 
 def _stiffness(block: Block) -> float | None:
-    """Return the stiffness of a layer, None where it is not given; CaseError where it differs between the directions."""
+    """Return the stiffness of a layer, None if not given; raises CaseError if it differs between the directions."""
     block.choice("TYPE", ("UNCOUPLED",))
     block.choice("ELIGIBILITY", ("CURRENT CONTACTS", "ORIGINAL CONTACTS"))
     if not block.rows:
@@ -78,7 +78,7 @@ def _stiffness(block: Block) -> float | None:
 
 
 def _evolution(block: Block, given: dict[str, Any], stiffness: float | None) -> dict[str, Any]:
-    """Return the energies of a layer and how modes are mixed."""
+    """Return the fracture energies of a layer and its mixed-mode law."""
     block.choice("SOFTENING", ("LINEAR",))
     block.choice("MODE MIX RATIO", ("ENERGY",))
     kind = block.choice("TYPE", ("DISPLACEMENT", "ENERGY"))
@@ -100,7 +100,7 @@ def _evolution(block: Block, given: dict[str, Any], stiffness: float | None) -> 
 
 
 def _in_modes(block: Block, quantity: str) -> tuple[float, float]:
-    """Return numbers for opening and for sliding, which is the same along both directions."""
+    """Return the numbers for opening and for sliding, the latter the same along both directions."""
     row = block.only("modes or fields")
     values = [row.positive(index, "number") for index in range(3)]
     if values[1] != values[2]:

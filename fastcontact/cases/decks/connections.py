@@ -9,7 +9,7 @@ from fastcontact.cases.decks.content import Axes, Content, Equation, Link, Multi
 from fastcontact.cases.decks.cyclic_symmetry import sector_ends
 from fastcontact.cases.decks.multi_points import LEAST
 
-# Terms of an equation: more tie everything to everything.
+# Largest number of terms of an equation: more would couple everything to everything.
 MOST_TERMS = 100_000
 
 
@@ -35,7 +35,7 @@ def _sides(block: Block, kind: str) -> Iterator[tuple[Location, str, str]]:
 
 
 def clearance(content: Content, block: Block) -> None:
-    """*CLEARANCE: the initial distance of the sides of a pair, whatever the coordinates say."""
+    """*CLEARANCE: the initial gap between the sides of a pair, irrespective of the coordinates."""
     secondary = block.get("SLAVE") or block.get("SECONDARY")
     primary = block.get("MASTER") or block.get("MAIN")
     value = as_number(block.location, block.required("VALUE"))
@@ -47,7 +47,7 @@ def clearance(content: Content, block: Block) -> None:
 
 
 def tie(content: Content, block: Block) -> None:
-    """*TIE: sides that neither open nor slide."""
+    """*TIE: surfaces that neither open nor slide."""
     if "CYCLIC SYMMETRY" in block.parameters:
         content.sector_ends.append(sector_ends(block))
         return
@@ -68,7 +68,7 @@ def tie(content: Content, block: Block) -> None:
 
 
 def equation(content: Content, block: Block) -> None:
-    """*EQUATION: the number of terms, then node, component and coefficient of each."""
+    """*EQUATION: the number of terms, then the node, component and coefficient of each term."""
     rows = block.each()
     for head in rows:
         count = head.whole(0)
@@ -92,7 +92,7 @@ def _term(row: Row, start: int) -> tuple[str, int, float]:
 def multi_point(content: Content, block: Block) -> None:
     """*MPC: PIN and TIE give two nodes the same displacement, BEAM a rigid bar from the first node to the second.
 
-    Those of PLANE, STRAIGHT and MEANROT go on over lines that begin with a number.
+    PLANE, STRAIGHT and MEANROT continue over lines that begin with a number.
     """
     several: list[tuple[Row, str, list[str]]] = []
     for row in block.each():
@@ -114,7 +114,7 @@ def multi_point(content: Content, block: Block) -> None:
 
 
 def rigid_body(content: Content, block: Block) -> None:
-    """*RIGID BODY: nodes that move with a reference node as a whole."""
+    """*RIGID BODY: nodes that move with a reference node as a rigid body."""
     kind = "elements" if block.get("ELSET") else "nodes"
     group = block.get("ELSET") or block.required("NSET")
     content.links.append(Link(block.location, block.required("REF NODE"), group, kind, rotation=block.get("ROT NODE")))

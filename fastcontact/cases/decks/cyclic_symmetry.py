@@ -1,4 +1,4 @@
-"""Cyclic symmetry of a deck: *TIE, CYCLIC SYMMETRY names the ends of a sector, *CYCLIC SYMMETRY MODEL axis and number."""
+"""Cyclic symmetry of a deck: *TIE, CYCLIC SYMMETRY (ends of a sector) and *CYCLIC SYMMETRY MODEL (axis and number)."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from fastcontact.cases.decks.refusals import refusing
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.model.model import Model
 
-# Most sectors: beyond, one is a negligible part of the whole.
+# Largest number of sectors: a smaller sector would be a negligible part of the whole.
 MOST_SECTORS = 100_000
 
 
 def sector_ends(block: Block) -> SectorEnds:
-    """*TIE, CYCLIC SYMMETRY: the surfaces at the two ends of a sector."""
+    """*TIE, CYCLIC SYMMETRY: the end surfaces of a sector."""
     if len(block.rows) != 1 or len([entry for entry in block.rows[0].entries if entry]) != 2:
         raise block.refuse("cyclic symmetry needs one data line with two surfaces, the ends of the sector")
     row = block.rows[0]
@@ -37,7 +37,7 @@ def cyclic_symmetry_model(content: Content, block: Block) -> None:
 
 
 def add_sectors(model: Model, deck_mesh: DeckMesh) -> list[MultiPointConstraint]:
-    """Add the cyclic symmetries of the deck to the model; return their relations."""
+    """Add the cyclic symmetries of the deck to the model; return their constraints."""
     content, before = deck_mesh.made.content, len(model.relations)
     used: set[int] = set()
     for sectors in content.sectors:
@@ -62,7 +62,7 @@ def add_sectors(model: Model, deck_mesh: DeckMesh) -> list[MultiPointConstraint]
 
 
 def _ends(content: Content, sectors: Sectors) -> SectorEnds:
-    """Return the ends that a *CYCLIC SYMMETRY MODEL means: those of its tie, or the only ones."""
+    """Return the sector ends of a *CYCLIC SYMMETRY MODEL: those of the tie it names, or the only ones."""
     named = [ends for ends in content.sector_ends if not sectors.tie or folded(ends.name) == folded(sectors.tie)]
     if len(named) != 1:
         known = ", ".join(ends.name or f"that of line {ends.location.line}" for ends in content.sector_ends) or "none"

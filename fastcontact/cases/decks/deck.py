@@ -150,7 +150,7 @@ class Deck:
         )
 
     def _supports_alone(self, reaction: Array, instant: float) -> Array:
-        """Return nodal forces (n_points, dim) without those of relations, found where no support acts [force]."""
+        """Return reactions (n_points, dim) without constraint forces, computed from the unsupported components [force]."""
         links = self.building.links
         if not links:
             return reaction.copy()
@@ -164,7 +164,7 @@ class Deck:
         return reaction - linked.reshape(reaction.shape)
 
     def _largest_strain(self, step: StepResult) -> float:
-        """Return the largest equivalent strain of the solid cells, from their nodal stresses [-]."""
+        """Return the largest equivalent strain of the solid cells, computed from nodal stresses [-]."""
         field, largest = self.model.material_field(), 0.0
         for name, block in self.model.mesh.solids.items():
             strains = np.einsum("cij,cnj->cni", field.compliance[field.rows[name]], step.stress[block])
@@ -174,7 +174,7 @@ class Deck:
         return largest
 
     def _tell_nonlinear(self, step: StepResult) -> None:
-        """Warn with the largest strain and rotation where the deck asks for large ones."""
+        """Warn with the largest strain and rotation if the deck has NLGEOM but small strains were solved."""
         for asked in (s for s in self.building.content.steps if s.nonlinear and self.building.linearised):
             strain = self._largest_strain(step)
             angle, _ = largest_rotation(self.model.mesh, step.displacement)
@@ -248,7 +248,7 @@ def read_deck(path: PathLike) -> Deck:
 
 
 def _times(factor: float, sums: Mapping[str, Any]) -> dict[str, Any]:
-    """Return sums of works or powers, also those by name, times a factor; what counts exchanges stays."""
+    """Return sums of work or power, also those by name, times a factor; counts stay as they are."""
     return {
         name: _times(factor, value) if isinstance(value, dict) else value if name == "exchanges" else factor * value
         for name, value in sums.items()
@@ -256,7 +256,7 @@ def _times(factor: float, sums: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _text(path: Path) -> str:
-    """Return the text that result files keep: the title as a case file has it."""
+    """Return the text stored in result files: the title in the form of a case file."""
     return f"# from the deck {path.name}\n"
 
 

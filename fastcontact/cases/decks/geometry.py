@@ -12,9 +12,9 @@ from fastcontact.cases.decks.element_types import described, element_type
 from fastcontact.cases.decks.refusals import defined, registered
 from fastcontact.mesh import elements
 
-# Elements that are no solids and yet mean something here: numbers of their nodes.
+# Numbers of nodes of the supported elements that are not solids.
 DISCRETE = {"GAPUNI": 2, "SPRINGA": 2}
-# From this number of nodes on an element may go on in the next line without a comma at the end.
+# Elements with at least this number of nodes may continue in the next line without a comma at the end.
 LONG = 15
 
 
@@ -67,7 +67,7 @@ def cells(content: Content, part: Part, block: Block) -> None:
 
 
 def _joined(block: Block, needed: int) -> Iterator[tuple[Row, tuple[str, ...]]]:
-    """Yield the entries of each element, which may go on over lines that end with a comma."""
+    """Yield the entries of each element; they may continue after a line that ends with a comma."""
     first: Row | None = None
     entries: tuple[str, ...] = ()
     for row in block.each():
@@ -108,7 +108,7 @@ def _members(block: Block) -> list[Members]:
             if numbers:
                 members = array("q", map(int, group))
                 if entries and isinstance(entries[-1].numbers, array) and len(entries[-1].numbers):
-                    entries[-1].add(members, row.location.line)  # one entry for the lines that follow each other
+                    entries[-1].add(members, row.location.line)  # one entry for consecutive lines
                 else:
                     entries.append(Members(row.location, members, instance=instance))
             else:
@@ -128,7 +128,7 @@ def surface(content: Content, part: Part, block: Block) -> None:
 
 
 def instance(content: Content, block: Block) -> Instance:
-    """*INSTANCE: a part with its place in the assembly."""
+    """*INSTANCE: a part placed in the assembly."""
     name, of = block.required("NAME"), block.required("PART")
     made = Instance(name, defined("part", of, content.parts, block))
     rows = block.rows

@@ -1,4 +1,4 @@
-"""Initial stresses of a deck, by element or set, as Abaqus takes them."""
+"""Initial stresses of a deck by element or element set, with the conventions of Abaqus."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.mesh.mesh import starts_of
 from fastcontact.model.model import Model
 
-# Components in the order of a data line, by how many there are.
+# Components in the order of a data line, by their number.
 ORDER = {2: ("xx", "yy", "zz", "xy"), 3: ("xx", "yy", "zz", "xy", "xz", "yz")}
 
 
 def add_initial_stresses(model: Model, deck_mesh: DeckMesh) -> None:
-    """Add the initial stresses to a model; the last line of several for an element counts."""
+    """Add the initial stresses to a model; of several lines for an element, the last one counts."""
     content, names = deck_mesh.made.content, ORDER[deck_mesh.dim]
     if not content.stresses:
         return

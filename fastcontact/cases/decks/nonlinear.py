@@ -1,4 +1,4 @@
-"""Keywords of nonlinear bodies: *PLASTIC, *HYPERELASTIC, and what NLGEOM comes to."""
+"""Nonlinear bodies of a deck: *PLASTIC, *HYPERELASTIC, and the effect of NLGEOM."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from fastcontact.cases.decks.refusals import refusing
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.elasticity.nonlinear_materials import ElasticPlastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
 
-# Poisson's ratio of hyperelastic materials whose compressibility is zero, as in CalculiX.
+# Poisson's ratio of hyperelastic materials with zero compressibility constant, as in CalculiX.
 UNGIVEN = 0.475
-# Numbers of constants before those of the compressibility, and of those.
+# Numbers of deviatoric constants, and of compressibility constants.
 HYPERELASTIC = {"NEO HOOKE": (1, 1), "MOONEY-RIVLIN": (2, 1), "YEOH": (3, 3), "OGDEN": (2, 1)}
 
 
 def plastic(content: Content, current: Material, block: Block) -> None:
-    """*PLASTIC: yield stresses by equivalent plastic strains, after the *ELASTIC of the material."""
+    """*PLASTIC: yield stresses by equivalent plastic strain, after the *ELASTIC of the material."""
     hardening = block.choice("HARDENING", ("ISOTROPIC", "KINEMATIC"))
     elastic = None if current.law is None else current.law(None)
     if type(elastic) is not LinearElastic:
@@ -80,7 +80,7 @@ def _law(kind: str, constants: list[float], mu: float, bulk: float) -> Any:
 
 
 def strain_of(content: Content, laws: list[Any]) -> tuple[str, str]:
-    """Return the strain of the model that a deck asks for, and why NLGEOM is not followed; empty where it is."""
+    """Return the strain measure of the model, and the reason why NLGEOM is not followed; empty if it is."""
     finite = [law for law in laws if getattr(law, "strain", "small") == "finite"]
     if finite:
         return "finite", ""

@@ -17,18 +17,18 @@ from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropi
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.errors import ContactError
 
-# Numbers of the constants of elastic materials.
+# Numbers of constants of elastic materials.
 CONSTANTS = {"ISOTROPIC": 2, "ENGINEERING CONSTANTS": 9, "ORTHOTROPIC": 9, "ANISOTROPIC": 21}
 
 
 def material(content: Content, block: Block) -> Material:
-    """*MATERIAL: begins a material."""
+    """*MATERIAL: the beginning of a material."""
     name = block.required("NAME")
     return registered("material", name, content.materials, Material(name, block.location), block)
 
 
 def elastic(content: Content, current: Material, block: Block) -> None:
-    """*ELASTIC: constants of one temperature."""
+    """*ELASTIC: constants at one temperature."""
     kind = " ".join(block.get("TYPE", "ISOTROPIC").upper().split())
     kinds = [known for known in CONSTANTS if len(kind) >= 3 and known.startswith(kind)]
     if not kinds:
@@ -47,7 +47,7 @@ def elastic(content: Content, current: Material, block: Block) -> None:
 
 
 def _with_axes(current: Material, block: Block, kind: str) -> None:
-    """Take the constants of a material with axes, which may go on over lines; a temperature may follow them."""
+    """Read the constants of a material with axes; they may span several lines, and a temperature may follow."""
     numbers, count = block.numbers(), CONSTANTS[kind]
     if not count <= len(numbers) <= count + 1:
         raise block.refuse(
@@ -66,7 +66,7 @@ def _with_axes(current: Material, block: Block, kind: str) -> None:
 
 
 def _moduli(values: list[float]) -> Array:
-    """Return moduli (6, 6) [pressure] from those of a deck, its upper triangle by columns 11, 22, 33, 12, 13, 23."""
+    """Return moduli (6, 6) [pressure] from the upper triangle in a deck, by columns 11, 22, 33, 12, 13, 23."""
     D = np.zeros((6, 6))
     places = [(i, j) for j in range(6) for i in range(j + 1)]
     if len(values) == CONSTANTS["ORTHOTROPIC"]:
@@ -78,20 +78,20 @@ def _moduli(values: list[float]) -> Array:
 
 
 def distribution_table(content: Content, part: Part, block: Block) -> None:
-    """*DISTRIBUTION TABLE: what distributions hold, which axes of cells alone do here."""
+    """*DISTRIBUTION TABLE: content of distributions; only axes of cells are supported."""
     kinds = [entry.upper() for row in block.rows for entry in row.entries if entry]
     if kinds != ["COORD3D", "COORD3D"]:
         raise block.refuse(f"a distribution of {', '.join(kinds)[:80]} is not supported, only COORD3D, COORD3D of axes")
 
 
 def distribution(content: Content, part: Part, block: Block) -> None:
-    """*DISTRIBUTION: two points for the axes of each cell, seen from 0, 0, 0, by default those of the line without a cell."""
+    """*DISTRIBUTION: two points for the axes of each cell, relative to the origin; the line without a cell is the default."""
     block.choice("LOCATION", ("ELEMENT",))
     registered("distribution", block.required("NAME"), content.distributions, block, block)
 
 
 def orientation(content: Content, part: Part, block: Block) -> None:
-    """*ORIENTATION: axes of materials."""
+    """*ORIENTATION: material axes."""
     name, system = block.required("NAME"), block.choice("SYSTEM", ("RECTANGULAR", "CYLINDRICAL"))
     block.choice("DEFINITION", ("COORDINATES",))
     rows, key = block.rows, folded(name)
@@ -122,7 +122,7 @@ def density(content: Content, current: Material, block: Block) -> None:
 
 
 def section(content: Content, part: Part, block: Block) -> None:
-    """*SOLID SECTION: which material the elements of a set have."""
+    """*SOLID SECTION: the material of the elements of a set."""
     thickness = None
     for row in block.rows[:1]:
         thickness = row.number(0, 1.0)
@@ -135,7 +135,7 @@ def section(content: Content, part: Part, block: Block) -> None:
 
 
 def interaction(content: Content, block: Block) -> Interaction:
-    """*SURFACE INTERACTION: begins the properties of contact pairs."""
+    """*SURFACE INTERACTION: the beginning of the properties of contact pairs."""
     name = block.required("NAME")
     made = registered("surface interaction", name, content.interactions, Interaction(name, block.location), block)
     if block.rows:
@@ -145,10 +145,10 @@ def interaction(content: Content, block: Block) -> Interaction:
 
 
 def changed_interaction(content: Content, block: Block) -> Interaction:
-    """*CHANGE FRICTION: begins what holds from the current step on, by the *FRICTION below it."""
+    """*CHANGE FRICTION: the beginning of a change from the current step on, given by the *FRICTION below it."""
     name = block.required("INTERACTION")
     before = defined("surface interaction", name, content.interactions, block)
-    changed = Interaction(name, block.location, friction=-1.0)  # which it has to say
+    changed = Interaction(name, block.location, friction=-1.0)  # to be set by *FRICTION
     before.changes.append((len(content.steps) - 1, changed))
     return changed
 
@@ -170,7 +170,7 @@ def behaviour(content: Content, current: Interaction, block: Block) -> None:
 
 
 def _table(block: Block) -> float | list[tuple[float, float]]:
-    """Return a table of overclosures and pressures; the slope of one straight line through no pressure at zero."""
+    """Return a table of overclosures and pressures, or the slope if it is one straight line through the origin."""
     points = [(row.number(1), row.number(0)) for row in block.rows]
     try:
         TabularLaw("", points)
@@ -182,7 +182,7 @@ def _table(block: Block) -> float | list[tuple[float, float]]:
 
 
 def friction(content: Content, current: Interaction, block: Block) -> None:
-    """*FRICTION: coefficient, and in CalculiX the stick slope."""
+    """*FRICTION: the coefficient, and in CalculiX the stick slope."""
     row = block.only()
     current.friction = row.number(0)
     if current.friction < 0:
@@ -217,7 +217,7 @@ def gap(content: Content, block: Block) -> None:
 
 
 def spring(content: Content, block: Block) -> None:
-    """*SPRING: stiffness of springs along their line."""
+    """*SPRING: stiffness of springs along their axis."""
     rows = block.rows
     if len(rows) != 1:
         raise block.refuse("linear springs along their line need an empty line and then one with the stiffness")

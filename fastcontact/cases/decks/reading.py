@@ -1,4 +1,4 @@
-"""From the blocks of a deck to its content, one keyword after the other, each where it may stand."""
+"""Reading of the blocks of a deck into its content, with a check of the context of each keyword."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ IN_LAYERS = ("DAMAGE INITIATION", "DAMAGE EVOLUTION", "DAMAGE STABILIZATION")
 
 @dataclass
 class Reader:
-    """What is open while a deck is read: part, instance, material, interaction, step, coupling."""
+    """State while a deck is read: the open part, instance, material, interaction, step and coupling."""
 
     content: Content = field(default_factory=Content)
     part: Part | None = None
@@ -134,7 +134,7 @@ class Reader:
 
 
 def read_content(blocks: Iterable[Block]) -> Content:
-    """Return what the blocks of a deck say; CaseError with file, line and keyword where something is wrong."""
+    """Return the content of the blocks of a deck; raises CaseError with file, line and keyword if it is invalid."""
     reader = Reader()
     for block in blocks:
         reader.take(spelled(block))

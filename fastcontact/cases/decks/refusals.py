@@ -1,4 +1,4 @@
-"""Names that a deck defines twice or not at all, and what the model refuses, told at the line of the deck."""
+"""Errors with a deck location: names defined twice or not at all, and errors of the model."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ Entry = TypeVar("Entry")
 
 @contextmanager
 def refusing(at: Location | Located, about: str = "") -> Iterator[None]:
-    """Refuse, at a location of the deck, what the package refuses in the block; the message begins with what it is about."""
+    """Re-raise errors of the package as CaseError at a location of the deck; the message begins with `about`."""
     try:
         yield
-    except CaseError:  # which has a location
+    except CaseError:  # has a location already
         raise
     except FastcontactError as error:
         raise at.refuse(f"{about}{error}") from error
@@ -32,7 +32,7 @@ def registered(kind: str, name: str, table: dict[str, Entry], entry: Entry, at: 
 
 
 def defined(kind: str, name: str, table: Mapping[str, Any], at: Location | Located) -> Any:
-    """Return the entry of a table with a name; refused with the names of all entries if there is none."""
+    """Return the entry of a table with a name; raises CaseError with the names of all entries if there is none."""
     if folded(name) not in table:
         known = ", ".join(entry.name for entry in table.values()) or "none"
         raise at.refuse(f"{kind} '{name}' is not defined; {kind.rpartition(' ')[2]}s: {known}")

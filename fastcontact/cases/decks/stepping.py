@@ -1,11 +1,11 @@
-"""Keywords of the steps: *STEP, *STATIC, *FREQUENCY, and the blocks of supports and loads in them."""
+"""Keywords of steps: *STEP, *STATIC, *FREQUENCY, and the blocks of supports and loads in them."""
 
 from __future__ import annotations
 
 from fastcontact.cases.decks.blocks import Block, folded
 from fastcontact.cases.decks.content import Content, Given, Step
 
-# Parts of a step whose pair has friction, at most.
+# Largest number of increments of a step with friction.
 MOST_PARTS = 20
 
 
@@ -20,7 +20,7 @@ def new_step(content: Content, block: Block) -> Step:
 
 
 def static(content: Content, step: Step, block: Block) -> None:
-    """*STATIC: first increment and length of the step; how it is cut is decided here."""
+    """*STATIC: first increment and length of the step, which determine its division into increments."""
     if step.static:
         raise block.refuse("the step has two of it")
     if step.modes:
@@ -40,7 +40,7 @@ def static(content: Content, step: Step, block: Block) -> None:
 
 
 def heated(content: Content, step: Step, block: Block) -> None:
-    """*HEAT TRANSFER, *COUPLED and *UNCOUPLED TEMPERATURE-DISPLACEMENT: as *STATIC, of steady heat."""
+    """*HEAT TRANSFER, *COUPLED and *UNCOUPLED TEMPERATURE-DISPLACEMENT: as *STATIC, with steady heat conduction."""
     if "STEADY STATE" not in block.parameters:
         raise block.refuse("only STEADY STATE is supported: heat is not followed in time")
     static(content, step, block)
@@ -50,7 +50,7 @@ def heated(content: Content, step: Step, block: Block) -> None:
 
 
 def frequency(content: Content, step: Step, block: Block) -> None:
-    """*FREQUENCY: how many modes."""
+    """*FREQUENCY: the number of modes."""
     if step.static or step.modes:
         raise block.refuse("a step has either *STATIC or one *FREQUENCY")
     number = block.rows[0].whole(0, 10) if block.rows else 10
@@ -60,7 +60,7 @@ def frequency(content: Content, step: Step, block: Block) -> None:
 
 
 def end_step(content: Content, step: Step) -> None:
-    """*END STEP: what a step with *FREQUENCY asks for is kept, and no load step."""
+    """*END STEP: a step with *FREQUENCY becomes a request for modes, not a load step."""
     if not step.modes:
         if not step.static:
             raise step.refuse("the step has no *STATIC or other procedure, so it is unknown what to solve")
@@ -82,7 +82,7 @@ def end_step(content: Content, step: Step) -> None:
 
 
 def given(content: Content, step: Step | None, block: Block) -> None:
-    """Keep a block of supports or loads, in its step or before all steps."""
+    """Store a block of supports or loads, in its step or before all steps."""
     name = block.get("AMPLITUDE")
     if name and folded(name) not in content.amplitudes:
         known = ", ".join(content.amplitudes) or "none"
