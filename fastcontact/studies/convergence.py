@@ -1,4 +1,4 @@
-"""Mesh-convergence study: solve a case on finer and finer meshes, fit limits, compare them with theory."""
+"""Mesh-convergence study: solve a case on a sequence of finer meshes, fit limits, compare them with theory."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ def convergence_study(
 def _of_function(
     function: Function, sizes: int | Sequence[float], wanted: Quantities, options: dict[str, Any]
 ) -> Study:
-    """Return the study of a function that makes models; `options` are those of `run_functions`."""
+    """Return the study of a model function; `options` are those of `run_functions`."""
     if isinstance(sizes, int | np.integer):
         raise CaseError(f"a study of a function needs its mesh sizes, such as [4.0, 2.0, 1.0], not {sizes} levels")
     given = sorted(map(float, sizes), reverse=True)
@@ -162,13 +162,13 @@ def _tell_coarser(levels: Sequence[Level]) -> None:
 
 
 def level_job(case: Case, chosen: Settings, member: Combination, level: int) -> Job:
-    """Return the run of one element and formulation on one mesh."""
+    """Return the job of one element and formulation on one mesh."""
     marks = {"level": level, "element": member.element, "formulation": member.formulation}
     return job_of(case, chosen, member, level, label=f"{member} level {level}", marks=marks, size=level)
 
 
 def gathered(case: Case, jobs: Sequence[Job], results: Sequence[Result], wanted: Sequence[str]) -> Study:
-    """Return the study of finished runs; `wanted` are quantities to fit besides the standard ones and those of checks."""
+    """Return the study of finished runs; quantities in `wanted` are fitted besides the standard ones and those of checks."""
     by_combination: dict[Combination, list[tuple[int, Result]]] = {}
     for job, result in zip(jobs, results, strict=True):
         member = Combination(job.marks["element"], job.marks["formulation"])
@@ -194,9 +194,9 @@ def _series(
     theory: tuple[Any, float, str],
     asked: tuple[str, ...] = (),
 ) -> Series:
-    """Return one element and formulation with its limits; `checked` are fitted where they are known.
+    """Return the series of one element and formulation with its limits; `checked` quantities are fitted if known.
 
-    `theory` is that of the pair, the share of it that the model holds, and at what it is compared.
+    `theory` holds the theory of the pair, the fraction of it that the model represents, and the basis of comparison.
     """
     solved = [(number, result) for number, result in results if "error" not in result]
     levels = [Level(number=number, **fields_of(Level, result)) for number, result in solved]
@@ -215,7 +215,7 @@ def _series(
 
 
 def _at_force(theory: Any, share: float, force: Limit | None) -> tuple[dict[str, float], dict[str, float]]:
-    """Return the theory's values at the limit of the force, and how much they change over its error bar."""
+    """Return the values of the theory at the limit of the force, and their variation over its error bar."""
     if force is None or not force.value > force.uncertainty or not hasattr(theory, "at_force"):
         return {}, {}
     middle, upper = (of_theory(theory.at_force((force.value + off) / share), share) for off in (0.0, force.uncertainty))

@@ -20,7 +20,7 @@ from fastcontact.studies.sentences import sentences
 from fastcontact.studies.series import Series
 from fastcontact.studies.settings import Named
 
-# In figures, and in the table of all combinations.
+# Quantities in figures and in the table of all combinations.
 COMPARED = ("force", "pressure_max")
 
 
@@ -130,6 +130,6 @@ class Study(Report):
         return axes[0, 0].figure
 
     def _drawn(self) -> list[str]:
-        """Return the quantities whose errors are drawn."""
+        """Return the quantities for which errors are drawn."""
         known = self.best.shown(COMPARED) or list(self.best.quantities[:2])
         return known if isinstance(self.best.combination, Named) else list(COMPARED)

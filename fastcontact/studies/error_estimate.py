@@ -1,7 +1,7 @@
-"""Estimate of a solution's error, cell by cell: smoothed stress, and balance at the contact surface.
+"""Error estimate of a solution by cell, from the smoothed stress and the traction jump at the contact surface.
 
-The smoothed stress is more exact than the stress of the solution, so that their difference estimates the error
-(Zienkiewicz and Zhu, 1987). It does not contain the difference between smoothed stress and contact pressure on the contact
+The smoothed stress is more accurate than the stress of the solution, so that their difference estimates the error
+(Zienkiewicz and Zhu, 1987). This does not include the difference between smoothed stress and contact pressure on the contact
 surface, which is added as in residual estimates (e.g. Wriggers and Scherf, 1998).
 """
 
@@ -111,7 +111,7 @@ def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
 def _differences(
     model: Model, displacement: Array, name: str, smooth: Array, offset: StressOffset | None
 ) -> tuple[Array, float]:
-    """Return the squared energy norms (n_cells,) of smoothed minus own stress, and that of the own stress in all."""
+    """Return the squared energy norms (n_cells,) of smoothed minus computed stress, and the total of the computed stress."""
     N, stress, volume, elastic = stress_in_cells(
         model, name, slice(None), displacement, elements.get(name).order + 1, offset
     )
@@ -121,7 +121,7 @@ def _differences(
 
 
 def _add_contact(model: Model, result: ContactResult, smooth: dict[str, Array], contact: Array) -> None:
-    """Add h / E times the squared difference of pressure and smoothed normal stress, to the cells of the facets."""
+    """Add h / E times the squared difference between pressure and smoothed normal stress to the cells of the facets."""
     mesh = model.mesh
     pair = next(pair for pair in model.contact if pair.name == result.name)
     nodal = np.zeros(mesh.n_points)
@@ -160,7 +160,7 @@ def _traction(stress: Array, normal: Array) -> Array:
 
 
 def _owners(name: str, cells: Numbers, facets: Numbers) -> tuple[Indices, Indices, Indices]:
-    """Return the facets that belong to cells of a kind, those cells, and the facets' nodes as local nodes of the cells."""
+    """Return the facets of cells of a kind, these cells, and the facet nodes as local nodes of the cells."""
     near = np.flatnonzero(np.isin(cells, facets).sum(axis=1) >= facets.shape[1])
     sides = [list(side) for side in elements.get(name).facets if len(side) == facets.shape[1]]
     rows = np.array([same_facets(facets, cells[near][:, side]) for side in sides], np.intp).reshape(-1, len(near))

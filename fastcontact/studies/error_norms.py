@@ -1,7 +1,7 @@
-"""Norms of the difference between a finite-element solution and a theory, by quadrature: energy and mean square.
+"""Energy and L2 norms of the difference between a finite-element solution and a theory, by quadrature.
 
-For convergence studies against exact solutions such as `analytic.hertz_box`. Errors at the nodes alone often converge faster
-than the solution between them.
+They are for convergence studies against exact solutions such as `analytic.hertz_box`. Errors at the nodes alone often
+converge faster than the solution between them.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.elements import Element
 from fastcontact.model.model import Model
 
-# Quadrature points worked on at a time, so that theories with large intermediate arrays fit the memory.
+# Number of quadrature points evaluated at a time, which limits the intermediate arrays of theories.
 AT_ONCE = 100_000
 
 
@@ -161,11 +161,11 @@ def stress_in_cells(
     n_points: int | None,
     offset: StressOffset | None = None,
 ) -> tuple[Array, Array, Array, Array]:
-    """Return shape functions, stresses, volumes and elastic constants at the quadrature points of some cells of a kind.
+    """Return shape functions, stresses, volumes and compliances at the quadrature points of some cells of a kind.
 
     Shape functions (n_q, n_nodes) [-]; stresses (n_cells, n_q, n_components) [pressure]; volumes (n_cells, n_q) [length^dim];
-    compliances (n_cells, 1 or n_q, n_components, n_components), where they vary inside cells those of the points
-    [1 / pressure]. `displacement` is (n_points, dim) [length].
+    compliances (n_cells, 1 or n_q, n_components, n_components) [1 / pressure], by quadrature point if they vary inside cells.
+    `displacement` is (n_points, dim) [length].
     """
     mesh, element, axisymmetric = model.mesh, elements.get(name), model.kinematics == "axisymmetric"
     xi, weights = integration_rule(element, n_points)
@@ -189,7 +189,7 @@ def _squares(
     n_points: int | None,
     offset: StressOffset | None,
 ) -> Array:
-    """Return the squares (4,) of the norms over some cells, in the order of `ErrorNorms`."""
+    """Return the squared norms (4,) over some cells, in the order of `ErrorNorms`."""
     N, stress, volume, elastic = stress_in_cells(model, name, rows, u, n_points, offset)
     cells = model.mesh.cells[name][rows]
     places = np.einsum("qa,cad->cqd", N, model.mesh.points[cells])
@@ -203,7 +203,7 @@ def _squares(
 
 
 def _exact(theory: Theory, places: Array, n_components: int) -> tuple[Array, Array]:
-    """Return displacements and stresses (n_cells, n_q, ...) of the theory at `places` (n_cells, n_q, dim)."""
+    """Return displacements and stresses (n_cells, n_q, ...) of the theory at points `places` (n_cells, n_q, dim)."""
     points = places.reshape(-1, places.shape[2])
     at_points = []
     for name, size in (("displacement", points.shape[1]), ("stress", n_components)):

@@ -1,4 +1,4 @@
-"""What the reports of all studies share: the case; how tables and sentences stand on terminals, pages and in notebooks."""
+"""Base of the reports of all studies: the case, and the layout of tables and sentences for terminals, pages and notebooks."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 
 
 def of_case(case: Case) -> dict[str, Any]:
-    """Return the fields of a `Report` that are those of its case."""
+    """Return the fields of a `Report` that describe its case."""
     units = units_of_results(case.units, case.model.kinematics)
     return {"name": case.name, "title": case.title, "text": case.text, "units": units}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Report:
-    """A finished study of a case or of a function.
+    """A finished study of a case or a function.
 
     Attributes
     ----------
@@ -97,7 +97,7 @@ class Report:
         return data_frame(self.table(), {name: unit(name, self.units) for name in self.table().dtype.names or ()})
 
     def __repr__(self) -> str:
-        lines = self.lines()[self.title == self.name :]  # of a function without docstring
+        lines = self.lines()[self.title == self.name :]  # equal for a function without docstring
         return "\n".join([f"{type(self).__name__} of '{self.name}'", *lines])
 
     def _repr_html_(self) -> str:

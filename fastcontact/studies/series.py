@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from fastcontact.studies.fit import Limit, step_orders
 from fastcontact.studies.settings import Combination
 
-# Relative differences below this are those of straight facets and tolerances, no matter of the formulation [-].
+# Relative differences below this stem from straight facets and tolerances, not from the formulation [-].
 EXACT = 1e-4
 
 

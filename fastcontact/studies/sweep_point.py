@@ -1,4 +1,4 @@
-"""Results of a sweep for one choice of its parameters, and theory between them."""
+"""Results of a sweep at one point, and theory curves between the points."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Point(Measured):
 
 @dataclass(frozen=True, eq=False)
 class TheoryCurve:
-    """What the theory of a case gives over the first parameter of a sweep.
+    """Theory of a case over the first parameter of a sweep.
 
     Attributes
     ----------

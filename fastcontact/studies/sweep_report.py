@@ -16,9 +16,9 @@ from fastcontact.studies.report import Report
 from fastcontact.studies.sweep_figures import Drawing
 from fastcontact.studies.sweep_point import Point, TheoryCurve, Value
 
-# Quantities in tables and figures.
+# Quantities shown in tables and figures.
 MAIN = ("force", "pressure_max", "contact_radius")
-# What values are compared with, and what the difference is called in JSON and CSV.
+# References of the values, and the names of the differences in JSON and CSV.
 DIFFERENCES = {"theory": "from_theory", "equal_force": "from_theory_at_equal_force", "reference": "from_reference"}
 
 
@@ -105,7 +105,7 @@ class Sweep(Report):
         names, drawing = self._main(), Drawing(self.parameters, self.points, self.theories, self.units, self.compared)
         known = any(name in point.theory for point in self.points for name in names)
         size = (8.8 if known else 5.2, 0.5 + 3.1 * len(names))
-        heading = "\n".join(dict.fromkeys((self.title, self.combination)))  # of a function they are the same
+        heading = "\n".join(dict.fromkeys((self.title, self.combination)))  # equal for a function
         axes = panels(len(names), 1 + known, size, heading, fontsize=11)
         for row, name in zip(axes, names, strict=True):
             drawing.draw_values(row[0], name)

@@ -24,7 +24,7 @@ def refusing(at: Location | Located, about: str = "") -> Iterator[None]:
 
 
 def registered(kind: str, name: str, table: dict[str, Entry], entry: Entry, at: Location | Located) -> Entry:
-    """Put an entry into a table by its name, and return it; refused if there is one with this name already."""
+    """Add an entry to a table under its name and return it; raises CaseError if the name is in the table already."""
     if folded(name) in table:
         raise at.refuse(f"{kind} '{name}' is defined twice")
     table[folded(name)] = entry

@@ -1,4 +1,4 @@
-"""Pages: one self-contained HTML file of paragraphs, tables and pictures, which loads nothing from elsewhere."""
+"""Pages: a self-contained HTML file of paragraphs, tables and pictures that loads nothing else."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def paragraph(text: str) -> str:
 
 
 def failure(text: str) -> str:
-    """Return why something failed as a paragraph."""
+    """Return the reason of a failure as a paragraph."""
     return f"<p class='failed'>{html.escape(text)}</p>"
 
 
@@ -63,7 +63,7 @@ def table(rows: Sequence[Sequence[str]], caption: str = "") -> str:
 
 
 def image(figure: Any, description: str) -> str:
-    """Return a matplotlib figure as an image element that holds the picture."""
+    """Return a matplotlib figure as an image element with embedded data."""
     data = base64.b64encode(png(figure)).decode("ascii")
     return f"<p><img alt='{html.escape(description, quote=True)}' src='data:image/png;base64,{data}'></p>"
 
