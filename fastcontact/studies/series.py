@@ -145,7 +145,7 @@ class Series:
 
     @property
     def finest(self) -> Level:
-        """The last level that could be solved."""
+        """The finest level that was solved."""
         return self.levels[-1]
 
     @property
@@ -189,11 +189,11 @@ class Series:
         limit, theory = self.limits.get(quantity), self.equal_force.get(quantity)
         if not (limit and theory):
             return None
-        # The theory's value is as uncertain as the force at which it is taken.
+        # The value of the theory inherits the uncertainty of the force.
         error_bar = math.hypot(limit.uncertainty, self.equal_force_spread.get(quantity, 0.0))
         return split(self.values(quantity)[-1], dataclasses.replace(limit, uncertainty=error_bar), theory)
 
     def mesh_error(self, quantity: str) -> float:
-        """Return the error of the finest mesh [-], relative to the theory, or without one to the limit."""
+        """Return the error of the finest mesh [-], relative to the theory, or to the limit without a theory."""
         split = self.split(quantity)
         return split.mesh if split else self.errors(quantity)[-1]
