@@ -66,11 +66,10 @@ def kernels_of(runs: Sequence[str]) -> list[int]:
 
 
 def numba_type(given: Any) -> Any:
-    """Return the Numba type that an entry of the table tells.
+    """Return the Numba type of an entry of the table.
 
-    A string is a scalar, as NumPy writes its kind and bytes; a list ``[scalar, dimensions]`` a contiguous array that may be
-    written, one with a third item "r" one that may not; ``{"class": [type, ...]}`` a named tuple, and a plain one where the
-    class is empty.
+    A string is a scalar in NumPy's notation of kind and bytes. A list ``[scalar, dimensions]`` is a contiguous array; it is
+    read-only with a third item "r". ``{"class": [type, ...]}`` is a named tuple, or a plain tuple if the class is empty.
     """
     if isinstance(given, str):
         return from_dtype(dtype(given))

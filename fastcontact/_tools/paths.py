@@ -16,7 +16,7 @@ from pathlib import Path
 from fastcontact.errors import FileError
 
 PathLike = str | os.PathLike[str]
-# Folders with the open files of this process.
+# Paths of the open files of this process.
 _DESCRIPTOR = re.compile(r"/(?:dev|proc/(?:self|thread-self|\d+))/fd/(\d+)")
 
 

@@ -72,5 +72,5 @@ __all__ = [
 ]  # fmt: skip
 
 
-if not TYPE_CHECKING:  # to whom all names are known
+if not TYPE_CHECKING:  # type checkers see the imports above
     __getattr__, __dir__ = names_of("fastcontact.analytic", __all__)

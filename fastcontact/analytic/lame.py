@@ -245,13 +245,13 @@ def _pair(
     inner: tuple[float, float], outer: tuple[float, float], radii: tuple[float, float, float], interference: float,
     kinematics: str,
 ) -> PressFit:  # fmt: skip
-    """Return the fit of an inner and an outer body, each with its E and nu."""
+    """Return the press fit of an inner and an outer body, each given by E and nu."""
     for side, (E, nu) in (("inner", inner), ("outer", outer)):
         positive(f"E_{side}", E)
         poisson(f"nu_{side}", nu)
     a, b, c = radii
     positive("interface_radius", b)
-    # Under a unit pressure on the interface first.
+    # First for a unit pressure on the interface.
     shaft, hub = LameShell(a, b, 0.0, 1.0, *inner, kinematics), LameShell(b, c, 1.0, 0.0, *outer, kinematics)
     d = positive("interference", interference)
     pressure = d / float(hub.displacement(b) - shaft.displacement(b))

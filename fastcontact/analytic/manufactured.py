@@ -122,7 +122,7 @@ class HertzBox:
         return np.stack([xx, yy, vertical, xy, shear * sine, shear * cosine], axis=-1)
 
     def _in_plane(self, points: ArrayLike) -> tuple[tuple[Array, Array], tuple[Array, ...]]:
-        """Return (distance from the axis, height), and the direction that leads there in the coordinates of the top."""
+        """Return (distance from the axis, height), and the radial direction in the coordinates of the top."""
         places = array("points", points)
         if places.ndim == 0 or places.shape[-1] != self.dim:
             raise ModelError(f"points has shape {places.shape}: it must be (..., {self.dim})")

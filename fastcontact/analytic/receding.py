@@ -12,9 +12,9 @@ from fastcontact.analytic._inputs import Bodies, array, not_negative, plane_kine
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 
-_TERMS = 80  # of the Chebyshev series: errors of half-width and pressure below 1e-6 in all the range below
-_LARGEST_RATIO = 100.0  # of the moduli: beyond, the contact is so wide that the layer is a beam
-_LARGEST_LOAD = 10.0  # half-width of the load over thickness
+_TERMS = 80  # terms of the Chebyshev series: errors of half-width and pressure below 1e-6 in the range below
+_LARGEST_RATIO = 100.0  # largest ratio of the moduli: beyond, the contact is so wide that the layer is a beam
+_LARGEST_LOAD = 10.0  # largest half-width of the load over thickness
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class RecedingLayer:
         """Return the contact pressure (...) [pressure] at positions `x` (...) [length], zero outside."""
         position = np.abs(array("x", x)) / self.radius
         theta = np.arccos(np.minimum(position, 1.0))
-        # The coefficients sum to zero: with cos(2 k theta) - 1 in its place there is no 0/0 at the edge.
+        # The coefficients sum to zero: cos(2 k theta) - 1 in place of cos(2 k theta) avoids 0/0 at the edge.
         terms = sum((b * np.sin(k * theta) ** 2 for k, b in enumerate(self.series)), np.zeros_like(theta))
         return -2.0 * terms / np.maximum(np.sin(theta), 1e-300)
 
@@ -71,7 +71,7 @@ def _layer(xi: Array) -> tuple[Array, Array]:
 
 
 def _wave_numbers(panels: int) -> tuple[Array, Array]:
-    """Return points and weights on (0, 40), where all compliances have become those of a half plane."""
+    """Return points and weights on (0, 40); at the upper end all compliances are those of a half plane."""
     points, weights = np.polynomial.legendre.leggauss(12)
     width = 40.0 / panels
     start = width * np.arange(panels)[:, None]
@@ -90,7 +90,7 @@ def _series(c: float, ratio: float, a: float) -> Array:
     theta = (np.arange(half) + 0.5) * math.pi / _TERMS
     t, x = np.cos(theta), np.cos(np.arange(1, half) * math.pi / _TERMS)
     sines = np.sin(np.outer(c * x, xi)) * weight
-    # The whole force is 1: with its part taken out, the kernel stays bounded at small wave numbers.
+    # The total force is 1: without its contribution, the kernel stays bounded at small wave numbers.
     kernel = sines @ (0.5 * (bend - squeeze) * -2.0 * np.sin(0.5 * np.outer(c * t, xi)) ** 2).T
     singular = 1.0 / (x[:, None] - t) + 1.0 / (x[:, None] + t)
     right = sines @ (squeeze + 0.5 * (bend + squeeze) * (np.sinc(xi * a / math.pi) - 1.0))
@@ -170,7 +170,7 @@ def _modulus_ratio(bodies: Bodies, kinematics: str) -> float:
 
 
 def _half_width(ratio: float, a: float) -> float:
-    """Return c over thickness, where the pressure is not singular at the edge."""
+    """Return the c over thickness for which the pressure is not singular at the edge."""
     from scipy.optimize import brentq
 
     high = 1.0  # the contact of a soft layer under a line force has 0.86

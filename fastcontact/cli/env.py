@@ -38,7 +38,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _warm_up(show: bool) -> int:
-    """Compile all kernels of the table, side by side in a process for each processor; return their number."""
+    """Compile all kernels of the table in parallel, with one process per processor; return their number."""
     from fastcontact._jit import ahead, decorators
     from fastcontact.analysis.progress import StatusLine
 

@@ -1,4 +1,4 @@
-"""``fastcontact info``: what a mesh or result file holds."""
+"""``fastcontact info``: content of a mesh, case, deck or result file."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 from fastcontact.cli._outputs import check_outputs, save
 from fastcontact.cli._terminal import say
 
-HELP = "show what a mesh, case, deck or result file holds: groups, sizes, steps, iterations, versions"
+HELP = "show the content of a mesh, case, deck or result file: groups, sizes, steps, iterations, versions"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -26,7 +26,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print what the file holds."""
+    """Print the content of the file."""
     if options.contacts or options.png:
         return _contacts(options)
     if Path(options.file).suffix == ".vtkhdf":
@@ -56,7 +56,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _contacts(options: argparse.Namespace) -> int:
-    """Print the contacts that are found in a mesh, and draw them."""
+    """Print the contact pairs found in a mesh, and draw them."""
     from fastcontact.cases.case import files_of_case, read_case
     from fastcontact.contact.found_contacts import find_contacts
     from fastcontact.results import plot
@@ -73,7 +73,7 @@ def _contacts(options: argparse.Namespace) -> int:
 
 
 def _is_case(path: Path) -> bool:
-    """Whether a file is a case file, or a deck that is more than a mesh."""
+    """Whether a file is a case file, or a deck with more than a mesh."""
     return path.suffix.lower() == ".toml" or (path.suffix.lower() == ".inp" and _is_deck(path))
 
 

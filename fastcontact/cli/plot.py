@@ -1,4 +1,4 @@
-"""``fastcontact plot``: the deformed mesh coloured by a field, sections, the contact, what happens over the load."""
+"""``fastcontact plot``: the deformed mesh coloured by a field, sections, the contact, and its history over the load."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from fastcontact.cli import _results
 from fastcontact.cli._outputs import check_outputs, save, say_written
 from fastcontact.errors import CaseError
 
-HELP = "plot the deformed mesh with a field, a section, the contact, or what happens over the load"
-# Pictures of one contact pair.
+HELP = "plot the deformed mesh with a field, a section, the contact, or its history over the load"
+# Kinds of pictures of one contact pair.
 OF_CONTACT = ("history", "axis", "zones", "map")
 
 
@@ -111,7 +111,7 @@ def _of_bodies(
 
 
 def _of_contact(options: argparse.Namespace, results: Any, step: Any, case: dict[str, Any]) -> Any:
-    """Draw of one contact pair its map, its zones or history over the load, or the stresses under it."""
+    """Draw a contact pair: its map, its zones or history over the load, or the stresses under it."""
     from fastcontact.results import plot
 
     labels = {"title": case["title"]}
@@ -131,7 +131,7 @@ def _of_contact(options: argparse.Namespace, results: Any, step: Any, case: dict
 
 
 def _axis_curves(theories: dict[str, Any], step: Any, name: str, case: dict[str, Any]) -> dict[str, Any]:
-    """Return theories of the stresses on the axis by label, at equal approach and at equal force."""
+    """Return theories of the stresses on the axis, by label, at equal approach and at equal force."""
     theory = theories.get("theory")
     theory = getattr(theory, "hertz", theory)
     if theory is None or not hasattr(theory, "stress_on_axis"):

@@ -1,4 +1,4 @@
-"""``fastcontact sweep``: a case for many values of its parameters, held against theory."""
+"""``fastcontact sweep``: a case for many values of its parameters, compared with theory."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from fastcontact.cli import _study
 from fastcontact.errors import CaseError
 
-HELP = "solve a case for many values of its parameters, held against theory"
+HELP = "solve a case for many values of its parameters, and compare with theory"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -48,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def values(text: str) -> tuple[str, list[Any]]:
-    """Return a parameter and its values from ``NAME=VALUES``; raises CaseError if the text is of another form."""
+    """Return a parameter and its values from ``NAME=VALUES``; raises CaseError if the text has another form."""
     name, equals, listed = text.partition("=")
     if not (name and equals and listed):
         raise CaseError(f"--set '{text}' must be NAME=VALUES, for example approach=0.04,0.4,4")
