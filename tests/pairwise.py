@@ -9,9 +9,17 @@ pairs (those of elements and formulations: `test_every_solver` and the patch tes
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Sequence
 from itertools import combinations
+from typing import Any
 
 import pytest
+
+
+def first_of(count: int, cases: Sequence[Any]) -> list[Any]:
+    """Return the cases of one parameter, or of several in tuples, those after the first `count` marked as slow."""
+    rest = (pytest.param(*(c if isinstance(c, tuple) else (c,)), marks=pytest.mark.slow) for c in cases[count:])
+    return [*cases[:count], *rest]
 
 
 def covering(cases: list[dict[str, str]], strength: int = 2) -> list[int]:

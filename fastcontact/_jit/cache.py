@@ -15,13 +15,14 @@ import secrets
 import stat
 import sys
 from collections.abc import Callable, Iterator
-from functools import cache, cached_property, lru_cache
+from functools import cache, cached_property, lru_cache, partial
 from pathlib import Path
 from typing import Any
 
 import llvmlite
 import numba
 import numpy as np
+from numba.core.runtime import rtsys
 
 from fastcontact._jit import compiling
 from fastcontact._version import __version__
@@ -124,7 +125,14 @@ def keep(kernel: Any, function: Callable[..., Any], options: str) -> str:
         return f"others may write to the folder of compiled kernels, {folder}"
     name = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}"
     files[function] = numbas._cache_file = KernelFiles(folder, name, function, options, numbas._cache_file)
+    numbas.load_overload = partial(_loaded, numbas)
     return ""
+
+
+def _loaded(numbas: Any, signature: Any, target: Any) -> Any:
+    """Return a kernel that is kept, or None; Numba's own method first loads what it compiles by: half of a warm start."""
+    rtsys.initialize(target)
+    return numbas._load_overload(signature, target)
 
 
 @lru_cache(maxsize=1)

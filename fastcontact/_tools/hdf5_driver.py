@@ -48,7 +48,7 @@ class DriverFile:
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
         """Set the position from the start, from itself or from the end."""
-        base = {os.SEEK_SET: 0, os.SEEK_CUR: self._position, os.SEEK_END: self._size()}[whence]
+        base = self._size() if whence == os.SEEK_END else {os.SEEK_SET: 0, os.SEEK_CUR: self._position}[whence]
         self._position = base + offset
         return self._position
 

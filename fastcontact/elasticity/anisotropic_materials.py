@@ -27,7 +27,7 @@ from fastcontact.errors import ModelError
 from fastcontact.round_off import ROUND_OFF
 
 NAMES = ("12", "13", "23")
-# Of the stiffness to be symmetric, relative to its largest entry.
+# Tolerance of the symmetry of the stiffness, relative to its largest entry.
 SYMMETRIC = 1e-9
 
 
@@ -92,7 +92,7 @@ class Orthotropic(Material):
             _check_modulus(f"Young's modulus E{number}", value)
         for value, number in zip(self.G, NAMES, strict=True):
             _check_modulus(f"the shear modulus G{number}", value)
-        if not self.graded:  # else where the cells are known
+        if not self.graded:  # otherwise checked once the cells are known
             _check_ratios(self.E, self.nu)
         _take_rest(self)
 
@@ -156,12 +156,12 @@ class Orthotropic(Material):
         return S
 
     def admissible(self, constants: Any) -> Any:
-        """Return where (n,) moduli are positive, and Poisson's ratios leave the energy of any strain positive."""
+        """Return where (n,) moduli are positive and Poisson's ratios make the strain energy positive definite."""
         E, nu, G = (
             np.broadcast_arrays(*map(np.atleast_1d, values)) for values in (constants.E, constants.nu, constants.G)
         )
         fit = np.all([(v >= 1.0 / LARGEST) & (v <= LARGEST) for v in np.broadcast_arrays(*E, *G)], axis=0)
-        with np.errstate(all="ignore"):  # what is no modulus is found above
+        with np.errstate(all="ignore"):  # inadmissible moduli are detected above
             nu21, nu31, nu32 = nu[0] * E[1] / E[0], nu[1] * E[2] / E[0], nu[2] * E[2] / E[1]
             single = (nu[0] * nu21 < 1.0) & (nu[1] * nu31 < 1.0) & (nu[2] * nu32 < 1.0)
             return fit & single & (_determinant(nu, (nu21, nu31, nu32)) > ROUND_OFF)
@@ -240,12 +240,12 @@ class Anisotropic(Material):
         return np.asarray(np.linalg.inv(np.array(self.D)[None]))
 
     def admissible(self, constants: Any) -> Any:
-        """Return True: the moduli, which do not vary, are checked already."""
+        """Return True: the constant moduli are already checked."""
         return True
 
 
 def _take_rest(material: Orthotropic | Anisotropic) -> None:
-    """Check axes, density, expansion and conductivity of a material, and put them into their form."""
+    """Check axes, density, expansion and conductivity of a material, and normalise them."""
     object.__setattr__(material, "density", wrapped(material.density))
     for name in ("expansion", "conductivity"):
         value = getattr(material, name)
@@ -263,7 +263,7 @@ def _take_rest(material: Orthotropic | Anisotropic) -> None:
 
 
 def _axes(axes: Any) -> Any:
-    """Return the axes of a material in their form; ModelError if those of cells are not at right angles."""
+    """Return the normalised axes of a material; ModelError if those of cells are not orthogonal."""
     if isinstance(axes, CellAxes):
         return axes
     if not isinstance(axes, np.ndarray) or axes.ndim != 3:
@@ -286,20 +286,20 @@ def _three(name: str, values: Any) -> tuple[Any, Any, Any]:
 
 
 def _real(value: Any) -> float:
-    """Return a real number as it is; TypeError of anything else, such as text and complex numbers."""
+    """Return a real number unchanged; TypeError for anything else, such as text and complex numbers."""
     if not isinstance(value, Real) or isinstance(value, bool):
         raise TypeError(value)
     return float(value)
 
 
 def _determinant(nu: Sequence[Any], back: Sequence[Any]) -> Any:
-    """Return 1 - nu12 nu21 - ..., positive where the energy is, from nu12, nu13, nu23 and nu21, nu31, nu32 [-]."""
+    """Return 1 - nu12 nu21 - ..., which must be positive, from nu12, nu13, nu23 and nu21, nu31, nu32 [-]."""
     (nu12, nu13, nu23), (nu21, nu31, nu32) = nu, back
     return 1.0 - nu12 * nu21 - nu23 * nu32 - nu13 * nu31 - 2.0 * nu21 * nu32 * nu13
 
 
 def _check_ratios(E: Sequence[float], nu: Sequence[float]) -> None:
-    """Raise ModelError unless Poisson's ratios leave the energy of any strain positive."""
+    """Raise ModelError unless Poisson's ratios make the strain energy positive definite."""
     for value, number, (i, j) in zip(nu, NAMES, ((0, 1), (0, 2), (1, 2)), strict=True):
         limit = math.sqrt(E[i] / E[j])
         if not abs(value) < limit:

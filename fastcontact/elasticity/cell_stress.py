@@ -18,12 +18,12 @@ from fastcontact.elasticity.stiffness import of_cells
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
-# Cells at a time where moduli vary inside them.
+# Number of cells processed at a time if moduli vary inside them.
 VARYING = 2_000
 
 
 def beside(name: str, xi: Array) -> Array:
-    """Return the weights (n, n_q) [-] of values at the quadrature points for those at points `xi` (n, dim) [-]."""
+    """Return the interpolation weights (n, n_q) [-] from the quadrature points to points `xi` (n, dim) [-]."""
     element = elements.get(name)
     if xi is element.quadrature[0]:
         return np.eye(len(xi))
@@ -41,12 +41,12 @@ class CellStress:
     moduli : ndarray (n_materials, 4, 4), in 3D (n_materials, 6, 6)
         From `LinearElastic.moduli` [pressure].
     displacement : ndarray (n_points, dim)
-        Of all points [length].
+        Displacements of all points [length].
     averaged : ndarray of bool (n_materials,), optional
-        Which materials have a mean dilatation, see `dilatation`, or incompatible modes (`MaterialField.treatment`); none by
+        Materials with a mean dilatation, see `dilatation`, or incompatible modes (`MaterialField.treatment`); none by
         default.
     offset : StressOffset, optional
-        What stresses have by temperature and initial states.
+        Stresses due to temperature and initial states.
     """
 
     def __init__(
@@ -65,8 +65,8 @@ class CellStress:
     def at(self, name: str, xi: Array, cells: Numbers, material: Numbers, rows: Indices | None = None) -> Array:
         """Return the stresses (n_cells, n, n_components) [pressure] at points `xi` (n, dim) [-] of cells of an element.
 
-        `cells` (n_cells, n_nodes) of int; `material` (n_cells,) of int, the material number of each, or (n_cells, n_q), that
-        of each quadrature point; `rows` (n_cells,) of int, the numbers of the cells, which only initial states need.
+        `cells` (n_cells, n_nodes) of int; `material` (n_cells,) or (n_cells, n_q) of int, the material number of each cell or
+        of each quadrature point; `rows` (n_cells,) of int, the numbers of the cells, only needed for initial states.
         """
         out = np.empty((len(cells), len(xi), self._moduli.shape[1]))
         self.fill(name, xi, cells, material, out, rows)
@@ -76,7 +76,7 @@ class CellStress:
         self, name: str, xi: Array, cells: Numbers, material: Numbers, out: Array,
         rows: Indices | None = None,
     ) -> None:  # fmt: skip
-        """Fill `out` (n_cells, n, n_components) [pressure] in place, shared by threads.
+        """Fill `out` (n_cells, n, n_components) [pressure] in place, in parallel.
 
         At points `xi` (n, dim) [-] of `cells` (n_cells, n_nodes) of int of an element; `material` (n_cells,) or
         (n_cells, n_q) and `rows` (n_cells,) of int, as for `at`.
@@ -117,10 +117,10 @@ class CellStress:
         self, at: tuple[str, Array, Array, Array], cells: Numbers, material: Numbers, moduli: Array,
         out: Array,
     ) -> None:  # fmt: skip
-        """Fill `out` where moduli differ from point to point.
+        """Fill `out` if moduli vary from point to point.
 
-        At the quadrature points one point of all cells after the other. Elsewhere the strains come first, as stresses of
-        moduli that are one; moduli are those of the polynomial through the quadrature points.
+        At the quadrature points, the points of all cells are processed one after the other. Elsewhere strains are computed
+        first, as stresses of unit moduli; moduli are interpolated from the quadrature points.
         """
         name, xi, N, dN = at
         loops, shared = element_kernels.loops(self._mesh.dim), (self._axisymmetric, self._displacement)
@@ -165,7 +165,7 @@ class CellStress:
 
     @staticmethod
     def _lost_by_initial(offset: StressOffset, name: str, rows: Indices, N: Array, moduli: Array) -> Array | float:
-        """Return what stresses (n_cells, n, n_components) [pressure] lose by initial strains, less initial stresses."""
+        """Return the stresses (n_cells, n, n_components) of initial strains, minus initial stresses [pressure]."""
         strain, stress = (offset.initial(kind, name, rows, N) for kind in ("strain", "stress"))
         lost = 0.0 if strain is None else (moduli @ strain[..., None])[..., 0]
         return lost if stress is None else lost - stress
@@ -174,7 +174,7 @@ class CellStress:
         self, offset: StressOffset, at: tuple[str, Array, Indices], cells: Numbers, material: Numbers,
         out: Array,
     ) -> None:  # fmt: skip
-        """Add initial stresses, subtract those of initial strains, whose dilatation is projected where that of others is."""
+        """Add initial stresses, subtract those of initial strains, whose dilatation is projected like that of the strain."""
         name, xi, rows = at
         N = elements.get(name).shape(xi)
         stress, strain = (offset.initial(kind, name, rows, N) for kind in ("stress", "strain"))
@@ -208,7 +208,7 @@ class CellStress:
         material: Numbers,
         out: Array,
     ) -> None:
-        """Subtract the thermal stresses; the dilatation of the temperature is projected where that of the strain is."""
+        """Subtract the thermal stresses, whose dilatation is projected like that of the strain."""
         element, split = elements.get(name), dilatation.split(name, self._moduli, self._averaged)
         rise = thermal.rise[cells] @ element.shape(xi).T
         if material.ndim == 1:

@@ -4,7 +4,7 @@
 Shared arguments: ``points`` (n_points, dim) [length]; ``cells`` (n_cells, n_nodes); ``N`` (n_q, n_nodes), ``dN`` (n_q,
 n_nodes, dim), ``weights`` (n_q,) of the reference element; ``basis`` (n_q, m), the polynomials at the same points, the
 constant first; ``bulk`` (n_materials, 2) [pressure], the moduli of the mean dilatation and of the other polynomials, zero
-where a material takes the dilatation as it is; ``material`` (n_cells,). dim is 2 or 3.
+for materials without projection; ``material`` (n_cells,). dim is 2 or 3.
 
 With the dilatation t = d.u, the weights w of the quadrature and the polynomials p, M = sum w p p^T = L L^T is their mass
 matrix and g = sum w p d^T. L^-1 p are orthonormal polynomials, the projection is p^T M^-1 g u, and its stiffness
@@ -82,7 +82,7 @@ def back_substitute(L, y):
 def add_stiffness(points, cells, N, dN, weights, basis, bulk, material, axisymmetric, slots, owner, part, data):
     """Add the stiffness of the projected dilatation to `data` (n_blocks, dim, dim), in the rows of a part's nodes.
 
-    Arguments as for the element loops of the whole stiffness; Jacobians have been found positive.
+    Arguments as for the element loops of the stiffness; Jacobians are known to be positive.
     """
     n_cells, n_nodes = cells.shape
     dim, size = points.shape[1], basis.shape[1]
@@ -113,7 +113,7 @@ def add_stiffness(points, cells, N, dN, weights, basis, bulk, material, axisymme
 
 @kernel
 def add_pressure(points, cells, N, dN, weights, basis, bulk, material, axisymmetric, displacement, at, out):
-    """Add the moduli times the projected dilatation to the normal stresses of `out` (n_cells, n_out, n_components), in place.
+    """Add the moduli times the projected dilatation to the normal stresses in `out` (n_cells, n_out, n_components).
 
     `displacement` (n_points, dim); `at` (n_out, m): the polynomials at the points of `out`.
     """

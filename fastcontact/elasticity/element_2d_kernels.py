@@ -34,7 +34,7 @@ def _map(points, cell, N, dN, q, gradient):
 
 @kernel
 def owned(cells, c, owner, part, mine):
-    """Fill `mine` (n_nodes,) with which nodes of a cell have the owner `part`; return whether any has."""
+    """Fill `mine` (n_nodes,) with whether the nodes of a cell have the owner `part`; return whether any has."""
     is_owned = False
     for a in range(cells.shape[1]):
         mine[a] = owner[cells[c, a]] == part
@@ -89,7 +89,7 @@ def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, ax
         if not _cell(points, cells[c], N, dN, weights, moduli[material[c]], axisymmetric, gradient, local):
             return c
         for b in range(n_nodes):
-            local[b, b, 1, 0] = local[b, b, 0, 1]  # equal but for round-off; K is symmetric to the last bit
+            local[b, b, 1, 0] = local[b, b, 0, 1]  # equal up to round-off; keeps K bitwise symmetric
             for a in range(b + 1):
                 upper, lower = slots[c, a, b], slots[c, b, a]
                 if mine[a]:
@@ -107,8 +107,8 @@ def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, ax
 def stress(points, cells, N, dN, moduli, material, axisymmetric, displacement, out):
     """Fill `out` (n_cells, n_q, 4) with the stress xx, yy, zz, xy at the points of the tables N, dN.
 
-    Positions and displacements are differentiated along the cell, and their derivatives divided: no shape function's
-    gradient is formed.
+    Positions and displacements are differentiated in reference coordinates, and the derivatives divided: gradients of shape
+    functions are not computed.
     """
     n_cells, n_nodes = cells.shape
     local = np.empty((n_nodes, 4))
@@ -153,7 +153,7 @@ def largest_rotation(points, cells, N, dN, displacement):
     """
     n_cells, n_nodes = cells.shape
     gradient = np.empty((n_nodes, 2))
-    largest, number, first = 0.0, -1, np.int64(0)  # of a literal, the map would be compiled once more
+    largest, number, first = 0.0, -1, np.int64(0)  # a literal would compile the map once more
     for c in range(n_cells):
         _map(points, cells[c], N, dN, first, gradient)
         curl = 0.0
@@ -168,7 +168,7 @@ def largest_rotation(points, cells, N, dN, displacement):
 
 @interpretable_kernel
 def add_nodal(cells, extrapolation, at_points, low, high, total, count):
-    """Extrapolate quadrature values to the nodes `low` to ``high - 1`` of each cell and add them up per node, in place.
+    """Extrapolate quadrature values to the nodes `low` to ``high - 1`` of each cell and sum them per node, in place.
 
     `extrapolation` (n_nodes, n_q), `at_points` (n_cells, n_q, n_components); `total` (n_points, n_components) and
     `count` (n_points,) are added to.

@@ -54,7 +54,7 @@ def _tensor(D, tensor):
 def _integrate_products(x, slopes, weights, gradient, g):
     """Fill `g` (6, n_nodes, n_nodes) with the integrals of dN_a/dx_i dN_b/dx_j for ij = 00, 01, 02, 11, 12, 22.
 
-    Returns whether the Jacobian is positive everywhere. One short loop for each ij: the compiler makes vectors of it.
+    Returns whether the Jacobian is positive everywhere. One short loop for each ij, which the compiler vectorises.
     """
     n_nodes = x.shape[1]
     g[:] = 0.0
@@ -110,7 +110,7 @@ def _add_isotropic_block(flat, pair, at_upper, at_lower, upper, lower, coupling,
     trace, both = shear * (xx + yy + zz), coupling + shear
     k01, k02, k12 = coupling * xy + shear * yx, coupling * xz + shear * zx, coupling * yz + shear * zy
     k10, k20, k21 = coupling * yx + shear * xy, coupling * zx + shear * xz, coupling * zy + shear * yz
-    if not pair:  # equal but for round-off; K is symmetric to the last bit
+    if not pair:  # equal up to round-off; keeps K bitwise symmetric
         k10, k20, k21 = k01, k02, k12
     _add_block(
         flat, at_upper, at_lower, upper, lower,
@@ -144,7 +144,7 @@ def _add_general(g, tensor, products, block, slots, c, mine, flat):
                 for column in range(9):
                     total += tensor[row, column] * products[column]
                 block[row] = total
-            if a == b:  # equal but for round-off; K is symmetric to the last bit
+            if a == b:  # equal up to round-off; keeps K bitwise symmetric
                 block[3], block[6], block[7] = block[1], block[2], block[5]
             _add_block(
                 flat, mine[a], mine[b], slots[c, a, b], slots[c, b, a],
@@ -191,8 +191,8 @@ def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, ax
 
     `data` is written in place at `slots`. Threads share the nodes; each adds to its rows in the order of the cells.
     Returns the number of the first cell with a Jacobian that is not positive, or -1. The products of gradients are
-    integrated first; the moduli of the cell come in once at the end. Where ``isotropic`` (n_materials,) holds, these are
-    Lame's constants, ``D[0, 1]`` and ``D[3, 3]``.
+    integrated first, and multiplied with the moduli of the cell at the end. Where ``isotropic`` (n_materials,) holds, these
+    are Lame's constants, ``D[0, 1]`` and ``D[3, 3]``.
     """
     n_cells, n_nodes = cells.shape
     slopes, x, gradient = transposed(dN), np.empty((3, n_nodes)), np.empty((3, n_nodes))
@@ -225,7 +225,8 @@ def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, ax
 def stress(points, cells, N, dN, moduli, material, axisymmetric, displacement, out):
     """Fill `out` (n_cells, n_q, 6) with the stress xx, yy, zz, xy, yz, xz at the points of the table dN.
 
-    Position and displacement are differentiated along the cell together, and no gradients of shape functions are formed.
+    Positions and displacements are differentiated together in reference coordinates: gradients of shape functions are not
+    computed.
     """
     n_cells, n_nodes = cells.shape
     slopes, local = transposed(dN), np.empty((n_nodes, 6))
@@ -283,7 +284,7 @@ def largest_rotation(points, cells, N, dN, displacement):
     """
     n_cells, n_nodes = cells.shape
     slopes, x, gradient = transposed(dN), np.empty((3, n_nodes)), np.empty((3, n_nodes))
-    largest, number, first = 0.0, -1, np.int64(0)  # of a literal, the map would be compiled once more
+    largest, number, first = 0.0, -1, np.int64(0)  # a literal would compile the map once more
     for c in range(n_cells):
         _gather(points, cells, c, x)
         map_3d(x, slopes, first, gradient)

@@ -8,7 +8,8 @@ cell; ``pairs`` (dim, dim), the component of stress of two directions; ``moduli`
 or of their quadrature points. dim is 2 or 3, with 4 or 13 modes.
 
 With the strains M of unit modes and B of unit displacements of the nodes, own = sum w M^T D M = L L^T and mixed = sum w M^T D
-B: static condensation eliminates the modes by a = -own^-1 mixed u, and take (L^-1 mixed)^T (L^-1 mixed) from the stiffness.
+B: static condensation eliminates the modes by a = -own^-1 mixed u, and subtracts (L^-1 mixed)^T (L^-1 mixed) from the
+stiffness.
 """
 
 import numpy as np
@@ -78,7 +79,7 @@ def subtract_stiffness(
 ):
     """Subtract the condensed modes from `data` (n_blocks, dim, dim), in the rows of a part's nodes.
 
-    `slots`, `owner` and `part` as for the element loops of the whole stiffness; Jacobians have been found positive.
+    `slots`, `owner` and `part` as for the element loops of the stiffness; Jacobians are known to be positive.
     """
     n_cells, n_nodes = cells.shape
     dim = points.shape[1]
@@ -110,9 +111,9 @@ def add_stress(
 ):
     """Add the stresses of modes to `out` (n_cells, n_out, n_components), in place.
 
-    `displacement` (n_points, dim); `lost` (n_cells or 0, n_q, n_components), the stresses that the cells lose by temperature
-    and initial states; `at` (n_out, dim) and `slopes` (n_out, n_nodes, dim): the points of `out` and shape derivatives
-    there; `beside` (n_out, n_q): weights of values at the quadrature points for those at the points of `out`.
+    `displacement` (n_points, dim); `lost` (n_cells or 0, n_q, n_components), the stresses subtracted for temperature and
+    initial states; `at` (n_out, dim) and `slopes` (n_out, n_nodes, dim): the points of `out` and shape derivatives there;
+    `beside` (n_out, n_q): interpolation weights from the quadrature points to the points of `out`.
     """
     n_cells, n_nodes = cells.shape
     dim, size = points.shape[1], moduli.shape[1]

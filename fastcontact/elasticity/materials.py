@@ -24,9 +24,9 @@ from fastcontact.round_off import ROUND_OFF
 AnyMaterial = TypeVar("AnyMaterial", bound="Material")
 
 KINEMATICS = ("axisymmetric", "plane_strain", "plane_stress", "3d")
-# What elements make of the dilatation.
+# Treatments of the dilatation.
 VOLUMETRIC = ("auto", "plain", "mean_dilatation")
-# Poisson's ratio from which on a material has a mean dilatation by itself.
+# Poisson's ratio above which a material has a mean dilatation by default.
 NEARLY_INCOMPRESSIBLE = 0.49
 # Constants that may vary, those of the moduli first.
 MODULI = ("E", "nu", "G")
@@ -35,7 +35,7 @@ CONSTANTS = (*MODULI, "density", "expansion", "conductivity")
 
 @typed(ModelError)
 class Material:
-    """A linear elastic material: its moduli in axes of its own, and what loads and temperature need to know of it.
+    """A linear elastic material: moduli in material axes, density, and thermal properties.
 
     Attributes
     ----------
@@ -44,14 +44,13 @@ class Material:
     expansion : float, Varying, tuple or None
         Coefficients of thermal expansion [1 / temperature].
     conductivity : float, Varying, tuple or None
-        Of heat, one or three along the axes [power / (length temperature)].
+        Thermal conductivity, one or three along the axes [power / (length temperature)].
     axes : sequence, callable or None
         Unit vectors in rows (3, 3) [-], or a function, see `Orthotropic`; None: those of the mesh.
     averaged : bool
-        Whether elements have a mean dilatation, where they can and kinematics are not plane stress.
+        Whether elements that support it have a mean dilatation, except in plane stress.
     incompatible_modes : bool
-        Whether linear quadrangles and hexahedra have incompatible modes, where kinematics are not axisymmetric, in place of a
-        mean dilatation.
+        Whether linear quadrangles and hexahedra have incompatible modes instead of a mean dilatation, except in axisymmetry.
     """
 
     density: Any
@@ -75,7 +74,7 @@ class Material:
         return float(np.min(free))
 
     def _all_compliances(self) -> Array:
-        """Return compliances (n, 6, 6) [1 / pressure] in the material's axes, those of all samples where constants vary."""
+        """Return compliances (n, 6, 6) [1 / pressure] in material axes, at all samples if constants vary."""
         if not self.graded:
             return self.local_compliance[None]
         return np.concatenate([self.compliances(self.constants_at(*sample)) for sample in self._cells().samples()])
@@ -102,15 +101,15 @@ class Material:
 
     @property
     def varies_inside(self) -> bool:
-        """Whether axes, moduli or expansion vary inside cells: by functions, or by numbers at points.
+        """Whether axes, moduli or expansion vary inside cells: as functions, or as numbers at points.
 
-        Cells with a mean dilatation have the constants of their middle.
+        Cells with a mean dilatation use the constants at their middle.
         """
         varying_constants = [v for name in (*MODULI, "expansion") for v in varying(getattr(self, name, None))]
         return (callable(self.axes) or any(v.inside for v in varying_constants)) and not self.averaged
 
     def bound(self: AnyMaterial, cells: Cells) -> AnyMaterial:
-        """Return the material that knows its cells, which constants that vary need; ModelError where these cannot be."""
+        """Return the material with its cells, for varying constants; ModelError where these are not admissible."""
         names = [name for name in (*CONSTANTS, "axes") if varying(getattr(self, name, None))]
         if not names:
             return self
@@ -129,7 +128,7 @@ class Material:
         return bound_material
 
     def constants_at(self, name: str, rows: Indices, N: Array) -> SimpleNamespace:
-        """Return the constants in cells of an element, those that vary as arrays (n_rows * n,) [unit of the constant].
+        """Return the constants in cells of an element, varying ones as arrays (n_rows * n,) [unit of the constant].
 
         `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] shape values of the points.
         """
@@ -144,18 +143,18 @@ class Material:
         raise NotImplementedError
 
     def admissible(self, constants: Any) -> Any:
-        """Return for which moduli of constants (n,) the material can be."""
+        """Return for which constants (n,) the material is admissible."""
         raise NotImplementedError
 
     def _cells(self) -> Cells:
-        """Return the cells that have the material; ModelError if they are not known."""
+        """Return the cells of the material; ModelError if they are not known."""
         varying_constants = [v for name in CONSTANTS for v in varying(getattr(self, name, None))]
         if not varying_constants or varying_constants[0].cells is None:
             raise ModelError("constants of the material depend on the position: ask the one in `materials` of a model")
         return varying_constants[0].cells
 
     def _check_at(self, names: Sequence[str], element: str, rows: Indices, N: Array) -> None:
-        """Raise ModelError, with the place, where the constants `names` are such that the material cannot be."""
+        """Raise ModelError, with the position, where the constants `names` are not admissible."""
         constants, count = self.constants_at(element, rows, N), len(rows) * len(N)
         wrong = np.array(np.broadcast_to(~np.asarray(self.admissible(constants), bool), count))
         if constants.density is not None:
@@ -244,7 +243,7 @@ class Material:
         return np.asarray(tensor[:, :dim, :dim])
 
     def _along_axes(self, given: Any, points: Array, kinematics: str, constants: Any) -> tuple[Array, Array]:
-        """Return numbers (n, 3) along the material's axes, one or three `given`, and the tensors (n, 3, 3) that they make."""
+        """Return values (n, 3) along the material's axes, from one or three `given`, and the tensors (n, 3, 3)."""
         along, axes = np.empty((len(points), 3)), self._frames(points, kinematics, constants)
         for axis in range(3):
             along[:, axis] = given[axis] if isinstance(given, tuple) else given
@@ -260,10 +259,10 @@ class Material:
         return frames(axes, points, kinematics)
 
     def _compliance6(self, points: Array, kinematics: str, constants: Any) -> Array:
-        """Return the compliance (n, 6, 6) in the mesh's axes; ModelError where kinematics of the plane do not hold."""
+        """Return the compliance (n, 6, 6) in the mesh's axes; ModelError where plane kinematics are not possible."""
         check_known("kinematics", kinematics, KINEMATICS, ModelError)
         of_stress = rotations(self._frames(points, kinematics, constants))
-        # Strains turn by the inverse of the transpose, which for stresses in another frame is the rotation back.
+        # Engineering strains transform by the inverse transpose of the matrix of stresses.
         back = np.linalg.inv(of_stress)
         local = self.local_compliance if constants is None or not self.graded else self.compliances(constants)
         compliance = np.asarray(back.transpose(0, 2, 1) @ local @ back)
@@ -279,7 +278,7 @@ class Material:
 
 
 def _real(value: Any) -> float:
-    """Return a real number, infinite where it is too large for one; NaN for what is none."""
+    """Return a real number, infinite if it is too large; NaN if it is not a number."""
     try:
         return float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
     except OverflowError:
@@ -296,7 +295,7 @@ def check_positive(name: str, value: Any, caption: str = "a positive number") ->
 
 
 def check_density(value: Any) -> None:
-    """Raise ModelError if a density is given and is no number from zero on; one that varies is checked with its cells."""
+    """Raise ModelError if a density is given and is not a number >= 0; a varying one is checked with its cells."""
     if not isinstance(value, Varying) and value is not None and not 0.0 <= _real(value) < math.inf:
         raise ModelError(f"the density = {value} must be a number, zero or more")
 
@@ -320,7 +319,7 @@ def check_conductivity(value: Any, most: int) -> None:
             check_positive("the conductivity", number)
 
 
-# A number, a function of the position, or numbers for each cell or point; type checkers take what is read for a number.
+# A number, a function of the position, or numbers for each cell or point; for type checkers, a number when read.
 if TYPE_CHECKING:
     Constant = Any
 else:

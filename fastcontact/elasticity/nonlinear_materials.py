@@ -1,8 +1,8 @@
 """Nonlinear material laws: von Mises plasticity (small strain) and hyperelasticity (finite strain).
 
 A law is a row of constants for `constitutive_kernels`: its number, the shear modulus, the bulk modulus of the volumetric
-part ``U(J) = K (J - 1)^2 / 2``, then its own. Loads, contact and checks see the isotropic elasticity of small strains that
-the law begins with.
+part ``U(J) = K (J - 1)^2 / 2``, then the constants of the law. Loads, contact and checks use its initial isotropic
+elasticity.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ STRAINS = ("small", "finite")
 
 
 class NonlinearElastic(LinearElastic):
-    """What laws beyond Hooke's have in common; as `LinearElastic` it is their elasticity at the beginning."""
+    """Base of nonlinear laws; as a `LinearElastic` it represents their initial elasticity."""
 
-    strain: str  # of the kinematics that the law is for
+    strain: str  # kinematics of the law
 
     def _begins_with(self, mu: float, bulk: float) -> None:
-        """Set E and nu of a shear modulus and a bulk modulus [pressure]."""
+        """Set E and nu from a shear modulus and a bulk modulus [pressure]."""
         object.__setattr__(self, "E", 9.0 * bulk * mu / (3.0 * bulk + mu))
         object.__setattr__(self, "nu", (3.0 * bulk - 2.0 * mu) / (2.0 * (3.0 * bulk + mu)))
         super().__post_init__()
 
     def _check_numbers(self) -> None:
-        """Raise ModelError where E or nu is not a number: constants of these laws do not vary."""
+        """Raise ModelError if E or nu is not a number: constants of these laws do not vary."""
         for name in ("E", "nu"):
             if not isinstance(getattr(self, name), (int, float)):
                 raise ModelError(f"{name} of {type(self).__name__} must be a number: its constants do not vary")
@@ -46,7 +46,7 @@ class NonlinearElastic(LinearElastic):
 
     @property
     def averaged(self) -> bool:  # type: ignore[override]
-        """Whether elements project the dilatation, where they can and kinematics are not plane stress."""
+        """Whether elements that support it project the dilatation, except in plane stress."""
         nearly = self.strain == "small" or self.nu >= NEARLY_INCOMPRESSIBLE
         return self.volumetric == "mean_dilatation" or (self.volumetric == "auto" and nearly)
 
@@ -148,9 +148,9 @@ class Hyperelastic(NonlinearElastic):
     strain = "finite"
 
     def _set(self, mu: float, how: str, constants: dict[str, Any]) -> None:
-        """Set the constants, those of the law and of `LinearElastic`.
+        """Set the constants of the law and of `LinearElastic`.
 
-        ModelError if the bulk modulus, or the shear modulus `mu` at the beginning, `how` it is found, is not positive.
+        Raises ModelError if the bulk modulus, or the initial shear modulus `mu`, with the formula `how`, is not positive.
         """
         for name, value in {**constants, "incompatible_modes": False}.items():
             object.__setattr__(self, name, value)
@@ -199,7 +199,7 @@ class Polynomial(Hyperelastic):
     _coefficients: tuple[float, float, float, float]
 
     def _take(self, coefficients: dict[str, float], constants: dict[str, Any]) -> None:
-        """Set the `coefficients` by name, those that are missing being zero, and the other constants."""
+        """Set the `coefficients` by name, missing ones to zero, and the other constants."""
         if not all(map(math.isfinite, coefficients.values())):
             raise ModelError(f"the constants of {type(self).__name__} must be finite numbers")
         C10, C01, C20, C30 = (float(coefficients.get(name, 0.0)) for name in ("C10", "C01", "C20", "C30"))

@@ -18,9 +18,9 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
 Materials = dict[str, Numbers]
-# Memory for stresses at points while nodal ones are formed [bytes].
+# Memory for stresses at points during the computation of nodal ones [bytes].
 BATCH = 16_000_000
-# Of so many cells one tells where the nodes of all lie.
+# Sampling interval of cells by which the distribution of nodes is estimated.
 SAMPLED = 16
 
 
@@ -104,7 +104,7 @@ class NodalAverage:
     def add(self, cells: Numbers, extrapolation: Array, values: Array) -> None:
         """Add the stresses of `cells` (n_cells, n_nodes), `values` (n_cells, n_q, n_components) [pressure] at points.
 
-        The matrix `extrapolation` (n_nodes, n_q) [-] leads from values at the points to values at the nodes.
+        The matrix `extrapolation` (n_nodes, n_q) [-] maps values at the points to values at the nodes.
         """
         given = parallel.read_only(cells), extrapolation, values
         into = self._total, self._count
@@ -112,14 +112,14 @@ class NodalAverage:
         parallel.shared(lambda part: element_2d_kernels.add_nodal(*given, *part, *into), self._parts(cells))
 
     def _parts(self, cells: Numbers) -> list[tuple[int, int]]:
-        """Return ranges of nodes that have about equally many of the cells: each thread adds at its own nodes."""
+        """Return ranges of nodes with about equal numbers of cells: each thread adds at its own nodes."""
         some = np.sort(cells[::SAMPLED, 0])
         count = len(parallel.portions(*cells.shape)) if len(some) else 1
         ends = [0, *(int(some[k * len(some) // count]) for k in range(1, count)), len(self._count)]
         return list(itertools.pairwise(ends))
 
     def result(self) -> Array:
-        """Return the average (n_points, n_components) [pressure], once; zero where there is no cell."""
+        """Return the average (n_points, n_components) [pressure], zero at points without cells; may be called once."""
         self._total /= np.maximum(self._count, 1.0)[:, None]
         return self._total
 

@@ -22,13 +22,13 @@ def take_out(indptr, indices, data, supported, supported_nodes, kept, low, high,
     Parameters
     ----------
     supported : ndarray of bool (n_rows, size), supported_nodes : ndarray of bool (n_rows,)
-        Which components have a support, and which nodes have one.
+        Components with a support, and nodes with one.
     kept : (n,)
-        What stays on the diagonal.
+        Values that remain on the diagonal.
     low, high : int
-        Block rows `low` to ``high - 1`` are looked at.
+        Block rows `low` to ``high - 1`` are processed.
     start : (n + 1,)
-        Where rows begin; unless the kernel `moves` numbers, it fills ``start[row + 1]`` with how many there are.
+        Row offsets; unless the kernel `moves` numbers, it fills ``start[row + 1]`` with the number of entries.
     columns, taken : (n_taken,)
         Filled if it `moves` numbers.
     moves : bool

@@ -87,7 +87,7 @@ class Cells:
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """Number of cells."""
         return sum(map(len, self.rows.values()))
 
     def samples(self) -> Iterator[tuple[str, Indices, Array]]:
@@ -112,9 +112,9 @@ class Varying:
     given : callable or ndarray
         A function from positions (n, dim) [length] to numbers (n,), or numbers for each cell or each point.
     cells : Cells, optional
-        Those that have the material, once they are known.
+        Cells with the material, once they are known.
     name : str
-        For messages.
+        Name for messages.
     """
 
     def __init__(self, given: Any, cells: Cells | None = None, name: str = "the constant") -> None:
@@ -140,7 +140,7 @@ class Varying:
         return f"{low:{spec}} to {high:{spec}}"
 
     def _place(self, given: Array, cells: Cells) -> None:
-        """Find out from its length what an array has a number for."""
+        """Determine from its length whether an array is by cell or by point."""
         mesh = cells.mesh
         total = sum(map(len, mesh.solids.values()))
         lengths = {"cells": cells.count, "solid cells of the mesh": total, "points of the mesh": mesh.n_points}
@@ -173,7 +173,7 @@ class Varying:
 
     @cached_property
     def range(self) -> tuple[float, float]:
-        """The smallest and the largest number in its cells."""
+        """The smallest and the largest value in its cells."""
         assert self.cells is not None
         samples = [self.at(*sample) for sample in self.cells.samples()]
         return float(min(values.min() for values in samples)), float(max(values.max() for values in samples))
@@ -196,11 +196,11 @@ class Varying:
 class CellAxes(Varying):
     """Axes (n_cells, 3, 3) of a material that differ from cell to cell, unit vectors in rows [-].
 
-    For each cell of the material, or of the mesh.
+    One for each cell of the material, or of the mesh.
     """
 
     def _place(self, given: Array, cells: Cells) -> None:
-        """Find out from its length whether an array has axes for the cells of the material or of the mesh."""
+        """Determine from its length whether an array has axes for the cells of the material or of the mesh."""
         total = sum(map(len, cells.mesh.solids.values()))
         if len(given) not in (cells.count, total):
             raise ModelError(
@@ -217,7 +217,7 @@ class CellAxes(Varying):
 
 
 def _by_cell(given: Array, cells: Cells) -> dict[str, Array]:
-    """Return by element the values (n_cells, ...) that are `given` for `cells` or for all solid cells; NaN elsewhere."""
+    """Return the values (n_cells, ...) `given` for `cells` or for all solid cells, by element; NaN elsewhere."""
     blocks, first = {}, 0
     for name, block in cells.mesh.solids.items():
         blocks[name] = np.full((len(block), *given.shape[1:]), np.nan)
@@ -228,15 +228,15 @@ def _by_cell(given: Array, cells: Cells) -> dict[str, Array]:
 
 
 def positions(mesh: Mesh, nodes: Numbers, N: Array) -> Array:
-    """Return places (n_cells * n, dim) [length] in cells with `nodes` (n_cells, n_nodes) of int, by shape values `N`.
+    """Return positions (n_cells * n, dim) [length] in cells with `nodes` (n_cells, n_nodes) of int.
 
-    `N` is (n, n_nodes) [-].
+    `N` (n, n_nodes) [-] are the shape values.
     """
     return np.einsum("qa,cad->cqd", N, mesh.points[nodes]).reshape(-1, mesh.dim)
 
 
 def wrapped(value: Any, vector: bool = False) -> Any:
-    """Return a constant as it is if it is a number, else as `Varying`; with `vector`, each of a sequence."""
+    """Return a number unchanged, and other constants as `Varying`; with `vector`, for each of a sequence."""
     if vector and isinstance(value, Sequence) and not isinstance(value, str):
         return tuple(wrapped(v) for v in value)
     if isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind in "fiu":
@@ -256,10 +256,10 @@ def wrapped(value: Any, vector: bool = False) -> Any:
 
 
 def mapped(value: Any, change: Callable[[Any], Any]) -> Any:
-    """Return a constant, or each of a tuple of them, after `change`."""
+    """Return `change` of a constant, or of each of a tuple."""
     return tuple(change(v) for v in value) if isinstance(value, tuple) else change(value)
 
 
 def varying(value: Any) -> list[Varying]:
-    """Return the constants that vary of a constant, or of a tuple of them."""
+    """Return the varying ones of a constant, or of a tuple of constants."""
     return [v for v in (value if isinstance(value, tuple) else (value,)) if isinstance(v, Varying)]

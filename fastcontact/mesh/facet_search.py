@@ -1,4 +1,4 @@
-"""Facets of solid cells, found by their nodes: those outside of bodies, and those between two cells."""
+"""Facets of solid cells with given nodes: outer facets of bodies, and facets between two cells."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from fastcontact.mesh import elements
 def facets_with_nodes(
     solids: Mapping[str, Numbers], chosen: Mask, between: bool, own: Mapping[str, Mask] | None = None
 ) -> dict[str, Numbers]:
-    """Return by facet element the facets (n_facets, n_nodes) of solid cells all of whose nodes are chosen.
+    """Return the facets (n_facets, n_nodes) of solid cells whose nodes are all chosen, by facet element.
 
-    Each once, as its first cell has it, which is outward for those of one cell.
+    Each facet appears once, with the orientation of its first cell, which is outward for facets of a single cell.
 
     Parameters
     ----------
@@ -23,9 +23,9 @@ def facets_with_nodes(
         Connectivity by element.
     chosen : ndarray of bool (n_points,)
     between : bool
-        Facets of two cells; otherwise those of one.
+        Whether to return facets between two cells; otherwise those of a single cell.
     own : mapping of str to ndarray of bool (n_cells,), optional
-        The cells that the facets must belong to, by default all.
+        Cells to which the facets must belong, by default all.
     """
     candidates: dict[str, list[Numbers]] = {}
     owned: dict[str, list[Mask]] = {}
@@ -50,10 +50,10 @@ def facets_with_nodes(
 
 
 def added(block: Numbers, facets: Numbers) -> tuple[Numbers, Indices]:
-    """Return a block of facets with those that it lacks at its end, and the rows where all of them are."""
+    """Return a block of facets extended by missing ones, and the rows of all `facets` in it."""
     both = np.concatenate([block, facets])
     _, first, facet = np.unique(np.sort(both, axis=1), axis=0, return_index=True, return_inverse=True)
-    row = first[facet.ravel()]  # the first of the same nodes
+    row = first[facet.ravel()]  # the first with equal nodes
     new = (row == np.arange(len(both))) & (np.arange(len(both)) >= len(block))
     place = np.where(np.arange(len(both)) < len(block), np.arange(len(both)), len(block) + np.cumsum(new) - 1)
     return np.concatenate([block, both[new]]), place[row[len(block) :]].astype(np.intp)

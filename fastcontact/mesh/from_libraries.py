@@ -1,4 +1,4 @@
-"""Meshes that other libraries hold in memory: gmsh, meshio, PyVista, each imported when it is asked for."""
+"""Meshes from other libraries in memory: gmsh, meshio, PyVista, each imported at first use."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from fastcontact.mesh.files.meshio_content import UNFIT, mesh_of
 from fastcontact.mesh.files.meshio_process import CELL_PREFIX, POINT_PREFIX, TAGS, plain_parts
 from fastcontact.mesh.mesh import Mesh
 
-# Groups in arrays of 0 and 1 of our own result files.
+# Prefix of groups as arrays of 0 and 1 in our result files.
 RESULT_PREFIX = "group_"
-# How gmsh writes the open model: in its newest format, what belongs to a physical group or, without any group, everything.
+# Options with which gmsh writes the open model: newest format, cells in physical groups or, without any groups, all cells.
 GMSH_OPTIONS = {"Mesh.MshFileVersion": 4.1, "Mesh.Binary": 1.0, "Mesh.SaveAll": 0.0, "Mesh.SaveParametric": 0.0}
 
 
@@ -53,7 +53,7 @@ def from_meshio(mesh: Any) -> Mesh:
     sets = [mesh.cell_data, mesh.cell_sets, getattr(mesh, "point_data", {}), getattr(mesh, "point_sets", {})]
     if is_masked([mesh.points, *(block.data for block in mesh.cells), *sets]):
         raise MeshError(f"meshio's mesh {REFUSAL}")
-    # Of Gmsh's tags meshio's readers keep the dimension of each name; their format repeats a cell for each of its groups.
+    # meshio's readers keep the dimension of Gmsh's tag names; the format repeats a cell for each of its groups.
     file_format = "gmsh" if any(key.startswith("gmsh:") for key in mesh.cell_data) else ""
     return _made(plain_parts(mesh), file_format, "meshio's mesh")
 
@@ -153,7 +153,7 @@ def from_gmsh() -> Mesh:
 
 
 def _tell_what_is_left_out(gmsh: Any, dim: int) -> None:
-    """Warn of solid cells without a physical group, which Gmsh does not write where there are groups."""
+    """Warn of solid cells without a physical group, which Gmsh does not write if there are any groups."""
     if not gmsh.model.getPhysicalGroups():
         return
     alone = [tag for _, tag in gmsh.model.getEntities(dim) if not len(gmsh.model.getPhysicalGroupsForEntity(dim, tag))]
@@ -167,7 +167,7 @@ def _tell_what_is_left_out(gmsh: Any, dim: int) -> None:
 
 
 def _flags(data: Any, prefix: str) -> dict[str, Any]:
-    """Return the arrays that mean groups, under the names that `mesh_of` knows."""
+    """Return the arrays that define groups, under the names expected by `mesh_of`."""
     groups = {}
     for name in data.keys():  # noqa: SIM118, PyVista's data are no mapping
         values = np.asarray(data[name])
@@ -181,7 +181,7 @@ def _flags(data: Any, prefix: str) -> dict[str, Any]:
 
 
 def _made(content: dict[str, Any], file_format: str, library: str) -> Mesh:
-    """Return the mesh of plain data, its cells turned where they are inside out."""
+    """Return the mesh of plain data, with inverted cells reoriented."""
     try:
         mesh, _ = mesh_of(content, file_format)
     except MeshError as error:

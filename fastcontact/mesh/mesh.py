@@ -1,4 +1,4 @@
-"""A mesh: points, cells by element, named groups. It never changes; operations return a new one."""
+"""Immutable meshes: points, cells by element, named groups."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def _read_only(values: ArrayLike, dtype: Any) -> AnyArray:
 
 
 def _numbers(name: str, values: ArrayLike) -> AnyArray:
-    """Return whole numbers as an array that loses nothing when it becomes one of 32 bits."""
+    """Return whole numbers as an array that can be converted to 32 bits."""
     array = np.asarray(values)
     if array.size == 0:
         return array.astype(np.int32)
@@ -40,7 +40,7 @@ def _numbers(name: str, values: ArrayLike) -> AnyArray:
 
 
 def starts_of(blocks: Mapping[str, Sized]) -> dict[str, int]:
-    """Return where each block begins in the sequence of all, by name."""
+    """Return the offset of each block in the sequence of all, by name."""
     return dict(zip(blocks, np.cumsum([0, *map(len, blocks.values())]).tolist(), strict=False))
 
 
@@ -294,7 +294,7 @@ class Mesh:
         return self.with_facets({name: facets})
 
     def _cells_inside(self, name: str, group: str) -> dict[str, Mask]:
-        """Return by element which solid cells (n_cells,) are in a group; MeshError that names facet group `name` if none."""
+        """Return which solid cells (n_cells,) are in a group, by element; MeshError, with facet group `name`, if none."""
         if not self.cells_of(group, dim=self.dim):
             raise MeshError(
                 f"facet group '{name}' is to be of '{group}', which holds no solid cells: name a body's group"

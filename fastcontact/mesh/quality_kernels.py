@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Jacobians of solid cells at the points of a quadrature, and their longest edges, by which bad cells are found."""
+"""Jacobians of solid cells at quadrature points, and their longest edges, for the detection of bad cells."""
 
 import numpy as np
 
@@ -37,7 +37,7 @@ def extremes(points, cells, dN, weights, edges, low, high, measure, longest):
     dN : (n_q, n_nodes, dim), weights : (n_q,)
         Shape derivatives at the points of a quadrature, and its weights.
     edges : (n_edges, 2)
-        Local nodes at the ends of the edges, which count as straight.
+        Local nodes at the ends of the edges, which are treated as straight.
     """
     n_q, n_nodes, dim = dN.shape
     slopes, x = transposed(dN), np.empty((dim, n_nodes))

@@ -72,7 +72,7 @@ def oriented(mesh: Mesh) -> tuple[Mesh, int]:
 
 
 def _check_folds(mesh: Mesh) -> None:
-    """Raise MeshError if two solid cells, all of them oriented, go round a common facet in the same direction."""
+    """Raise MeshError if two oriented solid cells have a common facet with the same orientation."""
     folds, owners = [], []
     for name, block in mesh.solids.items():
         element = elements.get(name)
@@ -93,7 +93,7 @@ def _check_folds(mesh: Mesh) -> None:
 
 
 def _direction(facets: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return three nodes (n, 3) by which facets and their orientation differ: the lowest, the next, the last."""
+    """Return three nodes (n, 3) that identify facets and their orientation: the lowest, the next, the last."""
     first = facets.argmin(axis=1)
     rows, count = np.arange(len(facets)), facets.shape[1]
     # The orientation of a line is the order of its two ends.
@@ -102,7 +102,7 @@ def _direction(facets: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def remembered(function: Callable[Concatenate[Mesh, Further], Found]) -> Callable[Concatenate[Mesh, Further], Found]:
-    """Return `function`, computed once for every mesh and further arguments: meshes do not change, and much needs it."""
+    """Decorate `function` to cache its result for each mesh and further arguments; meshes are immutable."""
     known: WeakKeyDictionary[Mesh, dict[tuple[object, ...], Found]] = WeakKeyDictionary()
 
     @wraps(function)
@@ -147,9 +147,9 @@ def outer_facets(mesh: Mesh) -> Mapping[str, Numbers]:
 
 @typed(MeshError)
 def cells_joined_by_facets(mesh: Mesh) -> Numbers:
-    """Return for each cell (n_cells,) of the mesh the lowest one that common facets join it to, from cell to cell.
+    """Return for each cell (n_cells,) of the mesh the lowest cell connected with it through common facets.
 
-    Cells that are no solids stand for themselves.
+    For cells that are not solids it is the cell itself.
     """
     return _facets(mesh)[1]
 

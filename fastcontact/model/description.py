@@ -1,4 +1,4 @@
-"""A model in words: what will be solved."""
+"""Textual description of a model."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ KINDS = {
 
 
 def sentences(model: Any) -> Iterator[str]:
-    """Yield what a `Model` is made of, a line each: kinematics and mesh, materials, supports, loads, contact, solution."""
+    """Yield lines that describe a `Model`: kinematics and mesh, materials, supports, loads, contact, solution."""
     mesh = model.mesh
     cells = " and ".join(f"{len(block)} {name}" for name, block in mesh.solids.items())
     article = "An" if model.kinematics == "axisymmetric" else "A"
@@ -45,7 +45,7 @@ def sentences(model: Any) -> Iterator[str]:
     for load in model.loads:
         yield f"Load: {load.name}: {_load(load)}{_history(load.ramp)}."
     for temperature in model.temperatures:
-        if temperature.place:  # a further instant of the one before
+        if temperature.place:  # another instant of the previous one
             continue
         value = "a number for each point" if isinstance(temperature.value, np.ndarray) else _value(temperature.value)
         where = temperature.name.removeprefix("the temperature of ")

@@ -31,8 +31,8 @@ from fastcontact.model.pretension import check_locks
 from fastcontact.model.ramp import PartHistory, Ramp, combined, multiplier
 from fastcontact.model.rigid_motions import free_motions, generalised, resisting, unstopped
 
-# What a user finds in a model beside `add_...`; the rest serves the analysis.
-# What acts in some load steps alone.
+# Public methods and attributes of a model other than `add_...`; the rest is for the analysis.
+# Items that may act in some load steps only.
 TEMPORARY = (TemporaryConstraint, TemporaryHeat)
 PUBLIC = (
     "check", "contact", "couple", "describe", "fix", "fix_temperature", "internal_forces", "kinematics", "loads", "materials",
@@ -182,14 +182,14 @@ class Model(ModelSupports):
                 raise _in_steps_after(begin, error) from None
 
     def _acting(self, begin: float) -> Model:
-        """Return the model with what acts in the load step that begins at an instant."""
+        """Return the model with the items that act in the load step that begins at an instant."""
         acting = copy.copy(self)
         acting.relations = [r for r in self.relations if not isinstance(r, TemporaryConstraint) or r.acts_from(begin)]
         acting.heat_loads = [r for r in self.heat_loads if not isinstance(r, TemporaryHeat) or r.acts_from(begin)]
         return acting
 
     def _changes(self) -> list[float]:
-        """Return the instants at which temporary relations, temperatures or films begin or end, and 0."""
+        """Return the instants at which temporary constraints, temperatures or films begin or end, and 0."""
         temporary = [own for own in (*self.relations, *self.heat_loads) if isinstance(own, TEMPORARY)]
         return sorted({0.0, *(t for own in temporary for t in (own.begins, own.ends) if 0.0 < t < np.inf)})
 
@@ -203,7 +203,7 @@ class Model(ModelSupports):
             motion.lift(lift.ravel(), motion.values([multiplier(r.ramp, ramp, instant) for r in relations]))
 
     def _check_motions(self, fixed: Mask, forces: Sequence[Array]) -> None:
-        """Refuse motions without deformation that no supports, relations, springs or loads against a contact stop."""
+        """Refuse rigid-body motions that no supports, constraints, springs or loads against a contact prevent."""
         driven = self.force_driven
         motions = driven.motions(free_motions(self.mesh, self.kinematics, fixed, self.holding_rows()))
         if not len(motions):

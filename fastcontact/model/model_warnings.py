@@ -1,6 +1,6 @@
-"""Warnings about a model before it is solved, each with its number: units, poor cells, integrals that are not exact.
+"""Warnings about a model before it is solved, each with its number: units, poor cells, inexact integrals.
 
-They are sentences for the screen and the result file. The model may be right all the same, so they do not stop an analysis.
+They are sentences for the screen and the result file. The model may still be correct, so they do not stop an analysis.
 """
 
 from __future__ import annotations
@@ -31,28 +31,28 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 if TYPE_CHECKING:
     from fastcontact.model.model import Model
 
-# Young's moduli that differ by more: steel against soft rubber is 200 000, MPa against Pa a million.
+# Largest plausible ratio of Young's moduli: steel to soft rubber is 200 000, MPa to Pa a million.
 MODULI = 3e5
-# A prescribed displacement beyond this multiple of the size of the model, and strains by the loads above and below these
-# bounds, are probably mistakes.
+# A prescribed displacement beyond this multiple of the size of the model, and strains by the loads outside these bounds, are
+# probably mistakes.
 DISPLACED, STRAINED, UNSTRAINED = 1.0, 1.0, 1e-12
-# Solids: aerogel to diamond [Pa]. Only here units of the user matter, and only where a case names them.
+# Young's moduli of solids, from aerogel to diamond [Pa]. Only here the user's units matter, and only if they are named.
 SOLIDS = (1e2, 2e12)
-# Number of cells by which integrals are judged.
+# Number of cells by which integrals are assessed.
 SOME = 1000
-# Relative error of the integral of a load, and of the stiffness (1.6 % on regular pyramids), above which there is a warning.
+# Relative error of the integral of a load, and of the stiffness (1.6 % on regular pyramids), above which a warning is given.
 INTEGRAL, STIFFNESS = 1e-3, 5e-2
-# Nodes nearer to each other than this part of the edges there, and than single precision, are meant to be one.
+# Nodes nearer to each other than this fraction of the edges there, and than single precision, are probably meant to coincide.
 NEAR = 1e-2
-# A direction, no longer than 1, in which nodes of no regular mesh are at one height.
+# A direction, no longer than 1, along which no regular mesh has nodes of equal height.
 NO_AXIS = np.array([0.46, 0.5718, 0.6789])
-# Rubber on rough ground has a coefficient of friction of 1 to 2.
+# Largest plausible coefficient of friction: rubber on rough ground has 1 to 2.
 RUBBING = 3.0
 
 
 @on_one_blas_thread
 def model_warnings(model: Model, ramp: Ramp) -> list[str]:
-    """Return the warnings about a model that `Model.check` has found complete, for an analysis along a ramp."""
+    """Return the warnings about a model accepted by `Model.check`, for an analysis along a ramp."""
     supports = Supports(*model.prescribed_by_ramp(), ramp)
     pairs, pushed = [(pair, model.bind(pair)) for pair in model.contact], _pushed(supports)
     warnings = _moduli(model) + _named_units(model) + _proportions(model, pushed)
@@ -65,13 +65,13 @@ def model_warnings(model: Model, ramp: Ramp) -> list[str]:
 
 
 def _prescribed_overlaps(pairs: Pairs, supports: Supports) -> list[str]:
-    """Return a warning for each contact with nodes that supports alone bring into its other side."""
+    """Return a warning for each contact with nodes whose prescribed displacements cause penetration."""
     supported = [(pair, bound) for pair, bound in pairs if supports.fixed[bound.secondary.points].any()]
     return prescribed_overlap_warnings(supported, supports)
 
 
 def _split_sides(model: Model, pairs: Pairs) -> list[str]:
-    """Return a warning for each two contacts that go on in each other."""
+    """Return a warning for each two contacts that continue each other."""
     touched = {
         pair.name: np.union1d(*(model.mesh.points_of(side) for side in (pair.secondary, pair.primary)))
         for pair in model.contact
@@ -85,7 +85,7 @@ def _split_sides(model: Model, pairs: Pairs) -> list[str]:
 
 
 def _lost_loads(model: Model) -> list[str]:
-    """Return a warning for each load all of which acts on what supports prescribe."""
+    """Return a warning for each load that only acts on prescribed components."""
     fixed, _ = model.prescribed()
     texts = []
     for load in model.loads:
@@ -112,7 +112,7 @@ def _moduli(model: Model) -> list[str]:
 
 
 def _named_units(model: Model) -> list[str]:
-    """Compare moduli with those of solids, and the units with each other, where their names are known."""
+    """Compare moduli with those of solids, and the units with each other, if these are known."""
     units = model.units
     pascal, texts = in_si(units, "pressure"), [text for text in [misfit(units)] if text]
     if pascal is None:
@@ -151,18 +151,18 @@ def _proportions(model: Model, moved: float) -> list[str]:
 
 
 def _pushed(supports: Supports) -> float:
-    """Return the largest prescribed displacement, by its history or as it is given without one [length]."""
-    straight = {ramp: at for ramp, at in supports.by_ramp.items() if not isinstance(ramp, Harmonic)}  # not what turns
+    """Return the largest prescribed displacement over its history [length]."""
+    straight = {ramp: at for ramp, at in supports.by_ramp.items() if not isinstance(ramp, Harmonic)}  # no rotations
     return max((_peak(ramp) * float(np.abs(values).max(initial=0.0)) for ramp, values in straight.items()), default=0.0)
 
 
 def _peak(ramp: Table | None) -> float:
-    """Return the largest multiplier of a history by size [-]."""
+    """Return the largest multiplier of a history by magnitude [-]."""
     return 1.0 if ramp is None else max(abs(value) for _, value in ramp)
 
 
 def _coincident(model: Model) -> list[str]:
-    """Return a warning if nodes of solid cells are nearly at one place, and neither contact nor relations join them."""
+    """Return a warning if nodes of solid cells nearly coincide without a contact or constraint between them."""
     mesh, size = model.mesh, float(np.ptp(model.mesh.points, axis=0).max())
     edge = np.full(mesh.n_points, np.inf)  # the shortest one at each node on the outside of a body, where cracks lie
     for name, facets in outer_facets(mesh).items():
@@ -176,7 +176,7 @@ def _coincident(model: Model) -> list[str]:
     lone[model.holding_rows().indices // mesh.dim] = False
     numbers, within = np.flatnonzero(lone), SINGLE_PRECISION * size
     along = np.sort(mesh.points[numbers] @ NO_AXIS[: mesh.dim])
-    if not (np.diff(along) <= within).any():  # no two nodes can be near; a tree takes a tenth of a second to import
+    if not (np.diff(along) <= within).any():  # no two nodes can be near; importing a tree takes a tenth of a second
         return []
     from scipy.spatial import cKDTree
 
@@ -185,7 +185,7 @@ def _coincident(model: Model) -> list[str]:
     near = apart < NEAR * edge[pairs].min(axis=1)
     pairs, apart = pairs[near], apart[near]
     count = len(np.unique(pairs[:, 1]))
-    if count < mesh.dim:  # bodies that touch at a corner only
+    if count < mesh.dim:  # bodies that touch only at a corner
         return []
     first = pairs[np.lexsort(mesh.points[pairs[:, 0]].T)[0]]
     point = ", ".join(f"{x:.6g}" for x in mesh.points[first[0]])
@@ -198,7 +198,7 @@ def _coincident(model: Model) -> list[str]:
 
 
 def _wetted_twice(model: Model) -> list[str]:
-    """Return a warning for two pairs with a fluid each that have secondary facets in common."""
+    """Return a warning for two pairs with fluids that have common secondary facets."""
     groups, wet = model.mesh.cell_groups, [pair for pair in model.contact if pair.fluid is not None]
     shared = {
         (one.name, other.name): len(np.intersect1d(groups.get(one.secondary, []), groups.get(other.secondary, [])))
@@ -213,7 +213,7 @@ def _wetted_twice(model: Model) -> list[str]:
 
 
 def _friction(model: Model) -> list[str]:
-    """Return a warning for each coefficient of friction that no surfaces have."""
+    """Return a warning for each implausible coefficient of friction."""
     return [
         f"the friction of contact '{pair.name}' is {friction:g}, more than the {RUBBING:g} that surfaces have at most: is it "
         "in percent? Where nothing is to slide, take kind='tied'"
@@ -223,7 +223,7 @@ def _friction(model: Model) -> list[str]:
 
 
 def _penetrating(model: Model, pairs: Pairs, pushed: float) -> list[str]:
-    """Return a warning for each contact whose sides penetrate by more than supports push before they do."""
+    """Return a warning for each contact whose initial penetration exceeds the prescribed displacements."""
     texts = []
     for pair, bound in pairs if pushed else ():
         gap = initial_gaps(bound)
@@ -239,7 +239,7 @@ def _penetrating(model: Model, pairs: Pairs, pushed: float) -> list[str]:
 
 
 def _unramped(model: Model, ramp: Ramp) -> list[str]:
-    """Return a warning if some loads have histories of their own, and others grow on beyond their values with the ramp."""
+    """Return a warning if some loads have their own histories, and others exceed their given values with the ramp."""
     top = max(ramp.value(instant) for instant in ramp.instants)
     if top <= 1.0 or len(ramp.table) > 2:
         return []
@@ -261,9 +261,9 @@ def _unramped(model: Model, ramp: Ramp) -> list[str]:
 
 @remembered
 def _stiffness(mesh: Mesh) -> list[str]:
-    """Return a warning if the quadrature of the stiffness is inexact, on cells that are curved or distorted.
+    """Return a warning if the quadrature of the stiffness is inexact on curved or distorted cells.
 
-    Judged by the trace of the stiffness of a scalar field, the integral of all squared gradients of shape functions.
+    The measure is the trace of the stiffness of a scalar field, the integral of all squared gradients of shape functions.
     """
     off = total = 0.0
     for name, block in mesh.solids.items():
@@ -288,7 +288,7 @@ def _traces(corners: Array, element: Element, xi: Array, weights: Array) -> Arra
 
 
 def _some(cells: AnyArray) -> AnyArray:
-    """Return about `SOME` of the cells, or all if they are fewer."""
+    """Return a sample of about `SOME` cells, or all if there are fewer."""
     return cells[:: max(1, len(cells) // SOME)]
 
 
@@ -317,7 +317,7 @@ def _loaded(model: Model, load: Load) -> Iterator[tuple[str, Numbers]]:
 
 
 def _integrals(mesh: Mesh, element: str, cells: Numbers, value: Value, name: str, finer: bool) -> Array:
-    """Return the integral (n_cells,) of a load over each cell, by about the rule of loads or by a finer one."""
+    """Return the integral (n_cells,) of a load over each cell, with about the rule of loads or a finer one."""
     reference = elements.get(element)
     xi, weights = quadrature.product_rule(reference.linear, 9 if finer else 5)
     J = np.einsum("qnk,cnd->cqdk", reference.gradient(xi), mesh.points[cells])

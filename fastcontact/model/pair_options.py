@@ -1,4 +1,4 @@
-"""The options of a contact pair that do not depend on its formulation, from what a user wrote to what surfaces need."""
+"""Conversion and checks of the user's options of a contact pair that do not depend on its formulation."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from fastcontact.model.ramp import Table, table_of
 def pair_options(
     name: str, options: Mapping[str, Any], mesh: Mesh, side: Surface, *, against_obstacle: bool
 ) -> PairOptions:
-    """Return the options of contact pair `name` with the secondary `side`, as formulations need them.
+    """Return the options of contact pair `name` with the secondary `side`, converted for formulations.
 
-    ContactError or ModelError if an option is wrong; the message names the pair.
+    Raises ContactError or ModelError if an option is wrong; the message names the pair.
     """
     if against_obstacle and "clearance_primary" in options:
         raise ContactError(
@@ -55,7 +55,7 @@ def pair_options(
     )
 
 
-# Of a cohesive layer and of adhesion: the numbers that must be given, and those that may be.
+# Required and optional numbers of a cohesive layer and of adhesion.
 LAWS = {
     "cohesion": (
         ("strength", "energy"),
@@ -67,7 +67,7 @@ CHOICES = {"initiation": ("bk", "quadratic", "maximum"), "mixed_mode": ("bk", "p
 
 
 def _cohesion(name: str, options: Mapping[str, Any]) -> CohesiveLaw | None:
-    """Return the law of what holds the sides together, None where nothing does."""
+    """Return the cohesive law of a pair, None without one."""
     chosen = [option for option in LAWS if option in options]
     if not chosen:
         return None
@@ -106,7 +106,7 @@ def _cohesion(name: str, options: Mapping[str, Any]) -> CohesiveLaw | None:
 
 
 def _kind(name: str, options: Mapping[str, Any], against_obstacle: bool) -> str:
-    """Return the kind of contact, which other options must not contradict."""
+    """Return the kind of contact, after checks for contradicting options."""
     kind = options.get("kind", "unilateral")
     check_known(f"kind of contact '{name}'", kind, KINDS, ContactError)
     if kind != "unilateral" and options.get("friction"):
@@ -130,7 +130,7 @@ def _kind(name: str, options: Mapping[str, Any], against_obstacle: bool) -> str:
 
 
 def _positive(name: str, option: str, options: Mapping[str, Any], without: str) -> float | None:
-    """Return the number of an option that must be positive, None where it is not given; `without` says what that means."""
+    """Return the positive number of an option, None if not given; `without` is the effect of leaving it out."""
     value = options.get(option)
     if value is None:
         return None
@@ -141,7 +141,7 @@ def _positive(name: str, option: str, options: Mapping[str, Any], without: str) 
 
 
 def _check_obstacle_temperature(name: str, options: Mapping[str, Any], against_obstacle: bool) -> None:
-    """Refuse heat that crosses to an obstacle of unknown temperature, and a temperature of what is none."""
+    """Refuse heat flow to an obstacle of unknown temperature, and a temperature without an obstacle."""
     temperature = options.get("obstacle_temperature")
     if temperature is None:
         if against_obstacle and {"conductance", "friction_heat"} & set(options):
@@ -157,7 +157,7 @@ def _check_obstacle_temperature(name: str, options: Mapping[str, Any], against_o
 
 
 def _friction_heat(name: str, options: Mapping[str, Any]) -> float:
-    """Return what part of the work of friction becomes heat; zero where it is not given."""
+    """Return the fraction of the frictional work that becomes heat; zero if not given."""
     fraction = options.get("friction_heat", 0.0)
     check_number(f"the friction_heat of contact '{name}'", fraction)
     if not 0.0 <= fraction <= 1.0:
@@ -170,7 +170,7 @@ def _friction_heat(name: str, options: Mapping[str, Any]) -> float:
 
 
 def _vector(name: str, option: str, options: Mapping[str, Any], dim: int) -> Array | None:
-    """Return the vector (dim,) that an option gives, None where it is not given."""
+    """Return the vector (dim,) of an option, None if not given."""
     value = options.get(option)
     if value is None:
         return None
@@ -198,7 +198,7 @@ def _penalty(name: str, options: Mapping[str, Any]) -> float | OverclosureLaw | 
 
 
 def _tangential_penalty(name: str, value: Any) -> Field | None:
-    """Return a number or a function of position as a function; None for none."""
+    """Return a number or a function of position as a function; pass None through."""
     penalty = _function(f"the tangential_penalty of contact '{name}'", value)
     return None if penalty is None else partial(_all_positive, penalty, name)
 
@@ -214,7 +214,7 @@ def _all_positive(penalty: Field, name: str, positions: Array) -> Array:
 
 
 def _check_friction_ramp(name: str, options: Mapping[str, Any]) -> None:
-    """Refuse a history of the coefficient of friction without one, and negative multipliers."""
+    """Refuse a history of friction without a coefficient of friction, and negative multipliers."""
     table = friction_ramp(name, options)
     if table is not None and not options.get("friction"):
         raise ContactError(f"contact '{name}' has a friction_ramp, but no friction that it could multiply")
@@ -225,17 +225,17 @@ def _check_friction_ramp(name: str, options: Mapping[str, Any]) -> None:
 
 
 def friction_ramp(name: str, options: Mapping[str, Any]) -> Table | None:
-    """Return the history of the coefficient of friction of contact pair `name`, None where it does not change."""
+    """Return the history of the coefficient of friction of contact pair `name`, None if it is constant."""
     return table_of(options.get("friction_ramp"), f"the friction_ramp of contact '{name}'")
 
 
 def clearance_ramp(name: str, options: Mapping[str, Any]) -> Table | None:
-    """Return the history of the clearance of contact pair `name`, None where it does not change."""
+    """Return the history of the clearance of contact pair `name`, None if it is constant."""
     return table_of(options.get("clearance_ramp"), f"the clearance_ramp of contact '{name}'")
 
 
 def _nodes(name: str, option: str, options: Mapping[str, Any], mesh: Mesh, side: Surface) -> Mask | None:
-    """Return a mask (n_points,) of the nodes of the groups that an option names; None for no groups."""
+    """Return a mask (n_points,) of the nodes of the groups named by an option; None without groups."""
     groups = options.get(option)
     if groups is None:
         return None

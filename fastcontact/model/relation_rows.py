@@ -36,7 +36,7 @@ def normals_of(mesh: Mesh, group: str) -> tuple[Indices, Array]:
 
 
 def directions_of(mesh: Mesh, group: str, component: str) -> list[tuple[Indices, Array]]:
-    """Return the nodes (m,) of a group, and unit vectors (m, dim), for each of the components that a name stands for.
+    """Return the nodes (m,) of a group, and unit vectors (m, dim), for each of the components in a name.
 
     The name is ``"normal"``, or some of the letters x, y, z.
     """
@@ -52,21 +52,21 @@ def along(nodes: Indices, directions: Array, n_dofs: int) -> csr_array:
 
 
 def less_first(rows: csr_array) -> csr_array:
-    """Return all rows (m, n) but the first one, less the first one."""
+    """Return the differences of all rows (m, n) except the first and the first one."""
     return csr_array(rows[1:] - csr_array(vstack([rows[[0]]] * (rows.shape[0] - 1), format="csr")))
 
 
 def matched(
     mesh: Mesh, first: tuple[str, Indices], second: tuple[str, Indices], translation: Sequence[float] | None
 ) -> Indices:
-    """Return, for each node of the first group, the place among the nodes of the second where it lies after `translation`.
+    """Return, for each node of the first group, the index of the coincident node of the second after `translation`.
 
-    Without one, groups are moved middle upon middle.
+    By default the centroid of the first group is moved to that of the second.
 
     Raises
     ------
     ModelError
-        If the groups have other numbers of nodes, or do not lie upon each other.
+        If the groups have different numbers of nodes, or do not coincide.
     """
     from scipy.spatial import cKDTree
 

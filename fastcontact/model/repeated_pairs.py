@@ -20,9 +20,9 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 
 def check_repeated(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
-    """Raise ContactError if two pairs join the same facets, in whichever roles, or press them on the same obstacle.
+    """Raise ContactError if two pairs have the same facets, in any roles, or press them on the same obstacle.
 
-    One side may meet several others: each pair then has an opposite side of its own.
+    One side may face several others: each pair then has a different opposite side.
     """
     if pair.obstacle is not None or other.obstacle is not None:
         _check_obstacles(mesh, pair, other)
@@ -49,7 +49,7 @@ def _check_sides(mesh: Mesh, pair: ContactPair, other: ContactPair, ours: str, t
 
 
 def joined_already(mesh: Mesh, sides: tuple[str, str], other: ContactPair) -> bool:
-    """Return whether a contact with another body joins facets of two groups, in whichever roles."""
+    """Return whether a contact with another body has facets of both groups, in any roles."""
     if other.obstacle is not None:
         return False
     roles = (other.secondary, other.primary), (other.primary, other.secondary)
@@ -80,11 +80,11 @@ def _moved(pair: ContactPair) -> tuple[Any, ...]:
 
 
 def split_side_warnings(pairs: Sequence[tuple[ContactPair, Formulation]]) -> list[str]:
-    """Return a warning for each two pairs whose sides go on in each other at common nodes, on both bodies.
+    """Return a warning for each two pairs whose sides continue each other at common nodes, on both bodies.
 
-    Each pair has a pressure of its own at such a node, and only the sum of both follows from the gap: it is spread over
-    the neighbours in a way that means nothing. Node-to-segment shares the force of a node by areas, which is right where
-    both pairs have the same primary side; where that is cut, too, each pair faces a part of it alone.
+    Each pair has its own pressure at such a node, but only the sum of both follows from the gap: its division, also over the
+    neighbours, is arbitrary. Node-to-segment contact divides the force of a node by areas, which is correct if both
+    pairs have the same primary side; if that is divided, too, each pair faces a part of it only.
     """
     texts = []
     for (one, ours), (other, theirs) in combinations(pairs, 2):
@@ -114,6 +114,6 @@ def _common(points: Array, side: Surface, other: Surface) -> Numbers:
 
 
 def _places(side: Surface, nodes: Numbers) -> Indices:
-    """Return the places of nodes among the points of a side."""
+    """Return the positions of nodes among the points of a side."""
     order = np.argsort(side.points)
     return np.asarray(order[np.searchsorted(side.points, nodes, sorter=order)])

@@ -14,7 +14,7 @@ from fastcontact.mesh.files.file_fields import read_file_field
 from fastcontact.mesh.files.mesh_fields import at_points_of
 from fastcontact.mesh.mesh import Mesh
 
-# How far a time of a file may lie from the one that is wanted, relative to the latest.
+# Tolerance of the times of a file, relative to the latest.
 SAME_TIME = 1e-9
 
 

@@ -1,4 +1,4 @@
-"""Units of a model by name: how a text tells them, and whether they fit each other."""
+"""Named units of a model: parsing, and consistency checks."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from fastcontact.errors import ModelError, check_known
 
-# What units that are known by name measure, in SI.
+# Known units in SI.
 KNOWN: dict[str, dict[str, float]] = {
     "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254},
     "force": {"N": 1.0, "kN": 1e3, "MN": 1e6, "mN": 1e-3, "lbf": 4.448222},
@@ -19,7 +19,7 @@ EXAMPLE = "units of length, force and pressure in this order, such as 'mm, N, MP
 
 
 def named_units(given: str | Mapping[str, str]) -> dict[str, str]:
-    """Return the names of units by what they measure, given as a text in the order of `KNOWN` or already by that.
+    """Return the names of units by quantity, given as a text in the order of `KNOWN` or as a mapping.
 
     Raises ModelError for anything else, and for a unit in the place of another kind.
 
@@ -42,12 +42,12 @@ def named_units(given: str | Mapping[str, str]) -> dict[str, str]:
 
 
 def in_si(units: Mapping[str, str], kind: str) -> float | None:
-    """Return what the unit of a kind measures in SI; None where it has no name, or one that is not known."""
+    """Return the unit of a quantity in SI; None if it has no name, or an unknown one."""
     return KNOWN[kind].get(units.get(kind, ""))
 
 
 def misfit(units: Mapping[str, str]) -> str:
-    """Return in words that force / length^2 is not the unit of pressure; empty where it is, or a unit is not known."""
+    """Return a message if force / length^2 is not the unit of pressure; empty if it is, or a unit is unknown."""
     metre, newton, pascal = (in_si(units, kind) for kind in KNOWN)
     if metre is None or newton is None or pascal is None or 0.99 < (ratio := newton / metre**2 / pascal) < 1.01:
         return ""

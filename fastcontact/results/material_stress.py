@@ -39,7 +39,7 @@ class MaterialStress:
 def by_largest_von_mises(
     sides: MaterialSides, cells: Numbers, at_places: Array, n_points: int
 ) -> tuple[Array, MaterialStress | None]:
-    """Return the nodal stress (n_points, n_components), and that of each side where materials meet [pressure].
+    """Return the nodal stress (n_points, n_components), and that of each side of material interfaces [pressure].
 
     Parameters
     ----------
@@ -47,10 +47,10 @@ def by_largest_von_mises(
     cells : ndarray of int (n_solids,)
         Material of every solid cell.
     at_places : ndarray (n_places, n_components)
-        Stress at the places of `sides` [pressure].
+        Stress at the slots of `sides` [pressure].
     n_points : int
 
-    Where materials meet, the nodal stress is that of the side with the largest von Mises stress.
+    At interfaces the nodal stress is that of the side with the largest von Mises stress.
     """
     stress = at_places[:n_points].copy() if len(sides.points) else at_places
     if not len(sides.points):

@@ -15,7 +15,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.layout import contact_pressure
 from fastcontact.results.step import StepResult
 
-# Where each component stands in ours, xx yy zz xy yz xz: Salome and code_aster have xz before yz.
+# Position of each component in our order, xx yy zz xy yz xz: Salome and code_aster have xz before yz.
 STRESSES = {"SIXX": 0, "SIYY": 1, "SIZZ": 2, "SIXY": 3, "SIXZ": 5, "SIYZ": 4}
 
 

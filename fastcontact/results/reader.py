@@ -1,4 +1,4 @@
-"""Read a result file back: nothing but the file is needed, neither the model nor the mesh file."""
+"""Reader of result files, which need neither the model nor the mesh file."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from fastcontact.results.units import units_of_results
 if TYPE_CHECKING:
     import pandas
 
-# Resultants of contact that are None where files have NaN.
+# Contact resultants that are None for NaN in files.
 OR_NONE = ("obstacle_displacement", "obstacle_angle", "torque", "tangent")
 
 
@@ -97,7 +97,7 @@ class Results(Sequence[StepResult]):
     """
 
     def __init__(self, path: PathLike, *, repeat: bool | None = None) -> None:
-        """`repeat`: whether to see writes that a power loss has kept from being done; not while a writer does them."""
+        """Open the file; `repeat` applies journalled writes after a power loss, which is not allowed beside a writer."""
         import h5py
 
         self.path: Path = existing_file(path)
@@ -105,7 +105,7 @@ class Results(Sequence[StepResult]):
             raise FileError(f"'{path}' may not be read: ask its owner for the permission")
         if not h5py.is_hdf5(self.path):
             raise FileError(f"'{path}' is no HDF5 file: name a result file that fastcontact wrote (.vtkhdf)")
-        # A file object of our own: by its name HDF5 would return a file that this process has open, as it was then.
+        # A separate file object: by name HDF5 would return a file already open in this process, in its former state.
         self._raw: Any = open(path, "rb")  # noqa: SIM115
         self._file: Any = None
         try:
@@ -120,7 +120,7 @@ class Results(Sequence[StepResult]):
             raise
 
     def _checked(self) -> Any:
-        """Return our group in the file, if it is one of ours and of a known schema."""
+        """Return the group of fastcontact in the file, after a check of its schema."""
         if self._file.userblock_size or self._file.id.get_create_plist().get_sizes() != (8, 8):
             raise ValueError("its addresses are not ours")
         check_contents(self._file, self.path)
@@ -159,7 +159,7 @@ class Results(Sequence[StepResult]):
         self.warnings: tuple[str, ...] = tuple(dict.fromkeys([*(run or {}).get("warnings", ()), *of_steps]))
 
     def _run_record(self, group: Any) -> dict[str, Any] | None:
-        """Return how the run ended; None while it goes on, after a crash, and when steps have been added since."""
+        """Return the record of the end of the run; None during the run, after a crash, and if steps were added since."""
         if "runs" not in group:  # schema 1
             return _read_json(group["run"], self._raw) if "run" in group else None
         rows = group["runs"][-1:]
@@ -211,7 +211,7 @@ class Results(Sequence[StepResult]):
         return f"Results('{self.path}': {self._n_steps} steps, {state}, {self.kinematics}, {self.mesh!r})"
 
     def _repr_html_(self) -> str:
-        """Return a table of what the file holds, and the last step, for notebooks."""
+        """Return a table of the contents, and the last step, for notebooks."""
         reached = f"{self._n_steps}, to load factor {self.load_factors[-1]:.6g}" if self._n_steps else "none yet"
         rows = [
             ("steps", reached),
@@ -282,7 +282,7 @@ class Results(Sequence[StepResult]):
         return conversions.dataset(self.mesh, self, self.units)
 
     def _units_of_case(self) -> dict[str, str]:
-        """Return the names of units that the case text gives: where files of earlier versions have them."""
+        """Return the names of units in the case text, for files of earlier versions."""
         try:
             named = toml_text.parsed(self.case_text or "").get("units", {})
         except ValueError:
@@ -320,7 +320,7 @@ class Results(Sequence[StepResult]):
             )
 
     def _restart(self, number: int) -> dict[str, Any] | None:
-        """Return the restart data of the last step; None where there are none, or steps were written since we opened."""
+        """Return the restart data of the last step; None without any, or if steps were written since the file was opened."""
         group, name = self._file["fastcontact"], layout.restart_table(number)
         try:
             kept = unpacked(group[name][()]) if name in group else {}
@@ -329,7 +329,7 @@ class Results(Sequence[StepResult]):
         return kept["restart"] if kept.get("step") == number else None
 
     def _material_stress(self, number: int) -> MaterialStress | None:
-        """Return the stress of each side where materials meet; None for a step or file without."""
+        """Return the stress of each side of material interfaces; None for a step or file without."""
         group = self._file["fastcontact"]
         if "materials" not in group:
             return None
@@ -384,12 +384,12 @@ class Results(Sequence[StepResult]):
 
     @contextlib.contextmanager
     def _explained(self) -> Iterator[None]:
-        """Turn whatever HDF5 and our own reading raise on a broken file into one sentence."""
+        """Convert errors of HDF5 and of reading a damaged file to one message."""
         try:
             yield
         except (FileError, Warning):
             raise
-        except Exception as error:  # what HDF5, and numbers that make no sense, can raise has no end
+        except Exception as error:  # HDF5 and invalid numbers may raise errors of any kind
             lines = str(error).splitlines()
             reason = lines[0][:200] if lines else type(error).__name__
             raise FileError(
@@ -425,7 +425,7 @@ def _read_groups(group: Any, raw: Any) -> dict[str, Numbers]:
 
 
 def _rows(table: Any, step: Any, prefix: str, name: str) -> Any:
-    """Return the rows of a table that a row of steps counts by ``first`` and ``count``; ValueError if some are missing."""
+    """Return the rows of a table given by ``first`` and ``count`` of a step; ValueError if some are missing."""
     first, count = int(step[f"{prefix}first"]), int(step[f"{prefix}count"])
     rows = table[first : first + count]
     if len(rows) != count or first < 0:
@@ -439,7 +439,7 @@ def _read_contact(pair: Any, number: int, name: str, formulation: str) -> Contac
     columns: dict[str, Any] = {column: np.ascontiguousarray(rows[column]) for column in rows.dtype.names}
     for mask in {"active", "sticking"} & set(columns):
         columns[mask] = columns[mask].astype(bool)
-    # Earlier files have fewer of these, and no forces on the primary side: defaults of a ContactResult stand for them.
+    # Earlier files lack some of these, and forces on the primary side: the defaults of ContactResult replace them.
     resultants: dict[str, Any] = {}
     for column in set(step.dtype.names).difference(layout.PLACES):
         value = step[column]

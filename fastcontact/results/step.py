@@ -14,22 +14,22 @@ from fastcontact.errors import FastcontactError, unknown
 from fastcontact.results.material_stress import MaterialStress
 from fastcontact.results.units import with_unit
 
-# Part of the normal forces below which their resultant tells nothing.
+# Fraction of the normal forces below which their resultant is negligible.
 CANCELLED = 1e-3
 
 
 def half_width(place: Array, closed: Mask, across: Array | None = None) -> tuple[float, float]:
     """Return the bracket of the half-width of a contact [length]: (NaN, NaN) where nothing is closed.
 
-    From `place` (n,) from the middle, with a sign where they lie on both sides of it [length], and which are `closed`: half
-    the width up to the outermost closed places, and up to the next ones beyond, measured in `across` (n,), by default the
-    places themselves [length]. Where all places lie on one side, the other half is the mirror image.
+    `place` (n,) are coordinates of nodes relative to the middle, signed if they lie on both sides of it [length]. The
+    bracket is half the width of the outermost `closed` nodes, and that of the next ones beyond, measured in `across`
+    (n,), by default `place` [length]. If all nodes lie on one side, the other half is the mirror image.
     """
     if not closed.any():
         return float("nan"), float("nan")
     across, one_sided = place if across is None else across, bool(place.min() >= 0.0)
     beyond = place == place[place > place[closed].max()].min(initial=np.inf)
-    if not one_sided:  # where the surface ends on one side, it is no wider there
+    if not one_sided:  # the contact cannot extend beyond an end of the surface
         beyond |= place == place[place < place[closed].min()].max(initial=-np.inf)
 
     def half(nodes: Mask) -> float:
@@ -174,7 +174,7 @@ class ContactResult:
                 f"coordinates of a ContactResult must be an array (m, dim), not {type(self.coordinates).__name__}"
             )
         dim = self.coordinates.shape[1]
-        defaults = {  # places are those of a file from before they were measured from the middle
+        defaults = {  # for files of versions that did not measure from the middle
             "middle": lambda: np.zeros(dim),
             "place": lambda: np.abs(self.coordinates[:, 0]) if dim == 2 else np.array(self.abscissa),
             "primary_points": lambda: np.empty(0, np.int32),

@@ -156,7 +156,7 @@ def line_table(mesh: Mesh, step: StepResult, group: str, start: str | int | None
 
 
 def with_column(table: AnyArray, name: str, values: AnyArray) -> AnyArray:
-    """Return a table (m,) with one column more, `values` (m,) under `name`."""
+    """Return a table (m,) with an additional column `name` of `values` (m,)."""
     return structured({**_columns(table), name: values})
 
 
@@ -210,12 +210,12 @@ def _text(value: Any) -> str:
         return "true" if value else "false"
     if isinstance(value, float):
         text = f"{value:.17g}"
-        return text if text.strip("-0123456789") else text + ".0"  # so that it stays a float
+        return text if text.strip("-0123456789") else text + ".0"  # keeps it recognisable as a float
     return str(value)
 
 
 def structured(columns: Mapping[str, AnyArray | Sequence[Any]]) -> AnyArray:
-    """Return columns (m,) of equal length by name, in their units, as one structured array (m,)."""
+    """Return columns (m,) of equal length, by name, as one structured array (m,)."""
     arrays = {name: np.asarray(column) for name, column in columns.items()}
     table = np.empty(len(next(iter(arrays.values()))), dtype=[(name, array.dtype) for name, array in arrays.items()])
     for name, array in arrays.items():

@@ -1,7 +1,7 @@
-"""Texts of variable length in a result file, read without HDF5, which never returns from some damaged files.
+"""Texts of variable length in a result file, read without HDF5, which does not return from some damaged files.
 
-Such a text stands in a "global heap collection": a head of 16 bytes with the size of the collection, then objects one after
-the other, each with a head of 16 bytes, its number and its size (HDF5 File Format Specification 3.0, section III.E).
+Such a text is stored in a "global heap collection": a header of 16 bytes with the size of the collection, then objects one
+after the other, each with a header of 16 bytes, its number and its size (HDF5 File Format Specification 3.0, section III.E).
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from typing import Any
 
 SIGNATURE = b"GCOL\x01\0\0\0"  # with version and reserved bytes
 HEAD = struct.Struct("<8sQ")  # of a collection: signature, size
-OBJECT = struct.Struct("<H6xQ")  # of an object: number, size; the free room at the end has the number 0
-REFERENCE = struct.Struct("<IQI")  # in a data set: length of the text, place of the collection, number of the object
+OBJECT = struct.Struct("<H6xQ")  # of an object: number, size; free space at the end has the number 0
+REFERENCE = struct.Struct("<IQI")  # in a data set: length of the text, position of the collection, number of the object
 
 
 def read_text(dataset: Any, raw: Any) -> str:
     """Return the text in a data set of one text; `raw` is its open file, with addresses of eight bytes.
 
-    Raises ValueError if it is no such data set, or damaged.
+    Raises ValueError if it is another kind of data set, or damaged.
     """
     import h5py
 

@@ -21,6 +21,9 @@ import shutil
 import sys
 from pathlib import Path
 
+import h5py
+import numpy as np
+
 from fastcontact.cli import main
 
 # Children have what all commands import; none of it runs a kernel.
@@ -123,10 +126,20 @@ def intact(folder: Path, source: Path) -> list[str]:
 
 
 def contents(path: Path) -> object:
-    """Return what a file holds: its bytes, of a summary all but the times of the run."""
-    if path.suffix != ".json":
+    """Return what a file holds: the arrays of results, all but the times of a summary, else its bytes."""
+    if path.suffix == ".json":
+        return {key: value for key, value in json.loads(path.read_text()).items() if key != "timings"}
+    if path.suffix != ".vtkhdf":
         return path.read_bytes()
-    return {key: value for key, value in json.loads(path.read_text()).items() if key != "timings"}
+    arrays: dict[str, bytes] = {}
+
+    def keep(name: str, item: object) -> None:
+        if isinstance(item, h5py.Dataset):
+            arrays[name] = np.asarray(item[()]).tobytes()
+
+    with h5py.File(path, "r") as file:
+        file.visititems(keep)
+    return arrays
 
 
 def apart(folder: Path, whole: Path) -> list[str]:

@@ -15,7 +15,7 @@ from fastcontact._tools.packing import packed, unpacked
 
 GOOD = ("read", "refused")
 few = settings(
-    max_examples=20, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=10, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 # What files of a format begin with.
 HEADS = {

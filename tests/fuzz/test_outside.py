@@ -88,6 +88,7 @@ def read(path):
         fc.read_mesh(path)
 
 
+@pytest.mark.each_value
 @pytest.mark.skipif(sys.platform != "linux", reason="watching a folder is done as Linux does it")
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("kind", ["med", "vtkhdf", "xdmf", "h5m", "hmf", "cgns"])

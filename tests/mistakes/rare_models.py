@@ -107,7 +107,7 @@ MISTAKES = [
     Mistake("a forked process with threads", forked, fc.errors.FastcontactError,
             r"this process was forked after its parent had started the threads .*: start processes by multiprocessing's 'spawn'"),
     Mistake("a penalty where constraints have no areas", formulation_without_areas, fc.ContactError,
-            r"formulation 'mortar' knows no penalty: leave out the option"),
+            r"formulation 'mortar' supports no penalty: leave out the option"),
     Mistake("unknown multipliers", lambda: pair_of("CONT_UPPER", "CONT_LOWER", formulation="mortar", multipliers="dul"),
             fc.ContactError, r"unknown kind of multipliers 'dul': did you mean 'dual'\?"),
     Mistake("an augmentation of zero", lambda: pair_of("CONT_UPPER", "CONT_LOWER", formulation="mortar", augmentation=0.0),

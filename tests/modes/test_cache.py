@@ -53,6 +53,7 @@ def test_a_read_only_install_keeps_kernels_where_it_is_told(installed, tmp_path)
         assert MESSAGE not in log
 
 
+@pytest.mark.slow
 def test_processes_that_compile_at_once_leave_a_good_cache(tmp_path):
     environment = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     at_once = [start("two_kernels.py", **environment) for _ in range(2)]

@@ -15,6 +15,7 @@ def found():
     return [json.loads(finished(start("whole_runs.py", *CLOSE, NUMBA_DISABLE_JIT=mode))[0]) for mode in "01"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("run", CLOSE)
 def test_interpreted_kernels_find_the_numbers_of_compiled_ones(run, found):
     compiled, interpreted = found

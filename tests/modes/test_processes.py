@@ -22,6 +22,7 @@ def test_started_children_find_the_same_bits(method):
     assert answer["child"] == answer["parent"]
 
 
+@pytest.mark.slow
 def test_a_child_forked_before_the_threads_start_runs():
     assert "sizes" in found("fork", "small", before="nothing")["child"]
 

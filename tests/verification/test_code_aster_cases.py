@@ -140,7 +140,7 @@ def pytest_generate_tests(metafunc):
     cases = []
     for folder in metafunc.config.getoption("--cases") or FOLDERS:
         found = [
-            pytest.param((path, run), id=f"{path.stem}-{run}", marks=AT_THE_END if at_the_end(path, run) else ())
+            pytest.param((path, run), id=f"{path.stem}-{run}", marks=marks_of(path, run))
             for path, run in aster_spec.specs(folder)
         ]
         absent = pytest.mark.skip(reason=f"there are no specs in {folder}")
@@ -148,9 +148,10 @@ def pytest_generate_tests(metafunc):
     metafunc.parametrize("spec_and_run", cases)
 
 
-def at_the_end(path, run):
-    """Return whether a run has nodes beyond the end of the primary side that decide about its values."""
-    return path.stem == "ssnv104d" and run in (0, 2)
+def marks_of(path, run):
+    """Return the marks of a run: further runs of a spec are slow, and some have values decided beyond the end of a side."""
+    at_the_end = path.stem == "ssnv104d" and run in (0, 2)
+    return [*([pytest.mark.slow] if run else []), *([AT_THE_END] if at_the_end else [])]
 
 
 def test_values_lie_within_the_tolerances_of_code_aster(spec_and_run):

@@ -30,6 +30,7 @@ def stack(kinematics: str, element: str, law, **options):
     return fc.solve(model, 3)[-1], model
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("law", ["neo-Hookean", "Ogden"])
 @pytest.mark.parametrize(
     ("kinematics", "element"),

@@ -1,8 +1,8 @@
 """One table that shows that results do not depend on the linear solver: multigrid beside factors.
 
 Every element, formulation and dimension, rigid obstacles too, with and without friction and penalty, either side secondary.
-The default run takes each element, formulation and friction once, in turn with a penalty or swapped, of elements in space two
-formulations; the whole table is slow.
+The default run takes each element with two formulations (in space one), with friction and without, in turn with a penalty or
+swapped; the whole table is slow.
 """
 
 from itertools import product
@@ -162,12 +162,12 @@ def compare(cell, obstacle=False):
 WHOLE = ("kinematics", "element", "formulation", "friction", "penalty", "swapped")
 
 
-@pytest.mark.parametrize(WHOLE, cells("3d", (*SOLIDS, "hex8+tet10", "wedge6+hex20"), every=2))
+@pytest.mark.parametrize(WHOLE, cells("3d", (*SOLIDS, "hex8+tet10", "wedge6+hex20"), every=4))
 def test_multigrid_gives_what_factors_give_in_space(kinematics, element, formulation, friction, penalty, swapped):
     compare((kinematics, element, formulation, friction, penalty, swapped))
 
 
-@pytest.mark.parametrize(WHOLE, cells("plane_strain", FACES) + cells("axisymmetric", FACES))
+@pytest.mark.parametrize(WHOLE, cells("plane_strain", FACES, every=2) + cells("axisymmetric", FACES, every=2))
 def test_multigrid_gives_what_factors_give_in_a_plane(kinematics, element, formulation, friction, penalty, swapped):
     compare((kinematics, element, formulation, friction, penalty, swapped))
 

@@ -105,15 +105,6 @@ def test_a_pocket_that_no_facet_connects_with_the_source_stays_dry():
     assert not step.fluid_pressure.any()
 
 
-def test_a_run_that_is_resumed_repeats_the_other_bit_for_bit():
-    model, ramp = seal(push=lambda x: -0.004 - 0.01 * x[:, 0]), fc.Ramp((1.0, 4.0, 7.0), ((0, 0), (30, 30)))
-    states = []
-    whole = fc.solve(model, ramp, on_step=states.append)
-    again = fc.solve(model, ramp, resume=states[:2])
-    assert np.array_equal(whole[-1].displacement, again[-1].displacement)
-    assert np.array_equal(whole[-1].contact["seal"].fluid_pressure, again[-1].contact["seal"].fluid_pressure)
-
-
 def test_what_is_refused():
     with pytest.raises(fc.ContactError, match="no nodes of the secondary side"):
         seal(source="A BOTTOM_LEFT")

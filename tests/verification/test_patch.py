@@ -23,6 +23,7 @@ def two_blocks(element, formulation, kinematics="plane_strain", swap=False, **op
     return model
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("swap", [False, True])
 @pytest.mark.parametrize("kinematics", ["plane_strain", "plane_stress", "axisymmetric"])
 @pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])

@@ -14,7 +14,7 @@ from fastcontact.analysis import step_result
 from fastcontact.contact.integration import nodal_areas
 from fastcontact.mesh.generate import box, half_spheres, renamed, union
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 METHODS = {
     "node": {"formulation": "node_to_segment"},
@@ -147,7 +147,6 @@ def test_options_change_nothing_about_it(method, options, space, carried):
     check(solved(made(model, **{"normals": "averaged", **METHODS[method], **options})), carried)
 
 
-@pytest.mark.each_value
 @EVERY
 @pytest.mark.parametrize("element", ["tri3", "quad4", "tri6", "quad8"])
 def test_the_training_case(method, element, carried, forma04):
@@ -194,13 +193,12 @@ def test_a_pin_in_a_hole_presses_where_it_touches(method, sides, carried):
     assert along == pytest.approx(np.abs(contact.force[1]), rel=0.02)
 
 
-@pytest.mark.each_value
 @pytest.mark.parametrize("multipliers", ["standard", "dual"])
 @pytest.mark.parametrize("element", ["hex8", "hex20", "tet10"])
 def test_barely_covered_faces_have_no_wild_pressure(element, multipliers, carried):
     """A punch on a wider block: nothing physical depends on where its edge lies in the faces of the block."""
     largest = []
-    for offset in (0.0, 0.05, 0.09, 0.099, 0.0999):
+    for offset in (0.0, 0.09, 0.0999):
         low = box((2.0, 1.0, 1.0), (10, 2, 3), element, (0.0, 0.0, -1.0))
         up = box((1.0, 1.0, 1.0), (7, 3, 3), element, (0.5 + offset, 0.0, 0.0))
         parts = zip("LU", (low, up), strict=True)

@@ -47,6 +47,7 @@ def outward(side, dim):
     return (-1.0 if side.endswith(("LEFT", "MIN")) else 1.0) * np.eye(dim)[axis]
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("swap", [False, True])
 @pytest.mark.parametrize("element", ["tri3", "tri6", "quad4", "quad8", "quad9", "hex8", "tet4", "hex20", "tet10"])
 def test_mortar_ties_meshes_that_do_not_match_exactly(element, swap):
@@ -70,6 +71,7 @@ def test_mortar_ties_meshes_that_do_not_match_exactly(element, swap):
     assert contact.force == pytest.approx(sigma @ normal * area, rel=1e-10, abs=1e-9)
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 @pytest.mark.parametrize("make", [blocks, boxes])
 def test_matching_meshes_are_tied_as_if_they_were_one(make, formulation):
@@ -89,6 +91,7 @@ def test_matching_meshes_are_tied_as_if_they_were_one(make, formulation):
     assert np.abs(glued.displacement - whole.displacement[nearest]).max() < 1e-9 * np.abs(whole.displacement).max()
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("turn", [0.0, 1e-3])
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_curved_sides_are_tied_without_stress_as_they_lie(formulation, turn):

@@ -1,10 +1,10 @@
 """Basis transformation on quadratic facets: constraints at corners eliminated along facet-wise linear functions.
 
-Gaps that are weighted with such functions, those of standard mortar multipliers, have next to no entries of their own at
-corners: the integral of a corner's quadratic function is none on triangles, and negative on quadrangles. With nodal pivots
-the matrix to invert is therefore nearly singular, and its inverse full. Where a corner moves and takes the mid nodes of its
-edges along, its linear function D (n,), the entries are those of a mass matrix of linear facets:
-``u + D s`` with ``s = (B D)^-1 (c - B u)``.
+Gaps weighted with such functions, those of standard mortar multipliers, have very small diagonal entries at corners: the
+integral of a corner's quadratic function is zero on triangles, and negative on quadrangles. With nodal pivots the matrix to
+invert is therefore nearly singular, and its inverse full. If instead a corner moves together with the mid nodes of its edges,
+along its linear function D (n,), the entries are those of a mass matrix of linear facets: ``u + D s`` with
+``s = (B D)^-1 (c - B u)``.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from fastcontact.linear.sparse_rows import scaled
 class BasisTransformation(Elimination):
     """``u[pivots] += moves (B moves)^-1 (c - B u)``.
 
-    Its `pivots` (q,) are all unknowns that move, its `weights` (m, n) are -B, its `force_weights` the rows that multipliers
-    act through, with the sign reversed, too.
+    The `pivots` (q,) are all unknowns that move, the `weights` (m, n) are -B, the `force_weights` minus the rows that
+    multipliers act through.
 
     Attributes
     ----------
     moves : csr_array (q, m)
-        D: what the pivots move by where the corner of an equation moves by one.
+        D: displacement of the pivots for a unit displacement of the corner of an equation.
     corners : ndarray of int (m,)
-        The unknown of each equation's own corner.
+        The unknown at the corner of each equation.
     """
 
     moves: csr_array = None  # type: ignore[assignment]
@@ -50,7 +50,7 @@ class BasisTransformation(Elimination):
             x[self.pivots] += offset
 
     def move_forces(self, r: Array) -> None:
-        """See `Elimination.move_forces`: the remainder does no work along the corner functions."""
+        """See `Elimination.move_forces`: the remaining forces do no work along the corner functions."""
         W = self.force_weights
         elimination_kernels.add_rows(W.indptr, W.indices, W.data, self.multiplier(r[self.pivots]), r)
 
@@ -63,7 +63,7 @@ class BasisTransformation(Elimination):
         """See `Elimination.with_sparse_weights`."""
         rows = self.weights
         if isinstance(self.own, CoupledPivots):
-            # The equations with the lumped matrix in place of their own: what they leave of a motion obeys them again.
+            # Equations with the lumped matrix instead of the exact one: the projected motion satisfies them exactly.
             m, n = rows.shape
             E = csr_array((np.ones(m), self.corners, np.arange(m + 1)), shape=(m, n))
             rows = csr_array(rows + self.own.beyond_lumped @ E)
@@ -71,7 +71,7 @@ class BasisTransformation(Elimination):
         return Elimination(self.pivots, W, np.zeros(len(self.pivots)), W, self.own.sparse)
 
     def _following(self, inverse: csr_array, rows: csr_array) -> csr_array:
-        """Return the weights (q, n) that the pivots are of all unknowns."""
+        """Return the weights (q, n) of all unknowns in the pivots."""
         q = len(self.pivots)
         identity = csr_array((np.ones(q), self.pivots, np.arange(q + 1)), shape=(q, rows.shape[1]))
         W = csr_array(identity + self.moves @ csr_array(inverse @ rows))
@@ -82,7 +82,7 @@ class BasisTransformation(Elimination):
 def eliminated(
     B: csr_array, c: Array, force_rows: csr_array | None, nodes: Indices | None, size: int, functions: csr_array | None
 ) -> Elimination:
-    """Eliminate equations along the `functions` of corners where they are of that kind, by nodal unknowns elsewhere.
+    """Eliminate equations along the corner `functions` where they are of that kind, by nodal unknowns elsewhere.
 
     See `eliminate_transformed` and `elimination.eliminate`.
     """
@@ -95,7 +95,7 @@ def eliminated(
 def eliminate_transformed(
     B: csr_array, c: Array, force_rows: csr_array | None, nodes: Indices, size: int, functions: csr_array
 ) -> BasisTransformation | None:
-    """Return the elimination of equations along the functions of corners, None where they are not of that kind.
+    """Return the elimination of equations along the corner functions, None where they are not of that kind.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def eliminate_transformed(
     force_rows : csr_array (m, n), optional
         See `elimination.eliminate`, like `nodes` (m,) and `size`.
     functions : csr_array (n, n)
-        Rows of mid nodes: what they move by where corners do.
+        Rows of mid nodes: their displacements for unit displacements of the corners.
 
     Raises
     ------

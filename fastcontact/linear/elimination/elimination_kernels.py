@@ -21,7 +21,7 @@ def complete(pivots, indptr, indices, weights, x):
 
 @kernel
 def move_forces(pivots, indptr, indices, weights, r):
-    """Move the forces at the pivots to the unknowns that they follow: ``r[pivots] = 0``, then ``r += W.T r[pivots]``."""
+    """Move the forces at the pivots to the other unknowns: ``r += W.T r[pivots]``, then ``r[pivots] = 0``."""
     forces = np.empty(pivots.shape[0], r.dtype)
     for p in range(pivots.shape[0]):
         forces[p] = r[pivots[p]]

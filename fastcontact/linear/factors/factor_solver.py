@@ -17,33 +17,33 @@ from fastcontact.linear.field_compliance import FieldCompliance
 from fastcontact.linear.protocol import Counters, LinearSolver, Monitor
 
 log = logging.getLogger("fastcontact")
-# Beyond this many unknowns last, their dense block costs more than the solutions it saves.
+# Number of last unknowns above which their dense block costs more than the solutions it saves.
 LAST_UP_TO = 4000
-# Unknowns up to which a factorisation is affordable, by the number of components of a displacement.
+# Number of unknowns up to which a factorisation is affordable, by the dimension.
 AFFORDABLE = {1: 3_000_000, 2: 3_000_000, 3: 150_000}
 ATTAINABLE = 1e-14
-# Errors of one solution, in units of those of another.
+# Error of one solution over that of another.
 MARGIN = 10.0
 
 
 class FactorSolver(LinearSolver):
     """A direct solver; sub-classes factorise and solve.
 
-    Where a sub-class gives factors with the unknowns last that equations may involve, their Delassus operator is the inverse
-    of the trailing block, ``(K^-1)_cc = (L_cc D_c L_cc.T)^-1``, and costs no solution with K at all; the displacement of the
-    other unknowns under contact forces follows from theirs by half a solution.
+    If a sub-class provides factors in which the unknowns involved in equations come last, their Delassus operator is the
+    inverse of the trailing block, ``(K^-1)_cc = (L_cc D_c L_cc.T)^-1``, without any solution with K; the displacement of
+    the other unknowns under contact forces then follows by half a solution.
 
     Parameters
     ----------
     tolerance : float
-        Not needed: direct solutions are exact but for round-off.
+        Ignored: direct solutions are exact up to round-off.
     """
 
     name: str
     iterative = False
 
     def __init__(self, tolerance: float = ATTAINABLE) -> None:
-        self.tolerance = ATTAINABLE  # whatever was asked
+        self.tolerance = ATTAINABLE  # regardless of the argument
         self.counters = Counters()
         self.n = 0
         self._factors: SymmetricFactors | None = None
@@ -61,13 +61,13 @@ class FactorSolver(LinearSolver):
         raise NotImplementedError
 
     def _with_last(self, K: bsr_array, last: Indices) -> SymmetricFactors | None:
-        """Factorise K (n, n), as `_factorise`, with the unknowns `last` (m,) last; None where nothing is gained by that."""
+        """Factorise K (n, n) as `_factorise` does, with the unknowns `last` (m,) last; None where this has no advantage."""
         raise NotImplementedError
 
     def prepare(
         self, K: bsr_array, rigid_modes: Array, involved: Indices | None = None, release: bool = False
     ) -> bsr_array:
-        """Factorise K, and leave it as it is; see `LinearSolver.prepare`.
+        """Factorise K without modifying it; see `LinearSolver.prepare`.
 
         Raises
         ------
@@ -90,10 +90,10 @@ class FactorSolver(LinearSolver):
         return K
 
     def _error(self, K: bsr_array) -> float:
-        """Return by how much, in its largest component, a second solution corrects the first one.
+        """Return the largest correction of a solution by a step of iterative refinement, relative to the solution.
 
-        Displacements of unknowns that are last come from one and the same inverse, so that errors of the factors do not show
-        from one pairing to the next; those of whole solutions do.
+        Displacements of the last unknowns are computed with one inverse, so that errors of the factors are the same in all
+        pairings; those of full solutions vary.
         """
         f = np.random.default_rng(0).normal(size=self.n)
         u = self._solve(f)
@@ -127,14 +127,12 @@ class FactorSolver(LinearSolver):
         """See `LinearSolver.improve`: one step of iterative refinement for later solutions."""
         if self.refines:
             return False
-        log.info(
-            "linear solver: forces are out of balance by %.1e times what is allowed, solutions are refined", excess
-        )
+        log.info("linear solver: forces are out of balance by %.1e times the bound, solutions are refined", excess)
         self.refines = True
         return True
 
     def refined(self, f: Array) -> Array:
-        """Return ``K^-1 f``, shape (n,), corrected once."""
+        """Return ``K^-1 f``, shape (n,), with one step of iterative refinement."""
         u = self.back_substitute(f)
         return u + self.back_substitute(f - self._K @ u)
 
@@ -144,7 +142,7 @@ class FactorSolver(LinearSolver):
         return self._solution(f)
 
     def extend(self, u: Array) -> Array:
-        """Return the displacement (n,) under forces on the unknowns `last` alone, which move by u (m,)."""
+        """Return the displacement (n,) under forces on the unknowns `last` alone, whose displacement is u (m,)."""
         assert self._factors is not None
         self.counters.iterations += 1
         return self._factors.extended(u)
@@ -202,7 +200,7 @@ class LoadedFactor:
 
 
 class CondensedProblem:
-    """K condensed to the k contact unknowns by a dense inverse; see `linear.protocol.Loaded`. Vectors are theirs.
+    """K condensed to the k contact unknowns by a dense inverse; see `linear.protocol.Loaded`. Vectors have length k.
 
     Parameters
     ----------

@@ -1,17 +1,17 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Vector work of conjugate gradients: sums in fixed chunks, the same for any number of threads."""
+"""Vector operations of conjugate gradients: sums in fixed chunks, equal for any number of threads."""
 
 from numba import prange
 
 from fastcontact._jit.decorators import kernel, parallel_kernel
 
-# Numbers that one thread takes at a time.
+# Length of the chunks.
 CHUNK = 4096
 
 
 @kernel
 def _dot(a, b, low, high):
-    """Return the dot product of a stretch, in four sums that the processor can add side by side."""
+    """Return the dot product of a range, in four sums that the processor can vectorise."""
     s0 = s1 = s2 = s3 = 0.0
     whole = low + (high - low) // 4 * 4
     for i in range(low, whole, 4):
@@ -60,7 +60,7 @@ def advance(alpha, p, q, x, r, sums):
 
 @parallel_kernel
 def turn(beta, z, p):
-    """Turn the search direction: ``p = z + beta p``."""
+    """Update the search direction: ``p = z + beta p``."""
     for i in prange(p.shape[0]):
         p[i] = z[i] + beta * p[i]
 

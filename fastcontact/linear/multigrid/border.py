@@ -16,9 +16,9 @@ from scipy.sparse.linalg import splu
 from fastcontact.arrays import Array
 from fastcontact.linear.krylov.iterations import Multiply, Precondition
 
-# Compliance of displacements in units of the inverse diagonal of their matrix.
+# Compliance of displacements over the inverse diagonal of their matrix.
 SOFTER = 2.0
-# Part of what they have by themselves that is added to multipliers in the preconditioner: some are linearly dependent.
+# Relative regularisation of the multipliers in the preconditioner, since some constraints are linearly dependent.
 REPEATED = 1e-10
 
 
@@ -43,7 +43,7 @@ class Border:
         yielding = np.divide(1.0, diagonal, out=np.zeros(len(diagonal)), where=diagonal > 0.0)
         S = self.compliance + SOFTER * (self.rows @ diags_array(yielding) @ self.rows.T)
         diagonal_of_S = S.diagonal()
-        # Residuals of these equations become forces.
+        # Residuals of these equations are scaled to forces.
         self.stiffness = 1.0 / diagonal_of_S
         self._factors = splu(csc_array(S + diags_array(REPEATED * diagonal_of_S)))
 

@@ -12,12 +12,12 @@ from fastcontact.arrays import AnyArray
 from fastcontact.linear.multigrid import cycle_kernels
 from fastcontact.round_off import ROUND_OFF
 
-# A dense factor of more unknowns costs more than a sparse one.
+# Number of unknowns above which a dense factor costs more than a sparse one.
 DENSE_UP_TO = 1500
 
 
 class Coarse:
-    """Solves with a symmetric positive semidefinite matrix; unknowns without stiffness of their own stay at zero.
+    """Solver for a symmetric positive semidefinite matrix; unknowns without stiffness stay at zero.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class Coarse:
     Attributes
     ----------
     matrix : csc_array (n, n)
-        `A`; what is solved with also holds the last change.
+        `A`, without the last change.
     """
 
     def __init__(self, A: csc_array) -> None:

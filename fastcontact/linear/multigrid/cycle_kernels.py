@@ -15,7 +15,7 @@ from fastcontact._jit.decorators import kernel, parallel_kernel
 from fastcontact.linear.multigrid.block_products import row_times
 from fastcontact.linear.multigrid.symmetric_storage_kernels import CHUNK, FIRST
 
-# Up to so many block rows, waking another thread costs more than it saves.
+# Number of block rows up to which waking another thread costs more than it saves.
 ALONE = 4 * CHUNK
 
 
@@ -74,10 +74,10 @@ def _relax(low, high, inverse, r, first, second, d, x, rows, begin):
 
 @parallel_kernel
 def relax(inverse, r, first, second, d, x, rows, begin):
-    """One step of a Chebyshev iteration: ``d = first d + second D^-1 r`` and ``x = x + d``.
+    """Make one step of a Chebyshev iteration: ``d = first d + second D^-1 r`` and ``x = x + d``.
 
-    `inverse` (n_rows * m * m,) holds the inverted diagonal blocks. With ``first = 0``, d need not be set before, and
-    with `begin` x neither: it then starts from zero.
+    `inverse` (n_rows * m * m,) are the inverted diagonal blocks. With ``first = 0``, d need not be set before; with
+    `begin`, x starts from zero and need not be set either.
     """
     n = r.shape[0] // len(rows)
     if n <= ALONE:
@@ -89,7 +89,7 @@ def relax(inverse, r, first, second, d, x, rows, begin):
 
 @kernel
 def _dot_rows(a, b, length):
-    """Return the dot product of the beginnings of two vectors, in four sums side by side."""
+    """Return the dot product of the first `length` entries of two vectors, in four partial sums."""
     s0 = s1 = s2 = s3 = 0.0
     whole = length // 4 * 4
     for k in range(0, whole, 4):
@@ -106,8 +106,8 @@ def _dot_rows(a, b, length):
 def factorise_dense(A, reciprocal):
     """Replace the lower triangle of a symmetric positive semidefinite `A` (n, n) by its Cholesky factor.
 
-    `reciprocal` (n,) takes the inverses of its diagonal; unknowns without stiffness of their own, or that follow from
-    those before them, get zero and are left out of solutions.
+    `reciprocal` (n,) receives the inverses of its diagonal; unknowns without stiffness, or that depend on earlier ones, get
+    zero and are left out of solutions.
     """
     n = A.shape[0]
     largest = 0.0
@@ -163,7 +163,7 @@ def subtract_rows(numbers, indptr, indices, data, x, y, rows):
 def invert_blocks(blocks, size, out):
     """Fill `out` (n * size * size,) with the inverses of symmetric positive semidefinite `blocks` (n * size * size,).
 
-    Unknowns without stiffness of their own get rows and columns of zeros: Gauss-Jordan elimination passes them by.
+    Unknowns without stiffness get rows and columns of zeros: Gauss-Jordan elimination skips them.
     """
     a = np.empty((size, 2 * size))
     for i in range(blocks.shape[0] // (size * size)):

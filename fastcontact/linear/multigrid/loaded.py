@@ -1,7 +1,7 @@
-"""Multigrid solution under linear constraints, some of which have a compliance of their own.
+"""Multigrid solution under linear constraints, some of which have a compliance.
 
-An equation with a compliance of its own is a spring along its row. Springs not much stiffer than the body become part of the
-matrix and of the hierarchy; stiffer ones are eliminated like exact equations, see `reduced`.
+An equation with a compliance is a spring along its row. Springs not much stiffer than the body become part of the matrix
+and of the hierarchy; stiffer ones are eliminated like exact equations, see `reduced`.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from fastcontact.linear.sparse_rows import scaled
 from fastcontact.linear.springs import Springs
 
 log = logging.getLogger("fastcontact")
-# Equations whose own stiffness exceeds that of the unknowns they act on by this factor are eliminated: as springs they
-# take half as many iterations again there, and the root of the ratio as many beyond.
+# Equations whose stiffness exceeds that of their unknowns by this factor are eliminated: as springs they need 1.5 times the
+# iterations at this ratio, and more with its square root beyond.
 STIFF = MILD
 
 
 class LoadedMultigrid(LoadedIteration):
     """See `LoadedIteration`; its solver is a `Multigrid`."""
 
-    # Values of a pressure field at the edge of the contact, as they were in the last pairing.
+    # Values of a pressure field at the edge of the contact in the last pairing.
     _at_edge: Array = np.empty(0)
 
     def solve(
@@ -98,7 +98,7 @@ class LoadedMultigrid(LoadedIteration):
             return monitor(u, parts.multiplier(u, multiplier, c), error)
 
         if parts.giving and self._functions is not None:
-            # Excesses at mid nodes are not eliminated here: conjugate gradients broke down, conjugate residuals go on.
+            # Excesses at mid nodes are not eliminated here: conjugate gradients broke down, conjugate residuals do not.
             start = np.zeros(len(f)) if guess is None else guess
             u = solver.nonsymmetric_solution(f, elimination, springs, start, tolerance or solver.tolerance)
         else:
@@ -109,7 +109,7 @@ class LoadedMultigrid(LoadedIteration):
         self, B: csr_array, c: Array, C: FieldCompliance, guess: Array | None, monitor: Monitor | None,
         tolerance: float | None,
     ) -> tuple[Array, Array]:  # fmt: skip
-        """Return u and the forces of points (m,); see `field_compliance`."""
+        """Return u and the point forces (m,); see `field_compliance`."""
         solver = self._solver
         parts = _FieldParts.of(B, c, C, solver.K.blocksize[0])
         elimination, springs, f, border = parts.elimination, parts.springs, parts.pushed(self._f, c), parts.border()
@@ -170,7 +170,7 @@ class _Parts:
     ) -> _Parts:  # fmt: skip
         """Return the parts of ``B u + C multiplier = c``; RepeatedError if stiff ones are linearly dependent."""
         gives = C[stiff].any()
-        if gives:  # excesses take the places of nodal pivots
+        if gives:  # excesses replace nodal pivots as unknowns
             functions = None
         if stiff.all():
             elimination = eliminated(B, c, through, nodes, size, functions) if len(c) else None
@@ -191,14 +191,14 @@ class _Parts:
         return self.elimination is not None and self.elimination.compliance is not None
 
     def pushed(self, f: Array, c: Array) -> Array:
-        """Return forces f (n,) and those of the springs at u = 0."""
+        """Return forces f (n,) plus those of the springs at u = 0."""
         if self.springs is None:
             return f
         acting = self.springs.rows if self.springs.through is None else self.springs.through
         return f + acting.T @ (self.springs.stiffness * c[~self.stiff])
 
     def multiplier(self, u: Array, of_stiff: Array, c: Array) -> Array:
-        """Return all multipliers (m,), given those of the equations eliminated."""
+        """Return all multipliers (m,), given those of the eliminated equations."""
         if self.springs is None:
             return of_stiff
         multiplier = np.empty(len(c))
@@ -238,12 +238,12 @@ class _FieldParts:
         return f + self.springs.rows.T @ (self.springs.stiffness * c)
 
     def multiplier(self, u: Array, inside: Array, at_edge: Array, c: Array) -> Array:
-        """Return the forces (m,) of the points, given what multiplies the equations of the field."""
+        """Return the forces (m,) of the points, given the multipliers of the equations of the field."""
         p = np.empty(len(self.field.right))
         p[~self.field.edge], p[self.field.edge] = inside, at_edge
         return self.weights * (self.field.P @ p) + self.springs.stiffness * (c - self.springs.rows @ u)
 
 
 def _nodes(rows: csr_array, size: int) -> Indices:
-    """Return the node (m,) that each row involves most; a node has `size` unknowns."""
+    """Return the node (m,) with the largest entry in each row; a node has `size` unknowns."""
     return np.asarray(abs(rows).argmax(axis=1), np.intp).ravel() // size

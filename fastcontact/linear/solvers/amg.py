@@ -1,9 +1,10 @@
 """Multigrid as a linear solver, and the factorisation that replaces it where it does not converge.
 
 Equations ``B u = c`` are eliminated, see `multigrid.solver`, also those with a diagonal compliance, see `multigrid.loaded`.
-Those with a full one cannot be: they go through columns of K^-1, one solution each, kept for the whole analysis. Where those
-would be many, or the iteration stalls, on thin or nearly incompressible parts, or a load step has taken more work than
-a factorisation, a factorisation replaces it for the rest of the analysis, if the matrix is not too large.
+Those with a full compliance cannot be eliminated: they use columns of K^-1, one solution each, stored for the whole
+analysis. If these are too many, or the iteration stalls on thin or nearly incompressible parts, or a load step has taken
+more work than a factorisation, a factorisation replaces multigrid for the rest of the analysis, unless the matrix is too
+large.
 """
 
 from __future__ import annotations
@@ -37,14 +38,14 @@ from fastcontact.linear.springs import Springs
 from fastcontact.round_off import ROUND_OFF
 
 log = logging.getLogger("fastcontact")
-# Unknowns up to which a factorisation replaces multigrid.
+# Number of unknowns up to which a factorisation replaces multigrid.
 FACTORS_UP_TO = AFFORDABLE
-# Equations that stiffen a node by more than this leave the softer body too little of multigrid's tolerance; coupled ones,
-# whose weights are nearly right only, take hundreds of iterations from the second on.
+# If equations stiffen a node by more than the first factor, the softer body is too inaccurate at multigrid's tolerance; with
+# coupled equations, whose weights are approximate, hundreds of iterations are needed from the second factor on.
 STIFFENED, STIFFENED_COUPLED = 3e4, 6.0
-# Work in one load step, in iterations, from which on factors are cheaper for certain: so much, and so much for each unknown,
-# by the number of components of a displacement. In 3D a factorisation and a step by it cost 300 and 0.04 where two bodies
-# touch, three times as much in stacks with friction (measured, see bench/README.md).
+# Work in one load step, in iterations, above which a factorisation is certainly cheaper: a constant, and an amount per
+# unknown, by the dimension. In 3D a factorisation and a step with it cost 300 and 0.04 for two bodies in contact, three
+# times as much in stacks with friction (measured, see bench/README.md).
 COST, COST_OF_UNKNOWN = 1000, {1: 0.0, 2: 0.0, 3: 0.08}
 
 
@@ -56,7 +57,7 @@ class Amg(Multigrid, LinearSolver):
     instead : Direct or None
         The factorisation that replaced multigrid.
     gave_up : str
-        Why.
+        Reason for the replacement.
     """
 
     name = "amg"
@@ -64,7 +65,7 @@ class Amg(Multigrid, LinearSolver):
     def __init__(self, tolerance: float = TOLERANCE, precision: str = "single") -> None:
         super().__init__(tolerance, precision)
         self.instead: Direct | None = None
-        self._factored: Direct | None = None  # kept where an analysis goes back to before that
+        self._factored: Direct | None = None  # kept if an analysis returns to a state before the replacement
         self.gave_up = ""
 
     def __repr__(self) -> str:
@@ -89,19 +90,19 @@ class Amg(Multigrid, LinearSolver):
         return self.K if release else K
 
     def load(self, f: Array) -> Loaded:
-        """Return the prepared matrix with right-hand side `f` (n,); work is allowed anew, see `affordable`."""
+        """Return the prepared matrix with right-hand side `f` (n,), with a new limit of work, see `affordable`."""
         self.begin()
         self.allowed = self.work + self.affordable if self._may_factorise else None
         return _Loaded(self, f)
 
     @property
     def affordable(self) -> int:
-        """How many iterations cost more than a factorisation and a load step by it."""
+        """Number of iterations that costs more than a factorisation and a load step with it."""
         n, size = self.K.shape[0], self.K.blocksize[0]
         return COST + int(COST_OF_UNKNOWN[size] * n)
 
     def improve(self, excess: float) -> bool:
-        """See `LinearSolver.improve`: lower the tolerance, or let factors take over where round-off is near."""
+        """See `LinearSolver.improve`: lower the tolerance, or replace multigrid by a factorisation near round-off."""
         if self.instead is not None:
             return self.instead.improve(excess)
         if self._may_factorise and not self.tolerance > ROUND_OFF * excess:
@@ -121,7 +122,7 @@ class Amg(Multigrid, LinearSolver):
         }  # fmt: skip
 
     def _constrained_by(self) -> dict[str, Any]:
-        """Return the equations and springs that the hierarchy was changed for, as plain arrays."""
+        """Return the equations and springs of the hierarchy, as plain arrays."""
         equations, springs, tied = self._hierarchy_equations, self._hierarchy_springs, None
         if equations is not None:
             rows = equations.weights
@@ -133,7 +134,7 @@ class Amg(Multigrid, LinearSolver):
         if (instead := snapshot.get("instead")) is not None:
             (self.instead or self._factorise(instead["why"])).put_back(instead)
             return
-        if self.instead is not None:  # multigrid was given up later
+        if self.instead is not None:  # multigrid was replaced after the snapshot
             self._factored, self.instead, self.gave_up, self.error = self.instead, None, "", 0.0
         put_back_tolerance(self, snapshot)
         if snapshot["precision"] != self.precision:
@@ -154,7 +155,7 @@ class Amg(Multigrid, LinearSolver):
         Raises
         ------
         StallError
-            If multigrid would need hundreds of iterations and factors can take over.
+            If multigrid would need hundreds of iterations and a factorisation can replace it.
         """
         super().constrain(elimination, springs)
         coupled = elimination is not None and elimination.coupled
@@ -166,12 +167,12 @@ class Amg(Multigrid, LinearSolver):
             )
 
     def give_up(self, stalled: StallError | TooManyColumnsError) -> None:
-        """Factorise the matrix, since the iteration stalls or columns of its inverse cost more.
+        """Factorise the matrix, because the iteration stalls or columns of the inverse cost more.
 
         Raises
         ------
         StallError, TooManyColumnsError
-            If the matrix is too large for that.
+            If the matrix is too large.
         """
         if not self._may_factorise:
             raise stalled
@@ -197,28 +198,28 @@ class Amg(Multigrid, LinearSolver):
         else:
             self._factored.put_back({"asked": [], "loads": []})
         self.gave_up, self.instead = why, self._factored
-        # What is asked of later solutions is what factors give.
+        # Later tolerances are those of a factorisation.
         self.asked = self.tolerance if self.asked is None else self.asked
         self.tolerance, self.error = self.instead.tolerance, self.instead.error
         return self.instead
 
 
 def _equal(first: Mapping[str, Any] | None, second: Mapping[str, Any] | None) -> bool:
-    """Return whether two sets of arrays, or none, are the same."""
+    """Return whether two sets of arrays, or None, are equal."""
     if first is None or second is None:
         return first is second
     return all(np.array_equal(values, second[name]) for name, values in first.items())
 
 
 def _elimination(tied: Mapping[str, Any], n: int) -> Elimination:
-    """Return the elimination of `Amg.snapshot`; its offsets and multipliers are not needed any more."""
+    """Return the elimination of `Amg.snapshot`, without offsets and multipliers, which are not needed."""
     m = len(tied["pivots"])
     rows = csr_array((tied["data"], tied["indices"], tied["indptr"]), shape=(m, n))
     return Elimination(tied["pivots"], rows, np.zeros(m), rows)
 
 
 def _or_by_factors(method: Callable[..., Any]) -> Callable[..., Any]:
-    """Let the method of a factorisation replace that of multigrid from where the iteration stalls."""
+    """Decorate a method to fall back on a factorisation where the iteration stalls."""
 
     @functools.wraps(method)
     def found(self: _Loaded, *args: Any, **options: Any) -> Any:

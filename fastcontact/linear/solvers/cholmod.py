@@ -21,7 +21,7 @@ WHOLE, PERMUTE = 0, 7
 
 
 class Cholmod(FactorSolver):
-    """CHOLMOD, with its own fill-reducing order where no unknowns must be last; see `FactorSolver`."""
+    """CHOLMOD, with its own fill-reducing order if no unknowns must be last; see `FactorSolver`."""
 
     name = "cholmod"
 
@@ -38,7 +38,7 @@ class Cholmod(FactorSolver):
         if not len(last):
             return None
         factor = factorised(lower_triangle(K.tocsr()), matrix(fill_reducing(K, last)))  # K's rows are its columns
-        # CHOLMOD may reorder independent branches of the elimination, which leaves what depends on what as it is.
+        # CHOLMOD may reorder independent branches of the elimination tree, which does not change dependences.
         position = np.empty(self.n, np.intp)
         position[_solved(factor, np.arange(self.n, dtype=float), PERMUTE).astype(np.intp)] = np.arange(self.n)
         start, rows, values = (np.asarray(part).ravel() for part in cholmod.getfactor(factor).CCS)
@@ -48,10 +48,10 @@ class Cholmod(FactorSolver):
 
 
 def by_supernodes(start: NDArray[np.int64], rows: NDArray[np.int64], values: Array) -> LowerTriangle:
-    """Return a Cholesky factor given by columns, rows ascending, with the rows of columns of equal structure once.
+    """Return a Cholesky factor, given by columns with ascending rows, with the rows once per supernode.
 
-    A column has the rows of the one before it, without the first, where that first row is its own and the numbers of
-    rows fit: the structure of a column of a Cholesky factor is part of that of its parent.
+    A column has the rows of the previous one without its first, if that row is the column itself and the numbers of rows
+    agree: below the diagonal, the structure of a column of a Cholesky factor is contained in that of its parent.
     """
     entries = np.diff(start)
     continues = np.zeros(len(entries), bool)
@@ -68,7 +68,7 @@ def by_supernodes(start: NDArray[np.int64], rows: NDArray[np.int64], values: Arr
 
 
 def lower_triangle(K: csc_array | csr_array) -> Any:
-    """Return the lower triangle of the symmetric matrix K (n, n) as CHOLMOD takes it."""
+    """Return the lower triangle of the symmetric matrix K (n, n) in CHOLMOD's format."""
     from kvxopt import matrix, spmatrix
 
     columns = np.repeat(np.arange(K.shape[0]), np.diff(K.indptr))
@@ -83,7 +83,7 @@ def factorised(A: Any, order: Any = None) -> Any:
 
     before = dict(cholmod.options)
     if order is not None:
-        cholmod.options["nmethods"] = 1  # otherwise it takes an order of its own where that leaves less to do
+        cholmod.options["nmethods"] = 1  # otherwise it may use its own order with less fill
     try:
         factor = cholmod.symbolic(A) if order is None else cholmod.symbolic(A, order)
         cholmod.numeric(A, factor)
@@ -101,7 +101,7 @@ def _solved(factor: Any, F: Array, system: int = WHOLE) -> Array:
     X = matrix(np.asfortranarray(F.reshape(len(F), -1)))
     try:
         cholmod.solve(factor, X, sys=system)
-    except ArithmeticError as error:  # small matrices are factorised past a zero pivot, which a solution finds
+    except ArithmeticError as error:  # small matrices are factorised past a zero pivot, which only the solution detects
         raise singular() from error
     return np.array(X, order="C").reshape(F.shape)
 

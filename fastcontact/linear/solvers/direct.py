@@ -12,9 +12,9 @@ from fastcontact.linear.factors.factor_solver import FactorSolver
 
 
 class Direct(FactorSolver):
-    """Our Cholesky factors with the contact unknowns last; see `FactorSolver`.
+    """Cholesky factorisation with the contact unknowns last; see `FactorSolver`.
 
-    Where no contact unknowns are named, or too many, SciPy's SuperLU: symmetric mode, minimum degree of A + A.T.
+    Without contact unknowns, or with too many, SciPy's SuperLU is used: symmetric mode, minimum degree of A + A.T.
     """
 
     name = "direct"

@@ -1,4 +1,4 @@
-"""A reference element: data, two functions and its default quadrature; shape functions that are products.
+"""A reference element: data, two functions and its default quadrature; product shape functions.
 
 Reference coordinates have no dimension.
 """
@@ -101,7 +101,7 @@ class Element:
 
     @cached_property
     def reversed(self) -> tuple[int, ...]:
-        """Node order of the same cell turned inside out: its mirror image with two reference coordinates swapped.
+        """Node order of the inverted cell: its mirror image with two reference coordinates swapped.
 
         Two-dimensional cells keep their first node and run the other way round; lines swap their ends.
         """
@@ -134,9 +134,9 @@ class Element:
 
 
 def product_gradients(factors: Array, slopes: Array) -> Array:
-    """Return the derivatives (m, n_nodes, 3) [-] of products of three factors, one of each coordinate.
+    """Return the derivatives (m, n_nodes, 3) [-] of products of three factors, one for each coordinate.
 
-    From the `factors` (m, n_nodes, 3) [-] and the derivative of each in its coordinate, `slopes` (m, n_nodes, 3) [-].
+    `factors` (m, n_nodes, 3) [-] are the factors, and `slopes` (m, n_nodes, 3) [-] their derivatives in their coordinates.
     """
     f, g, h = np.moveaxis(factors, 2, 0)
     df, dg, dh = np.moveaxis(slopes, 2, 0)

@@ -1,6 +1,6 @@
 """MED files, as Salome and code_aster read and write them: meshes with groups, nodal results at all instants.
 
-With h5py alone. Arrays are stored component by component ("no interlace"), node numbers count from 1. Meshes of MED 2.3 to
+Only h5py is needed. Arrays are stored component by component ("no interlace"), node numbers start at 1. Meshes of MED 2.3 to
 4.x are read. Files are written in version 3.0.0, which all later libraries read, or 4.0.0, the first with wedges of 18 nodes.
 """
 
@@ -24,10 +24,10 @@ from fastcontact.mesh.files.blocks import VERTEX, Block, build_mesh, check_kinds
 from fastcontact.mesh.files.med_families import Families, checked_name, decoded
 from fastcontact.mesh.mesh import Mesh
 
-# Elements whose nodes MED numbers otherwise than we do: our node k is node NODE_ORDER[code][k] of MED. MED sees the
-# base of a solid from outside, where we see it from inside: its cells are ours in the mirror.
+# Elements with different node orders in MED: our node k is node NODE_ORDER[code][k] of MED. MED numbers the base of a solid
+# as seen from outside, we as seen from inside: its cells are mirror images of ours.
 NODE_ORDER = {element.med: element.reversed for element in elements.ELEMENTS.values() if element.dim == 3}
-# The centres of faces follow in MED as bottom, sides round about, top; ours as -x, +x, -y, +y, bottom, top.
+# The order of face centres is bottom, sides all round, top in MED, and -x, +x, -y, +y, bottom, top here.
 _FACES_OF_H27 = dict(zip(range(20, 26), (24, 22, 21, 23, 20, 25)))
 NODE_ORDER["H27"] = tuple(_FACES_OF_H27.get(node, node) for node in NODE_ORDER["H27"])
 
@@ -50,9 +50,9 @@ class MedContent(NamedTuple):
 
 
 def read_med(path: PathLike, mesh_name: str | None = None) -> MedContent:
-    """Read a mesh with its groups, cells oriented as they are in the file.
+    """Read a mesh with its groups, with the orientation of cells in the file.
 
-    Of several meshes the one called `mesh_name` is read, of several time steps of a mesh the first one.
+    Of several meshes `mesh_name` is read, of several time steps of a mesh the first.
     """
     with opened(path) as file:
         name = _chosen_mesh(file, path, mesh_name)
@@ -102,7 +102,7 @@ def _group_names(families: Families, sign: int) -> list[str]:
 
 
 def _first_step(group: Any) -> Any:
-    """Return the HDF5 group with points and cells: the mesh itself in MED 2, its first time step later."""
+    """Return the HDF5 group with points and cells: the mesh itself in MED 2, its first time step in later versions."""
     if "NOE" in group:
         return group
     steps = [entry for entry in group.values() if "NOE" in entry]
@@ -133,7 +133,7 @@ def _read_points(step: Any, mesh: Any) -> Array:
 
 
 def _read_blocks(step: Any, families: Families) -> Iterator[Block]:
-    # MED 2 keeps faces and edges in folders of their own (FAC, ARE); later versions put all cells under MAI.
+    # MED 2 stores faces and edges in separate folders (FAC, ARE); later versions store all cells under MAI.
     folders = [step[name] for name in ("MAI", "FAC", "ARE") if name in step]
     entries = [entry for folder in folders for entry in folder.items()]
     foreign = {code: _cell_count(entry) for code, entry in entries if code not in elements.BY_MED and code != "PO1"}
@@ -174,7 +174,7 @@ def _read_nodes(entry: Any, code: str) -> AnyArray:
 def write_med_mesh(path: PathLike, mesh: Mesh, *, mesh_name: str = "mesh") -> None:
     """Write a mesh with all its groups; the file appears only when it is complete.
 
-    A reader gets the elements in alphabetical order of their MED codes. Names may have 64 bytes, of groups 80.
+    Readers return the elements in alphabetical order of their MED codes. Names may have 64 bytes, those of groups 80.
     """
     with new_file(path, mesh) as file:
         add_mesh(file, mesh, mesh_name)
@@ -182,7 +182,7 @@ def write_med_mesh(path: PathLike, mesh: Mesh, *, mesh_name: str = "mesh") -> No
 
 @contextmanager
 def new_file(path: PathLike, mesh: Mesh) -> Iterator[Any]:
-    """Open a new MED file that takes its place when all is written; `mesh` tells which version it needs."""
+    """Open a new MED file, which appears at `path` when it is complete; `mesh` determines the version."""
     version = 4 if "wedge18" in mesh.cells else 3
     with replacing(path) as temporary, _in_order(version >= 4), new_hdf5(temporary) as file:
         _set(file.create_group("INFOS_GENERALES"), MAJ=version, MIN=0, REL=0)
@@ -191,7 +191,7 @@ def new_file(path: PathLike, mesh: Mesh) -> Iterator[Any]:
 
 @contextmanager
 def _in_order(wanted: bool) -> Iterator[None]:
-    """Let new HDF5 groups remember the order of their members, without which libraries refuse a file of version 4."""
+    """Make new HDF5 groups track the order of their members, which libraries require in files of version 4."""
     import h5py
 
     settings = h5py.get_config()
@@ -318,7 +318,7 @@ def read_med_field(path: PathLike, field: str) -> tuple[Array, Array]:
 
 
 def read_point_field(path: PathLike, field: str) -> tuple[Array, Array, Array | None]:
-    """Return what `read_med_field` does, and the points (n_points, dim) [length]; None where they are in another file."""
+    """Return the result of `read_med_field`, and the points (n_points, dim) [length], None if they are in another file."""
     with opened(path) as file:
         group, _, mesh = _field_and_mesh(file, path, field)
         instants = [entry for entry in group.values() if "NOE" in entry and "PDT" in entry.attrs]
@@ -334,7 +334,7 @@ def read_point_field(path: PathLike, field: str) -> tuple[Array, Array, Array | 
 
 
 def _field_and_mesh(file: Any, path: PathLike, field: str) -> tuple[Any, str, Any]:
-    """Return the group of a field, the name of its mesh, and the group of this, None where it is in another file."""
+    """Return the group of a field, the name of its mesh, and the group of the mesh, None if it is in another file."""
     names = list(file["CHA"]) if "CHA" in file else []
     check_known("field", field, names, FileError, f"'{path}': ")
     name = decoded(bytes(attribute(file["CHA"][field], "MAI")))
@@ -342,12 +342,12 @@ def _field_and_mesh(file: Any, path: PathLike, field: str) -> tuple[Any, str, An
 
 
 def read_cell_field(path: PathLike, field: str) -> tuple[Array, Array, Array]:
-    """Return a field of cells of a file of MED 3 or later: times, values and middles of its cells.
+    """Return a field at cells from a file of MED 3 or later: times, values and middles of the cells.
 
     Times are (n_instants,) in the order of the file [-], values (n_instants, n_cells, n_components), NaN where there are
     none [unit of the field], middles (n_cells, dim) [length].
 
-    FileError if the file cannot be read, has no such field, or the field is not given once a cell.
+    Raises FileError if the file cannot be read, has no such field, or the field does not have one value per cell.
     """
     with opened(path) as file:
         group, name, mesh = _field_and_mesh(file, path, field)
@@ -374,12 +374,12 @@ def read_cell_field(path: PathLike, field: str) -> tuple[Array, Array, Array]:
 
 
 def _cell_supports(entry: Any) -> list[str]:
-    """Return the codes of the cells that a field has values at."""
+    """Return the codes of the cells with values of a field."""
     return [key[4:] for key in entry if key.startswith("MAI.")]
 
 
 def _of_cells(file: Any, entry: Any, code: str, n_cells: int, n_components: int, path: PathLike) -> Array:
-    """Return a field (n_cells, n_components) at the cells of one kind at an instant, NaN where it is not given."""
+    """Return a field (n_cells, n_components) at the cells of one kind at an instant, NaN where it has no value."""
     support = entry.get(f"MAI.{code}")
     if support is None:
         return np.full((n_cells, n_components), np.nan)

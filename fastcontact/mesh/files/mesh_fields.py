@@ -1,4 +1,4 @@
-"""Fields of files as arrays over the points or cells of a mesh, such as constants of materials take."""
+"""Fields of files as arrays over the points or cells of a mesh, for example as material constants."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from fastcontact.errors import FileError, MeshError, check_known
 from fastcontact.mesh.files.file_fields import FileField, read_file_field
 from fastcontact.mesh.mesh import Mesh
 
-# How far points of a file may lie from those of a mesh, relative to its size, and count as the same.
+# Tolerance of the positions of points in a file and in a mesh, relative to its size.
 SAME_PLACE = 1e-6
 OVER = ("cells", "points")
-# How far a time of a file may lie from the one that is wanted, relative to the latest.
+# Tolerance of the times of a file, relative to the latest.
 SAME_TIME = 1e-9
 
 
@@ -95,7 +95,7 @@ def _cells(mesh: Mesh, groups: Sequence[str] | str | None) -> list[Numbers]:
 
 
 def _row(field: FileField, instant: float | None, name: str) -> int:
-    """Return which instant of a field is wanted."""
+    """Return the row of the requested instant of a field."""
     if instant is None:
         if len(field.values) != 1:
             raise FileError(f"{name} has {len(field.values)} instants: say which with instant")
@@ -111,7 +111,7 @@ def _row(field: FileField, instant: float | None, name: str) -> int:
 def at_cells(field: FileField, middles: Array, mesh: Mesh, name: str) -> Array:
     """Return the values (n_instants, n_cells) of a field at cells of a mesh, by their `middles` (n_cells, dim) [length].
 
-    MeshError if a cell has no value, or none is at its place; `name` names the field.
+    Raises MeshError, with the `name` of the field, if a cell has no value, or the file has no cell at its position.
     """
     rows, _ = _nearest(field, middles, np.arange(len(middles)), mesh, ("cell", "cells"), name)
     return _known(field.values[:, rows], middles, np.arange(len(middles)), "cell", name)
@@ -120,8 +120,7 @@ def at_cells(field: FileField, middles: Array, mesh: Mesh, name: str) -> Array:
 def at_points_of(field: FileField, mesh: Mesh, wanted: Indices, name: str) -> Array:
     """Return the values (n_instants, n_points) of a field at the `wanted` (k,) points of a mesh, elsewhere NaN.
 
-    A file with the points of the mesh, in its order, gives the value of each point itself, any other one that of the point
-    at the same place.
+    If the file has the points of the mesh in the same order, values are assigned by number, otherwise by position.
 
     Raises
     ------
@@ -140,12 +139,12 @@ def at_points_of(field: FileField, mesh: Mesh, wanted: Indices, name: str) -> Ar
 
 
 def _in_space(places: Array) -> Array:
-    """Return places (n, 2) or (n, 3) with three coordinates."""
+    """Return positions (n, 2) or (n, 3) with three coordinates."""
     return np.pad(places, ((0, 0), (0, 3 - places.shape[1])))
 
 
 def _same_points(places: Array, mesh: Mesh) -> bool:
-    """Return whether the points of a file are those of a mesh, in its order."""
+    """Return whether the points of a file are those of a mesh in the same order."""
     if len(places) != mesh.n_points:
         return False
     off = np.abs(_in_space(places) - _in_space(mesh.points)).max(initial=0.0)
@@ -155,10 +154,10 @@ def _same_points(places: Array, mesh: Mesh) -> bool:
 def _nearest(
     field: FileField, places: Array, numbers: Indices, mesh: Mesh, nouns: tuple[str, str], name: str
 ) -> tuple[Indices, float]:
-    """Return the rows (n,) of a field at places (n, dim) of a mesh, and how far they may be from there [length].
+    """Return the rows (n,) of a field at positions (n, dim) of a mesh, and the tolerance of the distance [length].
 
-    `numbers` (n,) are those of the points or cells at the places; what they are, and what the field is to be written on, say
-    the `nouns`.
+    `numbers` (n,) are those of the points or cells at the positions; `nouns` name them, and the items on which the field
+    is to be written, in messages.
     """
     from scipy.spatial import cKDTree
 
@@ -175,7 +174,7 @@ def _nearest(
 
 
 def _known(values: Array, places: Array, numbers: Indices, noun: str, name: str) -> Array:
-    """Return values (n_instants, n) at some places (n, dim); MeshError where one is missing."""
+    """Return values (n_instants, n) at positions (n, dim); MeshError if one is missing."""
     missing = np.flatnonzero(~np.isfinite(values).all(axis=0))
     if len(missing):
         first = f"{noun} {numbers[missing[0]]} {places[missing[0]]}"
@@ -184,7 +183,7 @@ def _known(values: Array, places: Array, numbers: Indices, noun: str, name: str)
 
 
 def _refuse_two(field: FileField, wanted: Array, reach: float, name: str) -> None:
-    """Raise MeshError where points of the file at one place have different values."""
+    """Raise MeshError if coincident points of the file have different values."""
     from scipy.spatial import cKDTree
 
     assert field.places is not None

@@ -1,4 +1,4 @@
-"""Read and write mesh files: MED by our own reader and writer, all other formats by meshio."""
+"""Reading and writing of mesh files: MED with our own reader and writer, all other formats with meshio."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from fastcontact.mesh.mesh import Mesh
 
 logger = logging.getLogger("fastcontact")
 
-# code_aster's names for the meshes and results it reads and writes are MED files too.
+# Suffixes of MED files, including code_aster's for meshes and results.
 MED_SUFFIXES = (".med", ".mmed", ".rmed")
-# Its older one in text, which is read only.
+# code_aster's older text format, which can only be read.
 MAIL_SUFFIX = ".mail"
 
 

@@ -47,5 +47,5 @@ __all__ = [
 ]  # fmt: skip
 
 
-if not TYPE_CHECKING:  # to whom all names are known
+if not TYPE_CHECKING:  # type checkers know all names
     __getattr__, __dir__ = names_of("fastcontact.generate", __all__)

@@ -1,4 +1,4 @@
-"""Blocks that stand for half planes and half spaces: under an indenter, under a flat punch, crowned against each other."""
+"""Blocks that represent half planes and half spaces: under an indenter, under a flat punch, crowned against each other."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def graded_block(
 def _named(mesh: Mesh, lines: list[Array], radii: list[float]) -> Mesh:
     """Return the mesh with the groups of `graded_block`."""
     mesh = renamed(mesh, dict.fromkeys(_CORNERS) | (_NAMES_2D if mesh.dim == 2 else _NAMES_3D))
-    # Grid lines rarely stand at the radius itself: up to the first one not short of it.
+    # Up to the first grid line at or beyond the radius.
     edges = np.array(
         [places[places >= min(radius, places[-1]) * (1 - 1e-9)][0] for places, radius in zip(lines, radii)]
     )
@@ -194,7 +194,7 @@ def crowned_blocks(
     right, down = _lines(size, fine, whole, rate), _lines(size, size, whole, rate)
     lattice = on_lines(element, [np.concatenate([-right[:0:-1], right]), -down[::-1]], "LOWER")
     across, up = lattice.points.T
-    crown = across**2 / (2 * R) * (1 + up / whole)  # fades away downward
+    crown = across**2 / (2 * R) * (1 + up / whole)  # decays downward
     lower = renamed(lattice.replace(points=np.column_stack([across, up - crown])), _NAMES_CROWNED.get)
     lower = with_cells_inside(lower, "CONT_LOWER", "CONT_LOWER", lambda points: np.abs(points[:, 0]) <= 1.2 * fine)
     lower = with_points_at(lower, {"POLE_LOWER": (0.0, 0.0)})
@@ -203,6 +203,6 @@ def crowned_blocks(
 
 
 def _lines(size: float, fine: float, length: float, growth: float) -> Array:
-    """Return places (n + 1,) [length] from 0 to `length`: about `size` apart up to `fine`, then growing."""
+    """Return positions (n + 1,) [length] from 0 to `length`: about `size` apart up to `fine`, then growing."""
     equal = np.linspace(0.0, fine, segments(round(fine / size)) + 1)
     return np.concatenate([equal, fine + growing(length - fine, size * growth, growth)[1:]])

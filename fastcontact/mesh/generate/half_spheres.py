@@ -124,7 +124,7 @@ def quarter_disc(
 
 
 def _corners(R: float) -> dict[str, tuple[float, float]]:
-    """Corners of the lower body; D by the same formula as the nodes of the arc."""
+    """Return the corners of the lower body; D by the same formula as the nodes of the arc."""
     x, y = arc((0.0, -R), R, np.array([0.25 * math.pi]))[0]
     return {"A1": (0.0, -R), "B1": (R, -R), "C1": (0.0, 0.0), "D1": (float(x), float(y))}
 
@@ -140,7 +140,7 @@ def _spacing(R: float, size: float | None, contact_size: float | None, contact_r
 
 
 def _of_triangles(R: float, spacing: Spacing) -> Mesh:
-    """Lower body in tri3."""
+    """Return the lower body in tri3."""
     corners, right, half = _corners(R), 0.5 * math.pi, 0.25 * math.pi
     sides = [
         ("A1B1", divided(lambda s: straight(corners["A1"], corners["B1"], s), R, spacing)),
@@ -154,7 +154,7 @@ def _of_triangles(R: float, spacing: Spacing) -> Mesh:
 def _of_quadrangles(
     R: float, arc_sizes: tuple[float, float] | None, segments: int | None, radial_sizes: tuple[float, float] | None
 ) -> Mesh:
-    """Lower body in quad4: the square A-P-N-M and the two blocks between it and the arc."""
+    """Return the lower body in quad4: the square A-P-N-M and the two blocks between it and the arc."""
     n = 15 if segments is None else count("segments", segments)
     length = 0.25 * math.pi * R
     near, far = (
@@ -172,7 +172,7 @@ def _of_quadrangles(
 
 
 def _three_blocks(R: float, along: Array, outward: Array, equal: Array) -> Mesh:
-    """Lower body from the relative abscissae along C-D, along M-C and along the equally divided sides."""
+    """Return the lower body for relative abscissae along C-D, along M-C and along the equally divided sides."""
     places = {**_corners(R), "M1": (0.0, -R / 2), "N1": (R / 2, -R / 2), "P1": (R / 2, -R)}
 
     def line(start: str, end: str, relative: Array) -> Array:

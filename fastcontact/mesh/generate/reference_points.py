@@ -1,4 +1,4 @@
-"""Reference points: points of a mesh without cells, each with another one for its rotation."""
+"""Reference points: points of a mesh without cells, each with a second one for its rotation."""
 
 from __future__ import annotations
 

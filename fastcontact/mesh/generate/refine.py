@@ -1,4 +1,4 @@
-"""Uniform refinement of a 2D mesh: every cell into two or four of its own kind, boundaries kept on their curves."""
+"""Uniform refinement of a 2D mesh: every cell into two or four of the same kind, boundaries kept on their curves."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from fastcontact.mesh.generate.quadratic import ON_CURVE, Circle, Curve, all_on,
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
 
-# Corners of the children in the reference cell, each child turned like its parent.
+# Corners of the children in the reference cell, each child oriented like its parent.
 _CHILDREN = {
     "line2": [[[-1.0], [0.0]], [[0.0], [1.0]]],
     "tri3": [
@@ -34,16 +34,16 @@ _CHILDREN = {
         [[-1.0, 0.0], [0.0, 0.0], [0.0, 1.0], [-1.0, 1.0]],
     ],
 }
-# A line that turns by more than this from one node to the next does not count as a circle.
+# Largest angle between consecutive segments of a line that may be a circle.
 _TURN = np.pi / 5
 
 
 @dataclass(frozen=True, eq=False)
 class _Pattern:
-    """How cells of one element are divided: the points of the children, the parent's own nodes first.
+    """Division of the cells of one element: the points of the children, the parent's nodes first.
 
-    `shape` (m, n_nodes) has the shape functions of the parent at these points, `children` (n_children, n_nodes) their
-    numbers. A new point lies on the edge `on_edge` (m,) of the parent, -1 for others, `along` (m,) quarters from its begin.
+    `shape` (m, n_nodes) are the shape functions of the parent at these points, `children` (n_children, n_nodes) their
+    numbers. A new point lies on the edge `on_edge` (m,) of the parent, -1 for others, `along` (m,) quarters from its start.
     """
 
     shape: Array
@@ -117,11 +117,11 @@ def refined(mesh: Mesh, curves: Iterable[Curve] = ()) -> Mesh:
 
 
 class _NewPoints(NamedTuple):
-    """The points of a refined mesh that its parent has not, in the order of their keys: those on edges before others.
+    """The new points of a refined mesh, in the order of their keys: those on edges before others.
 
-    `keys` (n,) are the same for all cells that share a point; `sources` are name of an element, number of a point of its
-    lattice, rows of cells, and the numbers of the points that they have there; `lattices` (n_cells, n_lattice) hold the
-    points of every cell by element.
+    `keys` (n,) are equal for all cells that share a point; `sources` are the name of an element, the number of a point of its
+    lattice, rows of cells, and the numbers of their points there; `lattices` (n_cells, n_lattice) are the points of
+    every cell by element.
     """
 
     keys: AnyArray
@@ -140,7 +140,7 @@ def _new_points(mesh: Mesh) -> _NewPoints:
             edge = pattern.on_edge[point]
             if edge >= 0:
                 codes.append(_keys(ends[:, edge, 0], ends[:, edge, 1], int(pattern.along[point]), mesh.n_points))
-            else:  # each cell has its own
+            else:  # one for each cell
                 codes.append(inside + np.arange(len(block)))
                 inside += len(block)
             places.append((name, point))
@@ -156,20 +156,20 @@ def _new_points(mesh: Mesh) -> _NewPoints:
 
 
 def _keys(a: AnyArray, b: AnyArray, quarters: int, n_points: int) -> AnyArray:
-    """One number for a point on the edge from a to b, the same from either end."""
+    """Return a key for a point on the edge from a to b, independent of its direction."""
     from_least = np.where(a < b, quarters, 4 - quarters)
     return (np.minimum(a, b) * n_points + np.maximum(a, b)) * 4 + from_least
 
 
 def _edge_nodes(name: str) -> list[list[int]]:
-    """Local nodes of each edge, corners first."""
+    """Return the local nodes of each edge, corners first."""
     element = elements.get(name)
     middle = [[element.n_corners + k] if element.order == 2 else [] for k in range(len(element.edges))]
     return [[*edge, *middle[k]] for k, edge in enumerate(element.edges)]
 
 
 def _facets_on(mesh: Mesh, curve: Curve) -> list[AnyArray]:
-    """Facets of the curve's group, block by block, all of whose nodes lie on the curve."""
+    """Return the facets of the curve's group, block by block, whose nodes all lie on the curve."""
     facets = [block[all_on(mesh, curve, block)] for block in facets_of(mesh, curve).values()]
     if not sum(map(len, facets)):
         where = "outer facet" if curve.group is None else f"facet of group '{curve.group}'"
@@ -178,14 +178,14 @@ def _facets_on(mesh: Mesh, curve: Curve) -> list[AnyArray]:
 
 
 def _on_curve(mesh: Mesh, curve: Curve, keys: AnyArray) -> AnyArray:
-    """Numbers of the new points on the facets that lie on the curve."""
+    """Return the numbers of the new points on the facets that lie on the curve."""
     ends = np.concatenate([block[:, :2] for block in _facets_on(mesh, curve)]).astype(np.int64)
     wanted = np.unique(np.concatenate([_keys(ends[:, 0], ends[:, 1], q, mesh.n_points) for q in (1, 2, 3)]))
     return mesh.n_points + np.flatnonzero(np.isin(keys, wanted))
 
 
 def _cell_groups(mesh: Mesh) -> dict[str, AnyArray]:
-    """Children of each group's cells: those of one cell follow one another."""
+    """Return the children of each group's cells, which are consecutive for each cell."""
     pieces, start = {}, 0
     for name, first in mesh.offsets.items():
         pieces[name] = (first, start, len(_pattern(name).children))

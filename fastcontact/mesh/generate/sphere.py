@@ -1,4 +1,4 @@
-"""A sphere on a block in three dimensions, a quarter of both: boxes mapped on their shapes."""
+"""A sphere on a block in three dimensions, a quarter of both: mapped boxes."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from fastcontact.mesh.quality import check_cells
 
 Map = Callable[[Array, Array, Array], Array]
 
-# Wedges of different blocks would not match, and the apex of a pyramid in a thin curved cell would stand outside it.
+# Wedges of different blocks would not match, and the apex of a pyramid in a thin curved cell would lie outside it.
 SOLIDS = ("hex8", "hex20", "hex27", "tet4", "tet10")
 
-# Middle of the faces of the inner block over the radius, and how far its faces bulge from a cube to a ball.
+# Position of the middle of the inner block's faces over the radius, and their bulge between cube (0) and ball (1).
 INNER, BULGE = 0.45, 0.5
 
 
@@ -120,7 +120,7 @@ def sphere_octant(
     upward = np.linspace(0.0, eighth, count("segments", segments_for(R * eighth, spacing.far)) + 1)
 
     def ball(outside: int) -> Map:
-        """Return the map of the inner block (outside = -1), or of that beyond its face in one of the directions."""
+        """Return the map of the inner block (outside = -1), or of the block beyond its face in one of the directions."""
 
         def place(*parameters: Array) -> Array:
             coordinates = np.column_stack(parameters)
@@ -152,7 +152,7 @@ def sphere_octant(
 
 
 def _ball(cube: Array) -> Array:
-    """Map the cube [-1, 1]^3 (n, 3) smoothly on the unit ball, faces on the sphere (Nowell, 2005)."""
+    """Map the cube [-1, 1]^3 (n, 3) smoothly to the unit ball, faces to the sphere (Nowell, 2005)."""
     square = cube * cube
     next_, last = np.roll(square, -1, axis=1), np.roll(square, -2, axis=1)
     return cube * np.sqrt(1.0 - next_ / 2 - last / 2 + next_ * last / 3)
@@ -168,13 +168,13 @@ def _spacing(
 
 
 def _shallow(spacing: Spacing) -> Spacing:
-    """Return the spacing below the surface: as at the contact, but fine only half as far."""
+    """Return the spacing below the surface: that at the contact, with half the extent of the fine part."""
     shift = 0.5 * spacing.plateau
     return Spacing(spacing.near, spacing.far, plateau=spacing.plateau - shift, reach=spacing.reach - shift)
 
 
 def _mapped(element: str, grid: Sequence[Array], place: Map, solid: str, names: Mapping[str, str]) -> Mesh:
-    """Return a box with the given grid lines, mapped; of its groups and outer facets those that `names` lists."""
+    """Return a mapped box with the given grid lines; its groups and outer facets are those in `names`."""
     lattice = on_lines(element, grid, solid)
     lattice = lattice.replace(points=place(*lattice.points.T))
     return renamed(_without_unnamed_facets(lattice, names), dict(names))

@@ -1,4 +1,4 @@
-"""Mirror, move, unite, weld and rename meshes, and name groups by their places."""
+"""Operations on meshes: mirror, move, unite, merge points, rename groups, and define groups by position."""
 
 from __future__ import annotations
 
@@ -154,7 +154,7 @@ def union(*meshes: Mesh) -> Mesh:
 
 
 def _joined(parts: Iterable[Groups]) -> Groups:
-    """Return the arrays of the same name, one after the other."""
+    """Return the concatenated arrays of the same name."""
     groups_of_all: dict[str, list[AnyArray]] = {}
     for groups_of_mesh in parts:
         for name, values in groups_of_mesh.items():
@@ -163,7 +163,7 @@ def _joined(parts: Iterable[Groups]) -> Groups:
 
 
 def _renumbering(mesh: Mesh, starts: dict[str, int]) -> AnyArray:
-    """New number of each cell of `mesh`; moves `starts` on, past its cells."""
+    """Return the new number of each cell of `mesh`; advances `starts` past its cells."""
     numbers = np.empty(mesh.n_cells, np.int64)
     for name, start in mesh.offsets.items():
         n = len(mesh.cells[name])

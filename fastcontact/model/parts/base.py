@@ -36,8 +36,8 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 class Support:
     """A prescribed displacement component of all nodes of a group: `value` [length] times the ramp.
 
-    `value` is a number or a function of position, `ramp` a history of its own or None. What a rotation about an axis does is
-    added, with the history of its angle.
+    `value` is a number or a function of position, `ramp` its history or None. A `rotation` about an axis is added, with the
+    history of its angle.
     """
 
     group: str
@@ -49,11 +49,11 @@ class Support:
 
     @property
     def name(self) -> str:
-        """What it is and where it acts, for messages."""
+        """Component and group, for messages."""
         return f"the displacement {'xyz'[self.component]} prescribed on '{self.group}'"
 
     def by_history(self, points: Array) -> dict[PartHistory, Array]:
-        """Return by history its displacements (n,) of `points` (n, dim) at multiplier 1 [length]."""
+        """Return the displacements (n,) of `points` (n, dim) at multiplier 1, by history [length]."""
         parts: dict[PartHistory, Array] = {self.ramp: evaluated(self.value, points, self.name)}
         if self.rotation is not None:
             arms, angle = points - np.array(self.rotation.centre), self.rotation.angle
@@ -64,7 +64,7 @@ class Support:
 
 
 def group_names(groups: Sequence[str] | str | None) -> tuple[str, ...] | None:
-    """Return the names of groups as users give them, one or several; None for all."""
+    """Return names of groups, given as one or several, as a tuple; None for all."""
     if groups is None:
         return None
     names = (groups,) if isinstance(groups, str) else tuple(groups)
@@ -75,7 +75,7 @@ def group_names(groups: Sequence[str] | str | None) -> tuple[str, ...] | None:
 
 @typed(ModelError)
 class ModelBase:
-    """Mesh, kinematics, and what was added to them."""
+    """Mesh, kinematics, and lists of the added items."""
 
     def __init__(
         self,
@@ -119,11 +119,11 @@ class ModelBase:
         self.relations: list[MultiPointConstraint] = []
         self.related_supports: list[
             tuple[str, MultiPointConstraint]
-        ] = []  # those of the relations that support a group
+        ] = []  # those of the constraints that support a group
         self.springs: list[Springs] = []
         self.pretensions: list[Pretension] = []
         self.interpolated: list[str] = []  # cyclic symmetries whose nodes follow facets
-        self.periodic_interfaces: list[PeriodicInterface] = []  # nodes that are one place of a part that repeats itself
+        self.periodic_interfaces: list[PeriodicInterface] = []  # coincident nodes of periodic parts
         self.contact: list[ContactPair] = []
 
     @property
@@ -132,7 +132,7 @@ class ModelBase:
         return self.mesh.n_points * self.mesh.dim
 
     def _solid_groups(self, groups: Sequence[str] | str | None, otherwise: str) -> tuple[str, ...] | None:
-        """Return groups of solid cells by name, None for all; ModelError that ends with `otherwise` if one holds none."""
+        """Return groups of solid cells by name, None for all; ModelError that ends with `otherwise` if one is empty."""
         names = group_names(groups)
         check_solids(self.mesh, names, otherwise)
         return names
@@ -169,7 +169,7 @@ class ModelBase:
         return np.asarray(vector / np.linalg.norm(vector))
 
     def _related(self) -> Mask:
-        """Return which points (n_points,) relations and springs hold."""
+        """Return which points (n_points,) have constraints or springs."""
         related = np.zeros(self.mesh.n_points, bool)
         related[self.holding_rows().indices // self.mesh.dim] = True
         return related

@@ -184,7 +184,7 @@ class ModelContact(ModelConnections):
             self.add_contact(pair.name, secondary=secondary, primary=primary, formulation=formulation, **options)
             self.contact[-1] = dataclasses.replace(self.contact[-1], found_gap=pair.gap[0])
             added.append(pair)
-        if not added and options:  # they are wrong or right all the same
+        if not added and options:  # check the options anyway
             checked = copy.copy(self)
             checked.contact = []
             checked.add_contact("contacts", formulation=formulation, secondary=secondary, primary=primary, **options)
@@ -287,7 +287,7 @@ class ModelContact(ModelConnections):
             raise ModelError(f"the motion {motion} of obstacle '{name}' must be finite numbers")
         if isinstance(obstacle, MeshedSurface):
             obstacle.check_apart(self.mesh)
-        obstacle.distance(self.mesh.points[:1])  # what does not fit this dimension shows at once
+        obstacle.distance(self.mesh.points[:1])  # raises an error for a wrong dimension
         history = table_of(ramp, f"the ramp of the motion of obstacle '{name}'")
         given: dict[str, Any] = {option: value for option, value in options.items() if value is not None}
         if formulation is None:
@@ -307,7 +307,7 @@ class ModelContact(ModelConnections):
         )
 
     def _source(self, pair: ContactPair, side: Surface, options: PairOptions) -> Mask | None:
-        """Return the nodes (n_points,) that the fluid in a pair comes from, None where there is none."""
+        """Return the source nodes (n_points,) of the fluid in a pair, None without a fluid."""
         if pair.fluid is None:
             return None
         mask = np.zeros(self.mesh.n_points, bool)
@@ -325,9 +325,9 @@ class ModelContact(ModelConnections):
         return mask
 
     def _facet_kinds(self, group: str) -> tuple[list[str], bool]:
-        """Return the kinds of facets of a group, and whether linear triangles or tetrahedra alone have them."""
+        """Return the kinds of facets of a group, and whether all belong to linear triangles or tetrahedra."""
         facets = self.mesh.cells_of(group, self.mesh.dim - 1) if group in self.mesh.cell_groups else {}
-        if not facets:  # which `check` tells
+        if not facets:  # reported by `check`
             return [], False
         simplices = [block for name, block in self.mesh.solids.items() if name in ("tri3", "tet4")]
         theirs = any(np.isin(self.mesh.points_of(group), block).all() for block in simplices)

@@ -1,4 +1,4 @@
-"""Conduction of heat in a model: prescribed temperatures, fluxes, films, sources, and what its checks ask.
+"""Heat conduction in a model: prescribed temperatures, fluxes, films, sources, and checks.
 
 A `Value` is a number, or a function from reference positions (n, dim) [length] to numbers (n,) [unit of the quantity].
 """
@@ -29,7 +29,7 @@ HEAT_FLUX = ("heat_flux_x", "heat_flux_y", "heat_flux_z")
 
 @typed(ModelError)
 class ModelHeat(ModelMaterials):
-    """A model that may conduct heat; steps then tell temperatures and fluxes, and materials with an expansion expand."""
+    """A model with optional heat conduction; steps then contain temperatures and fluxes, and materials expand."""
 
     def fix_temperature(
         self, group: str, value: Value, *, ramp: History = None, begins: float | None = None, ends: float | None = None
@@ -171,7 +171,7 @@ class ModelHeat(ModelMaterials):
         return np.arange(self.mesh.n_points) if representative is None else representative
 
     def fixed_temperatures(self) -> tuple[Mask, dict[Table | None, Array]]:
-        """Return which nodes (n_points,) have a prescribed temperature, and by history their rises at multiplier 1.
+        """Return which nodes (n_points,) have a prescribed temperature, and their rises at multiplier 1 by history.
 
         Nodes with the same temperature are represented by the first one, see `same_temperature`. ModelError if two
         prescribed temperatures differ at a node.
@@ -242,11 +242,11 @@ class ModelHeat(ModelMaterials):
             )
 
     def conductances(self) -> dict[str, Conductance]:
-        """Return the laws of conductance by contact pair."""
+        """Return the conductances by contact pair."""
         given = {pair.name: pair.options.get("conductance") for pair in self.contact}
         return {name: Conductance(name, value) for name, value in given.items() if value is not None}
 
 
 def _span(begins: float | None, ends: float | None) -> tuple[float, float]:
-    """Return the instants between which a load acts, always where they are not given."""
+    """Return the instants between which a load acts, always if they are not given."""
     return -np.inf if begins is None else float(begins), np.inf if ends is None else float(ends)

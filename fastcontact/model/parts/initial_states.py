@@ -286,7 +286,7 @@ class ModelInitialStates(ModelLoads):
         return self._forces_of(field, field.offset(rise))
 
     def initial_forces_by_ramp(self) -> dict[Table | None, Array]:
-        """Return by history the nodal forces (n_points, dim) of initial stresses and strains at multiplier 1 [force]."""
+        """Return the nodal forces (n_points, dim) of initial stresses and strains at multiplier 1, by history [force]."""
         by_ramp: dict[Table | None, Array] = {}
         field = self.material_field() if self.initial_states else None
         for state in self.initial_states:
@@ -296,7 +296,7 @@ class ModelInitialStates(ModelLoads):
         return by_ramp
 
     def _forces_of(self, field: MaterialField, offset: StressOffset | None) -> Array:
-        """Return the nodal forces (n_points, dim) [force] of what stresses have beside those of the displacements."""
+        """Return the nodal forces (n_points, dim) [force] of a stress offset."""
         held = stress_at_points(
             self.mesh,
             self.kinematics,

@@ -332,7 +332,7 @@ class ModelLoads(ModelHeat):
         self.loads.append(load)
 
     def forces_by_ramp(self) -> dict[Table | None, Array]:
-        """Return by history the nodal forces (n_points, dim) of all loads at multiplier 1 [force]."""
+        """Return the nodal forces (n_points, dim) of all loads at multiplier 1, by history [force]."""
         related = self._related()
         by_ramp: dict[Table | None, Array] = {}
         for load in self.loads:

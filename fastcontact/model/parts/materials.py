@@ -45,7 +45,7 @@ class ModelMaterials(ModelBase):
 
     @property
     def cell_fields(self) -> tuple[str, ...]:
-        """Names of the `StepResult.cell_fields` that steps of this model have: none for linear elasticity."""
+        """Names of the `StepResult.cell_fields` in steps of this model: none for linear elasticity."""
         return field_names([material for material, _ in self.materials], self.strain)
 
     @property
@@ -79,7 +79,7 @@ class ModelMaterials(ModelBase):
         )
 
     def material_of_cells(self) -> dict[str, Numbers]:
-        """Return by element every solid cell's material (n_cells,)."""
+        """Return the material of every solid cell (n_cells,), by element."""
         if not self.materials:
             raise ModelError("no material: call add_material(LinearElastic(E=..., nu=...)) for the solid cells")
         numbers = {name: np.full(len(block), -1, np.int32) for name, block in self.mesh.solids.items()}
@@ -100,7 +100,7 @@ class ModelMaterials(ModelBase):
         return self.material_field().averaged
 
     def _check_material(self, index: int, group: str | None, given: Numbers) -> None:
-        """Refuse a material for cells that have another one already, which was not given to all cells."""
+        """Refuse a material for cells that already have another one, unless that was assigned to all cells."""
         new = self.materials[index][0]
         for number in np.unique(given[given >= 0]):
             old, groups = self.materials[number]

@@ -1,4 +1,4 @@
-"""The contacts that were found in a mesh: both sides of each, on pale bodies."""
+"""The contacts detected in a mesh: both sides of each, on pale bodies."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def _draw_2d(axes: Any, found_contacts: FoundContacts) -> None:
             PolyCollection(list(outlines(name, mesh.points[cells])), facecolors="0.95", edgecolors="0.8", lw=0.3)
         )
     for group, label, colour, opacity in _sides(found_contacts):
-        # From end to end, by way of the node in the middle if there is one.
+        # From end to end, through the middle node if there is one.
         lines = [mesh.points[b[:, [0, 2, 1] if b.shape[1] == 3 else [0, 1]]] for b in mesh.cells_of(group, 1).values()]
         strokes = [line for block in lines for line in block]
         width = 4.0 if opacity < 1.0 else 1.5

@@ -18,7 +18,7 @@ from fastcontact.results.units import labelled, units_of_results
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# So many numbers of closed nodes stand beside each other above the zones.
+# Largest number of counts of closed nodes above the zones.
 MOST_COUNTS = 20
 STATES = {"open": "0.85", "closed": "C0", "sticking": "C0", "sliding": "C1"}
 
@@ -96,14 +96,14 @@ def history(
         if entries:
             ax.legend(fontsize=9, loc="upper left")
         top = float(ax.dataLim.y1)
-        room = 0.12 * (entries + 0.3) if entries else 0.05  # for the legend above what is drawn
+        room = 0.12 * (entries + 0.3) if entries else 0.05  # for the legend above the curves
         ax.set_ylim(0.0, (1.0 + room) * top if 0.0 < top < np.inf else None)
         ax.set_xlim(left=min(0.0, float(x.min())))
     return axes
 
 
 def _brackets(ax: Any, x: Array, bracket: Array) -> None:
-    """Draw at each step a bar from the outermost closed place to the first open one; a tick where nothing is open."""
+    """Draw, at each step, a bar from the outermost closed node to the first open one; a tick if no node is open."""
     low, high = bracket.T
     known = np.isfinite(low)
     both = known & np.isfinite(high)

@@ -32,11 +32,11 @@ from fastcontact.results.units import labelled
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-LARGEST = 1e30  # of coordinates that can be drawn: the libraries multiply them
+LARGEST = 1e30  # largest coordinate that can be drawn: the libraries multiply them
 
 
 def scaled(points: Array, scale: float, displacement: Array) -> Array:
-    """Return displaced points (n, dim) [length]; FastcontactError if `scale` moves them out of what can be drawn."""
+    """Return displaced points (n, dim) [length]; FastcontactError if `scale` makes them too large to be drawn."""
     with np.errstate(all="ignore"):
         position = points + scale * displacement
         drawn = np.isfinite(scale) and (np.abs(position) < LARGEST).all()
@@ -129,9 +129,9 @@ def deformed_shape(
 def framed(
     axes: Any, drawn: Any, shown: Field, heading: str, units: Units, below: float, bar: float, labels: Sequence[str]
 ) -> Any:
-    """Give axes their colour bar, title, a label for each direction, and a legend that begins at a height [-]; return them.
+    """Add a colour bar, a title, a label for each direction, and a legend at height `below` [-] to axes; return them.
 
-    The colour bar is as long as a part `bar` of the room [-].
+    The colour bar takes the fraction `bar` of the available length [-].
     """
     caption, flat = labelled(shown.caption, units, shown.quantity), len(labels) == 2
     axes.figure.colorbar(drawn, ax=axes, label=caption, shrink=bar)
@@ -144,7 +144,7 @@ def framed(
 
 
 def _mark(axes: Any, shown: Field, points: Array, mesh: Mesh, units: Units, hidden: bool = False) -> None:
-    """Mark the extreme value: where it stands in the picture, and in another line where it was before the load."""
+    """Mark the extreme value with its deformed and undeformed positions."""
     before = mesh.points[shown.node[shown.extreme]]
     at, size = points[shown.extreme], float(np.ptp(points, axis=0).max())
     here, there = placed(at, size), placed(before, size)
@@ -157,7 +157,7 @@ def _draw(
 ) -> Any:  # fmt: skip
     """Draw the cells of a mesh in the plane at positions `nodes` (n_points, 2) in `colours` from one value to the other.
 
-    By default edges are drawn where there are few cells within the box around `box` (n, 2). Return what carries the colours.
+    By default edges are drawn if there are few cells within the box around `box` (n, 2). Return the artist with the colours.
     """
     from matplotlib.collections import PolyCollection
 

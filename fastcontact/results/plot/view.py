@@ -57,7 +57,7 @@ def view(results: Any, step: StepResult, *, scale: float = 1.0, title: str = "",
 
 
 def _has_display() -> bool:
-    """Return whether a window can be opened, as far as the environment tells."""
+    """Return whether the environment has a display for a window."""
     if sys.platform in ("win32", "darwin"):
         return True
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

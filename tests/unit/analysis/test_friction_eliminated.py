@@ -84,14 +84,6 @@ def test_what_fails_on_eliminated_constraints_is_solved_on_their_compliance(monk
     assert np.abs(one.displacement - other.displacement).max() < 1e-7 * np.abs(one.displacement).max()
 
 
-def test_a_run_with_friction_goes_on_bit_for_bit_with_multigrid():
-    model, ramp = rubbing(), fc.linear_ramp(6)
-    states = []
-    whole = fc.solve(model, ramp, linear_solver="amg", on_step=states.append)
-    rest = fc.solve(model, ramp, linear_solver="amg", resume=states[:4])
-    np.testing.assert_array_equal(rest[-1].displacement, whole[-1].displacement)
-
-
 @pytest.mark.parametrize("n", [30, 5000])
 def test_conjugate_residuals_solve_what_is_not_symmetric_and_never_grow(n):
     rng = np.random.default_rng(n)

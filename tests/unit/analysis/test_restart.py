@@ -145,44 +145,6 @@ def test_two_bodies_in_axisymmetry(formulation, friction, solver):
 
 
 @pytest.mark.parametrize("solver", ["direct", "amg"])
-@pytest.mark.parametrize("friction", [0.0, 0.3])
-@pytest.mark.parametrize("formulation", FORMULATIONS)
-def test_two_bodies_in_space(formulation, friction, solver):
-    def make():
-        return boxes(formulation, friction=friction)
-
-    check_resumed(make, fc.linear_ramp(3), FRICTION if friction else FRICTIONLESS, linear_solver=solver)
-
-
-@pytest.mark.parametrize("friction", [0.0, 0.3])
-def test_a_stiff_secondary_side_by_multigrid(friction):
-    def make():
-        parts = []
-        for side, divisions, z in (("L", (6, 6, 3), -5.0), ("U", (5, 5, 2), 0.0)):
-            part = box((10.0, 10.0, 5.0), divisions, "hex8", (0.0, 0.0, z))
-            parts.append(renamed(part, {name: f"{side}_{name}" for name in part.group_names}))
-        model = fc.Model(union(*parts), "3d")
-        model.add_material(fc.LinearElastic(E=1000.0, nu=0.3), groups=["L_BOX"])
-        model.add_material(fc.LinearElastic(E=1e5, nu=0.3), groups=["U_BOX"])
-        model.fix("L_ZMIN", "xyz")
-        model.prescribe("U_ZMAX", x=0.02, y=0.0, z=-0.04)
-        model.add_contact("pair", secondary="U_ZMIN", primary="L_ZMAX", friction=friction)
-        return model
-
-    whole = check_resumed(make, fc.linear_ramp(3), FRICTION if friction else FRICTIONLESS, linear_solver="amg")
-    assert not any("gave up" in text for text in whole[-1].warnings)
-
-
-@pytest.mark.parametrize("friction", [0.0, 0.3])
-@pytest.mark.parametrize("penalty", [1e3, 1e6])
-def test_a_penalty_by_multigrid(penalty, friction):
-    def make():
-        return boxes("node_to_segment", friction=friction, penalty=penalty)
-
-    check_resumed(make, fc.linear_ramp(3), FRICTION if friction else FRICTIONLESS, linear_solver="amg")
-
-
-@pytest.mark.parametrize("solver", ["direct", "amg"])
 @pytest.mark.parametrize("options", [{}, {"friction": 0.2}], ids=str)
 @pytest.mark.parametrize(("dim", "force"), [(2, True), (2, False), (3, True), (3, False)])
 def test_obstacles_that_move(dim, force, options, solver):
@@ -224,10 +186,6 @@ def test_steps_cut_in_halves(solver, updates, friction):
     options = {"linear_solver": solver, "criteria": Criteria(max_geometry_updates=updates, max_halvings=8)}
     whole = check_resumed(lambda: spheres(friction=friction), fc.linear_ramp(2), FRICTION, after=(1,), **options)
     assert any("substeps" in step.iterations for step in whole)
-
-
-def test_after_every_step():
-    check_resumed(lambda: spheres("continuous"), UP_AND_DOWN, FRICTIONLESS, after=(1, 2, 3, 4), linear_solver="amg")
 
 
 def test_bodies_on_springs():

@@ -74,6 +74,7 @@ def side_by_side(element="tri6", unit=(1000.0, 1.0), **options):
     return model
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("unit", [(1000.0, 1.0), (2e11, 1e-3)], ids=["N-mm", "N-m"])
 @pytest.mark.parametrize("element", ["tri6", "quad8"])
 def test_bilateral_contact_of_quadratic_facets_settles(element, unit):

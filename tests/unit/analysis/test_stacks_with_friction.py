@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from models import elastic_model
+from pairwise import first_of
 
 import fastcontact as fc
 from fastcontact.analysis.load_step import load_step
@@ -40,7 +41,9 @@ def solved(model, name):
 
 
 # Exact solutions in each step of Newton's method took 418, 851 and 1017 iterations.
-@pytest.mark.parametrize(("element", "divisions", "most"), [("hex8", (4, 5, 4), 300), ("hex20", (3, 4, 3), 620)])
+@pytest.mark.parametrize(
+    ("element", "divisions", "most"), first_of(1, [("hex8", (4, 5, 4), 300), ("hex20", (3, 4, 3), 620)])
+)
 def test_newtons_method_solves_no_more_exactly_than_the_friction_law_holds(element, divisions, most):
     model = stack(element, divisions)
     solver, found = solved(model, "amg")

@@ -5,8 +5,6 @@ import os
 import shutil
 import subprocess
 import sys
-import threading
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -237,7 +235,7 @@ def test_a_pipe_is_no_result_file(whole, path, capsys):
 
 
 @pytest.mark.skipif(importlib.util.find_spec("resource") is None, reason="needs resource limits")
-@pytest.mark.parametrize("extra", [[], ["--resume"]], ids=["anew", "resumed"])
+@pytest.mark.parametrize("extra", [pytest.param([], marks=pytest.mark.slow), ["--resume"]], ids=["anew", "resumed"])
 def test_a_disk_that_is_full_stops_the_run(extra, whole, path, capsys, monkeypatch):
     """Simulated by a limit for the size of files."""
     import resource
@@ -277,27 +275,6 @@ def test_a_full_disk_stops_the_run_before_anything_is_replaced(whole, small_disk
     assert path.read_bytes() == before
     assert_same(path, steps)
     assert sorted(os.listdir(small_disk)) == ["other", path.name]
-
-
-@pytest.mark.slow
-def test_two_runs_begun_at_once_leave_one_good_file(whole, path):
-    case, steps = whole
-    command = [sys.executable, "-m", "fastcontact", "run", str(case), "-q", "-o", str(path)]
-    found = []
-    threads = [
-        threading.Thread(target=lambda: found.append(subprocess.run(command, capture_output=True, text=True)))
-        for _ in range(2)
-    ]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert {done.returncode for done in found} <= {0, 1}
-    assert any(done.returncode == 0 for done in found)
-    refused = [only_line(done.stderr) for done in found if done.returncode]
-    assert all(line.startswith(f"error: '{path}' is being written by process ") for line in refused)
-    assert_same(path, steps)
-    assert os.listdir(Path(path).parent) == [path.name]
 
 
 def test_the_progress_of_a_resumed_run_counts_what_it_solves(whole, capsys, monkeypatch):

@@ -159,6 +159,7 @@ def test_pure_bending_is_exact_with_quadratic_cells(element):
     assert np.abs(step.stress - expected).max() < 1e-9 * np.abs(expected).max()
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("linear_solver", ["direct", "amg"])
 @pytest.mark.parametrize("element", SOLIDS)
 def test_bar_in_tension_is_exact(element, linear_solver):

@@ -143,6 +143,7 @@ def test_nothing_but_rigid_motion_is_free(name, kinematics, divisions):
     assert values[n] > 0.2 * plain[n]  # as stiff as an element that cannot lock, but for the deviatoric part of nu
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("linear_solver", ["direct", "amg"])
 @pytest.mark.parametrize("name", SOLIDS)
 def test_patch_test_through_the_solver(name, linear_solver):

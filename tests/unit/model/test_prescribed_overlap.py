@@ -44,6 +44,7 @@ def test_a_side_pushed_into_a_floor_is_refused(mesh, kinematics, side, formulati
         model.check()
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 @pytest.mark.parametrize("sides", [("CONT_UPPER", "CONT_LOWER"), ("CONT_LOWER", "CONT_UPPER")])

@@ -9,7 +9,6 @@ import os
 import subprocess
 import sys
 import tempfile
-import textwrap
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -443,76 +442,6 @@ def test_a_step_interrupted_half_way_can_be_written_again(path: Path, monkeypatc
     results = open_results(path)
     assert len(results) == 2
     assert_same(results[1], step_result(1))
-
-
-KILLED = """
-    import os, random, signal, sys, time
-    sys.path.insert(0, sys.argv[1])
-    from test_result_files import MESH, ResultWriter, nth_step
-    for trial in range(4):
-        path = f"{sys.argv[2]}/killed{trial}.vtkhdf"
-        acknowledged = os.open(path + ".count", os.O_CREAT | os.O_RDWR)
-        child = os.fork()
-        if child == 0:
-            out, number = ResultWriter(path, MESH), 0
-            while True:
-                out.write(nth_step(number))
-                os.write(acknowledged, b".")
-                number += 1
-        while os.fstat(acknowledged).st_size < 2 * trial:  # steps, whatever time they take
-            assert os.waitpid(child, os.WNOHANG) == (0, 0), "the writer ended by itself"
-            time.sleep(0.001)
-        time.sleep(0.02 * random.random())
-        os.kill(child, signal.SIGKILL)
-        os.waitpid(child, 0)
-"""
-
-
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork and SIGKILL")
-def test_kill_9_costs_no_finished_step(tmp_path: Path) -> None:
-    here = str(Path(__file__).parent)
-    subprocess.run([sys.executable, "-c", textwrap.dedent(KILLED), here, str(tmp_path)], check=True)
-    total = 0
-    for trial in range(4):
-        path = tmp_path / f"killed{trial}.vtkhdf"
-        finished = (tmp_path / f"killed{trial}.vtkhdf.count").stat().st_size
-        if not path.exists():
-            assert finished == 0
-            continue
-        with open_results(path) as results:
-            assert finished <= len(results) <= finished + 1
-            for number, step in enumerate(results):
-                assert_same(step, nth_step(number), f"trial {trial}, step {number}")
-        total += finished
-        write(path, 1)  # the dead writer's lock does not bar the way
-    assert total > 6, "the writers must have come to write something"
-
-
-FULL = """
-    import resource, signal, sys
-    sys.path.insert(0, sys.argv[1])
-    from test_result_files import MESH, ResultWriter, nth_step
-    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, 1_000_000))
-    with ResultWriter(sys.argv[2], MESH) as out:
-        for number in range(1000):
-            out.write(nth_step(number))
-"""
-
-
-@pytest.mark.skipif(importlib.util.find_spec("resource") is None, reason="needs resource limits")
-def test_a_full_disk_costs_no_finished_step(path: Path) -> None:
-    command = [sys.executable, "-c", textwrap.dedent(FULL), str(Path(__file__).parent), str(path)]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 1, "an exception, and no crash of HDF5"
-    last = done.stderr.strip().splitlines()[-1]
-    assert "cannot be written at step" in last
-    assert "see whether the disk is full" in last
-    results = open_results(path)
-    assert f"{len(results)} steps are complete" in last
-    assert len(results) > 3
-    for number, step in enumerate(results):
-        assert_same(step, nth_step(number))
 
 
 def test_an_old_file_stays_until_the_new_one_is_begun(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,9 +6,6 @@ import contextlib
 import dataclasses
 import os
 import shutil
-import subprocess
-import sys
-import textwrap
 from pathlib import Path
 
 import numpy as np
@@ -73,7 +70,7 @@ def recorded(path: Path, n_steps: int, monkeypatch: pytest.MonkeyPatch) -> tuple
     return writes, ends
 
 
-@pytest.mark.parametrize("apart", [4, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("apart", [12, pytest.param(1, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("n_steps", "from_step"), [(2, 0), (65, 64)])
 def test_every_write_may_be_the_last_one(
     n_steps: int, from_step: int, apart: int, path: Path, monkeypatch: pytest.MonkeyPatch
@@ -356,25 +353,6 @@ FULL = """
     import test_resume as t
     t.resumed(t.Path(sys.argv[2]), t.fc.linear_ramp(60))
 """
-
-
-@pytest.mark.slow  # by default `test_a_disk_that_is_full_stops_the_run`, where a limit stands for the end of the disk
-def test_a_full_disk_costs_no_step_and_the_run_goes_on_when_there_is_room(small_disk: Path, path: Path) -> None:
-    full = small_disk / "run.vtkhdf"
-    command = [sys.executable, "-c", textwrap.dedent(FULL), str(Path(__file__).parent), str(full)]
-    done = subprocess.run(command, capture_output=True, text=True)
-    last = done.stderr.strip().splitlines()[-1]
-    assert done.returncode == 1
-    assert f"'{full}' cannot be written at step" in last
-    assert "No space left on device" in last
-    n_steps = len(open_results(full))
-    assert f"{n_steps} steps are complete: see whether the disk is full" in last
-    assert 0 < n_steps < 60
-    shutil.copy(full, path)
-    assert len(resumed(path, fc.linear_ramp(60))) == 60
-    whole = fc.solve(spheres(), fc.linear_ramp(60))[-1]
-    last_step = open_results(path)[-1]
-    assert np.abs(last_step.displacement - whole.displacement).max() <= 1e-12 * np.abs(whole.displacement).max()
 
 
 # ---------------------------------------------------------------------------------------------- packing

@@ -66,6 +66,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 def test_an_mpi_process_that_dies_ends_the_study(case, tmp_path, mpiexec):
     script = tmp_path / "dying.py"
     script.write_text(DYING)

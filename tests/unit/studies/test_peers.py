@@ -40,6 +40,7 @@ def fake(tmp_path, reaction):
     return path
 
 
+@pytest.mark.slow
 def test_our_own_column(tmp_path):
     text, figures = run(tmp_path, "forma04", "--only", "fastcontact")
     (found,) = figures["runs"]
@@ -74,28 +75,6 @@ def test_peers_that_cannot_run_say_so(tmp_path):
     (found,) = figures["runs"]
     assert found["status"] == 3
     assert "answer" not in found
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("problem", "peer", "tolerance"),
-    [
-        ("forma04", "getfem", 0.03),  # contact geometry at rest
-        ("forma04", "getfem-deformed", 0.01),
-        ("forma04", "calculix", 0.01),
-        ("forma04", "kratos", 0.03),  # another weight of the gap
-        ("half", "dolfinx", 1e-6),  # the same discrete problem
-        ("octant", "dolfinx", 1e-6),
-    ],
-)
-def test_peers_that_are_there_agree(tmp_path, problem, peer, tolerance):
-    _, figures = run(tmp_path, problem, "--only", "fastcontact", peer)
-    if figures["absent"]:
-        pytest.skip(f"{peer} is not installed: {figures['absent'][peer]}")
-    ours, theirs = figures["runs"]
-    assert theirs["status"] == 0, theirs["said"]
-    assert theirs["n_dofs"] == ours["n_dofs"]
-    assert theirs["answer"]["force"] == pytest.approx(ours["answer"]["force"], rel=tolerance)
 
 
 def test_a_process_beyond_its_limit_is_ended(tmp_path):

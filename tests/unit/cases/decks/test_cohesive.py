@@ -52,6 +52,7 @@ def traction(sliding, opening, criterion="QUADS", mode="BK"):
     return -kept * K * np.array([sliding, opening])
 
 
+@pytest.mark.each_value
 @pytest.mark.filterwarnings("ignore:hex8 cells are too stiff")
 @pytest.mark.parametrize("criterion", ["QUADS", "MAXS"])
 @pytest.mark.parametrize("mode", ["BK", "POWER LAW"])

@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from pairwise import first_of
 
 import fastcontact as fc
 from fastcontact import topology
@@ -144,7 +145,7 @@ def test_default_triangles_are_as_many_and_as_short_as_those_of_the_reference_me
     assert quality.largest_angle < 105.0
 
 
-@pytest.mark.parametrize("size", [50.0, 23.0, 10.0, 7.3, 4.0, 2.5, 1.25])
+@pytest.mark.parametrize("size", first_of(6, [50.0, 23.0, 10.0, 7.3, 4.0, 2.5, 1.25]))
 def test_no_edge_is_longer_than_the_size_and_no_angle_small(size):
     mesh = quarter_disc(size=size)
     quality = fc.quality(mesh)

@@ -60,6 +60,7 @@ def polygon(corners, spacing):
     return filled("BODY", sides, spacing)
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize(
     "corners",
     [
