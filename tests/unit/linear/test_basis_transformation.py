@@ -1,4 +1,4 @@
-"""Equations of the corners of quadratic facets: eliminated along functions that are linear on facets."""
+"""Constraints of corners of quadratic facets, eliminated along functions that are linear on facets."""
 
 import numpy as np
 import pytest
