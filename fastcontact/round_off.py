@@ -13,5 +13,8 @@ LENGTH_ROUND_OFF = 1e-9
 SINGLE_PRECISION = 1e-6
 # Of a sum, in units of the sum of the sizes of its terms.
 SUM_ROUND_OFF = 16 * float(np.finfo(float).eps)
+# Step of central differences, relative to the size of the argument: their error of second order is then about what round-off
+# makes of them.
+DIFFERENCES = float(np.finfo(float).eps) ** (1.0 / 3.0)
 # In place of a divisor that may be zero.
 TINY = 1e-300

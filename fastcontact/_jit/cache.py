@@ -125,12 +125,13 @@ def keep(kernel: Any, function: Callable[..., Any], options: str) -> str:
         return f"others may write to the folder of compiled kernels, {folder}"
     name = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}"
     files[function] = numbas._cache_file = KernelFiles(folder, name, function, options, numbas._cache_file)
-    numbas.load_overload = partial(_loaded, numbas)
+    if hasattr(numbas, "_load_overload"):  # not a public name of Numba
+        numbas.load_overload = partial(_loaded, numbas)
     return ""
 
 
 def _loaded(numbas: Any, signature: Any, target: Any) -> Any:
-    """Return a kernel that is kept, or None; Numba's own method first loads what it compiles by: half of a warm start."""
+    """Return a cached kernel, or None, without the compiler that Numba's own method imports first (58 modules)."""
     rtsys.initialize(target)
     return numbas._load_overload(signature, target)
 

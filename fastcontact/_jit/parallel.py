@@ -13,9 +13,9 @@ from functools import lru_cache, wraps
 from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._jit import decorators
+from fastcontact.arrays import AnyArray
 
 Result = TypeVar("Result")
 Part = TypeVar("Part")
@@ -55,7 +55,7 @@ def on_one_blas_thread(function: Callable[Given, Result]) -> Callable[Given, Res
     return limited
 
 
-def read_only(numbers: NDArray[Any]) -> NDArray[Any]:
+def read_only(numbers: AnyArray) -> AnyArray:
     """Return a view that cannot be written, as the arrays of a mesh are: kernels are compiled for either kind."""
     view = numbers.view()
     view.flags.writeable = False

@@ -19,7 +19,7 @@ from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.scatter import Scatter, Watch
 from fastcontact.analysis.shared_nodes import SharedNodes
 from fastcontact.analysis.solution import Accuracy, Solution
-from fastcontact.analysis.tolerances import PATIENT_UPDATES, Tolerances
+from fastcontact.analysis.tolerances import Tolerances
 from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.errors import ConvergenceError
@@ -29,6 +29,8 @@ log = logging.getLogger("fastcontact")
 SEMISMOOTH_UPDATES = 8
 # Number of earlier geometries that are mixed into the next one.
 MIXED = 5
+# Pairings after which an iteration begins again from elsewhere, or with rounded edges: nodes flip between facets.
+PATIENT_UPDATES = 25
 
 
 @dataclass(frozen=True)
@@ -154,9 +156,9 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
         settled = SettledContact(constraints, solution, iterate)
         if not solution.settled or tolerances.inexact:
             watch.forget()
-        elif moved.change <= tolerances.enough(update, moved.size):
+        elif moved.change <= tolerances.enough(moved.size):
             return settled
-        elif scatter := watch.seen(fraction, settled.force, moved.change, moved.size, tolerances.noise(moved.size)):
+        elif scatter := watch.seen(fraction, settled.force, moved.change, moved.size):
             _log_scatter(scatter, problem.criteria.geometry)
             return replace(settled, scatter=scatter)
         mixed = None

@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csr_array, eye_array, kron
 
 from fastcontact._jit import parallel
 from fastcontact.analysis.active_dofs import ActiveDofs, SurfaceDofs
@@ -305,7 +304,6 @@ def prepare(
         driven.relations(model.relations),
         driven.without_stiffness,
     )
-    solver.basis_transformation = _basis_transformation(pairs.values(), K.shape[0], mesh.dim)
     contact_dofs = _contact_dofs(mesh, pairs, len(driven))
     involved = system.involved(contact_dofs)
     motions = floating_motions(model, supported)
@@ -374,17 +372,6 @@ def _contact_dofs(mesh: Any, pairs: Mapping[str, Formulation], n_driven: int) ->
     points = np.unique(np.concatenate(sides)) if sides else np.empty(0, np.intp)
     moved = mesh.n_points + np.arange(n_driven)
     return (np.concatenate([points, moved])[:, None].astype(np.intp) * mesh.dim + np.arange(mesh.dim)).ravel()
-
-
-def _basis_transformation(pairs: Iterable[Formulation], n: int, dim: int) -> csr_array | None:
-    """Return the `Formulation.basis_transformation` of all pairs as rows of displacement components (n, n)."""
-    total = None
-    for pair in pairs:
-        if (functions := pair.basis_transformation) is not None:
-            functions = csr_array(kron(functions, eye_array(dim), format="csr"))
-            functions.resize((n, n))
-            total = functions if total is None else csr_array(total.maximum(functions))
-    return total
 
 
 def near_nullspace(model: Model, displacement: Array | float = 0.0) -> Array:

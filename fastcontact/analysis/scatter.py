@@ -1,9 +1,9 @@
 """Attainable accuracy of the geometry loop: it ends where further changes are round-off.
 
-The level of round-off depends on the condition of the stiffness and of the constraints, which is unknown beforehand; the last
-displacements reveal it. An iteration that still converges, however slowly, proceeds in one direction: over a window the
-distance of its displacements is the sum of all changes. Round-off oscillates: the distance is hardly larger than one change.
-The same holds for residuals of iterative linear solutions, whose size is known.
+How much round-off there is depends on the condition of the stiffness and of the constraints, which nothing tells beforehand;
+the last displacements show it. An iteration that still converges, however slowly, goes on in one direction: over a window
+its displacements lie as far apart as all changes together. Round-off oscillates: they lie hardly farther apart than one
+change. So does what iterative linear solutions leave.
 """
 
 from __future__ import annotations
@@ -17,9 +17,7 @@ from fastcontact.arrays import Array
 
 # Number of updates in the window, and largest distance of their displacements over the typical change (WINDOW if collinear).
 WINDOW, APART = 8, 4.0
-# The same where changes may be residuals of linear solutions: fewer and closer (3 if collinear).
-SHORT_WINDOW, CLOSE = 4, 2.0
-# Largest accepted scatter: displacements over the largest one, nodal contact forces over the largest one.
+# What may scatter at most: displacements relative to the largest one, nodal contact forces relative to the largest one.
 DISPLACEMENT, FORCE = 1e-6, 1e-5
 # Changes below this fraction of those at the beginning of the window still converge.
 DECLINE = 0.5
@@ -49,8 +47,8 @@ class Watch:
         self._forces: list[Array] = []
         self._changes: list[float] = []
 
-    def seen(self, unknowns: Array, force: Array, change: float, size: float, noise: float = 0.0) -> Scatter | None:
-        """Add the displacements `unknowns` (k,) [length] and contact forces (n,) [force] of an update; return their scatter.
+    def seen(self, unknowns: Array, force: Array, change: float, size: float) -> Scatter | None:
+        """Take the displacements `unknowns` (k,) [length] and contact forces (n,) [force] of an update; return their scatter.
 
         Parameters
         ----------
@@ -58,9 +56,7 @@ class Watch:
         change : float
             Change of the displacements from the previous ones [length].
         size : float
-            Size of the displacements [length].
-        noise : float
-            Changes up to this may be residuals of an iterative linear solver [length].
+            Of the displacements [length].
 
         Returns
         -------
@@ -74,16 +70,12 @@ class Watch:
         self._forces.append(force.copy())
         self._changes.append(change)
         del self._parts[:-WINDOW], self._forces[:-WINDOW], self._changes[:-WINDOW]
-        last = self._changes[-SHORT_WINDOW:]
-        window, apart = (SHORT_WINDOW, CLOSE) if max(last) <= noise else (WINDOW, APART)
-        if len(self._changes) < window:
+        if len(self._changes) < WINDOW:
             return None
-        changes, half = self._changes[-window:], window // 2
-        scatter = Scatter(
-            _apart(self._parts[-window:]) / size, _apart(self._forces[-window:]) / (largest(force) or 1.0)
-        )
+        changes, half = self._changes, WINDOW // 2
+        scatter = Scatter(_apart(self._parts) / size, _apart(self._forces) / (largest(force) or 1.0))
         declining = np.median(changes[half:]) < DECLINE * np.median(changes[:half])
-        if declining or scatter.displacement * size > apart * float(np.median(changes)):
+        if declining or scatter.displacement * size > APART * float(np.median(changes)):
             return None
         return scatter if scatter.displacement <= DISPLACEMENT and scatter.force <= FORCE else None
 

@@ -26,9 +26,6 @@ from fastcontact.contact.constraints import Constraints, StackedConstraints
 from fastcontact.model.periodicity import PeriodicInterface
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# Gaps that differ by less than this fraction of the coordinates are equal.
-SAME_GAP = 64 * float(np.finfo(float).eps)
-
 
 @dataclass(frozen=True, eq=False)
 class SharedNodes:
@@ -258,7 +255,7 @@ def _alike(constraints: StackedConstraints) -> tuple[Indices, Indices, Indices]:
     if constraints.equality is not None:
         alike &= ~(constraints.equality[first] | constraints.equality[second])
     first, second = first[alike], second[alike]
-    level = constraints.gap0[second] - constraints.gap0[first] <= SAME_GAP * np.abs(constraints.positions).max()
+    level = constraints.gap0[second] - constraints.gap0[first] <= LENGTH_ROUND_OFF * np.abs(constraints.positions).max()
     yields = np.zeros(len(constraints), bool) if constraints.softness is None else constraints.softness > 0.0
     behind = np.setdiff1d(second[~level & ~yields[first]], [])
     first, second = first[level], second[level]

@@ -89,6 +89,12 @@ class Case:
     modes: dict[str, Any] | None = None
     deck: Deck | None = None
 
+    @property
+    def solution(self) -> dict[str, Any]:
+        """How the case is solved: keyword arguments of `solve`."""
+        chosen = {"linear_solver": self.linear_solver, "linear_tolerance": self.linear_tolerance}
+        return {**chosen, "criteria": self.criteria}
+
     def finished(self, step: StepResult) -> StepResult:
         """Return a step of the model as in results; for a deck with forces for the whole thickness."""
         return step if self.deck is None else self.deck.finished(step)

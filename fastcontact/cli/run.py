@@ -152,14 +152,8 @@ def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[int,
         total = len(steps) + len(remaining(case.ramp, last))
         progress = Progress(total, show=somebody_watches() and not options.quiet, done=len(steps))
         try:
-            for last in solve_steps(
-                case.model,
-                case.ramp,
-                linear_solver=options.linear or case.linear_solver,
-                linear_tolerance=case.linear_tolerance,
-                criteria=case.criteria,
-                resume=writer.done,
-            ):
+            chosen = {**case.solution, "linear_solver": options.linear or case.linear_solver}
+            for last in solve_steps(case.model, case.ramp, **chosen, resume=writer.done):
                 last = case.finished(last)
                 writer.write(_estimated(case.model, last) if fields else last)
                 steps.append(of_step(last))

@@ -23,13 +23,11 @@ from fastcontact.contact.surface import Surface
 from fastcontact.linear.sparse_rows import Entries, rows_of
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import weighted_area_vectors
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 # A force independent of the gap is represented with this small slope: it vanishes at this multiple of the length of the side.
 FAR = 1e6
-# Gaps below this fraction of the length of the side are closed; pressures that differ by less, relatively, are equal.
-CLOSED, ALIKE = 1e-10, 1e-9
-# Mean gaps beside the edge of the contact, where points between nodes are closed, may be this far below zero, in facet
-# lengths.
+# Mean gaps beside the edge of the contact, of which places between nodes are closed, may be so much below zero, in facets.
 EDGE = 0.01
 
 
@@ -118,13 +116,13 @@ def wetted(constraints: Constraints, at: Configuration, areas: AreaVectors, sour
     gaps = constraints.gaps(at.displacement)
     nodal, node = constraints.nodal.weighted_gaps(np.where(constraints.usable, gaps, np.inf))
     if at.pressure is None:
-        passable = nodal > CLOSED * size
+        passable = nodal > LENGTH_ROUND_OFF * size
     else:
         # A node under contact pressure is tight, even if the closed points lie beside it.
         # Contact pressures are forces per reference area.
         nominal = at.fluid_pressure * (1.0 if at.linearised is None else np.linalg.norm(vectors, axis=1))
         facet = size / side.n_facets ** (1.0 / (points.shape[1] - 1))
-        passable = (nodal > -EDGE * facet) & (at.pressure <= (1.0 + ALIKE) * nominal)
+        passable = (nodal > -EDGE * facet) & (at.pressure <= (1.0 + LENGTH_ROUND_OFF) * nominal)
     nodes = reached(side, source, passable)
     rows = nodes[node] & constraints.usable
     far = FAR * size

@@ -2,11 +2,12 @@
 """Projection of points on a curve in the plane along normals interpolated between its nodes."""
 
 from fastcontact._jit.decorators import interpretable_kernel, kernel
+from fastcontact.contact.projection_kernels import BEYOND
 from fastcontact.contact.search.projection_3d_kernels import MAX_ITERATIONS, STEP
 
 MOST_FACETS = 8
-# A projection farther beyond its facet than this, in reference coordinates, is rejected.
-FAR = 3.0
+# Reference coordinate of a projection that ends too far beyond its facet.
+FAR = 1.0 + 2.0 * BEYOND
 
 
 @kernel

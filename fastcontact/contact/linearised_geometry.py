@@ -36,9 +36,7 @@ from fastcontact.contact.projection import (
 from fastcontact.contact.surface import Surface
 from fastcontact.linear.sparse_rows import shapes_at
 from fastcontact.mesh import elements
-
-# Step of the finite differences of an obstacle's normals over the size of the model; their error is then 1e-10.
-MOVED = 1e-6
+from fastcontact.round_off import DIFFERENCES
 
 
 class Linearised(Protocol):
@@ -212,7 +210,7 @@ class _ObstaclePoints:
         gap, self.normal, paired, _ = obstacle.facing(x, pose)
         self._gap = np.where(paired, gap, 0.0)[:, None]
         self.apart = self._gap * self.normal
-        step = MOVED * float(np.ptp(coordinates, axis=0).max())
+        step = DIFFERENCES * float(np.ptp(coordinates, axis=0).max())
         sides = [[obstacle.facing(x + sign * step * axis, pose)[1] for sign in (1, -1)] for axis in np.eye(x.shape[1])]
         self._gradient = np.stack([ahead - behind for ahead, behind in sides], axis=2) / (2.0 * step)
         self._gradient[~np.isfinite(self._gradient)] = 0.0

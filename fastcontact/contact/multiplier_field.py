@@ -13,10 +13,8 @@ from scipy.sparse.linalg import SuperLU
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ContactError
+from fastcontact.linear.delassus import MOST_ROWS
 from fastcontact.linear.field_compliance import FieldCompliance
-
-# Largest number of closed integration points for the dense equations of the continuous formulation: about a minute.
-MOST_POINTS = 10_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,8 +45,8 @@ class Projection:
     quadratic: bool = False
 
     def block(self, rows: Indices) -> Array:
-        """Return rows and columns `rows` of C, a dense matrix; ContactError if it would be too large."""
-        if len(rows) > MOST_POINTS:
+        """Return rows and columns `rows` of C, a dense matrix; ContactError where it would be too large to be of use."""
+        if len(rows) > MOST_ROWS:
             raise ContactError(
                 f"the continuous formulation closes {len(rows)} integration points at once, whose compliance would be a "
                 f"dense matrix of {8e-9 * len(rows) ** 2:.1f} GB: use formulation='mortar' with "

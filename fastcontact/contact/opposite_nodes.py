@@ -6,12 +6,12 @@ import numpy as np
 
 from fastcontact.arrays import Array
 from fastcontact.contact.projection import places
-from fastcontact.contact.search.closest import closest_of_kinds
+from fastcontact.contact.search.closest import BESIDE, closest_of_kinds
 from fastcontact.contact.surface import Surface
 
-# In facet lengths: largest distance of a projection from an opposite node; largest gap, beyond the smallest one, of
-# points that are compared; and their largest distance beyond an edge.
-OPPOSITE, NEAR, BESIDE = 0.2, 0.5, 0.05
+# In facet lengths: how far from a node a projection may lie and still be opposite to it; how much farther apart than
+# the closest points others may be and still tell whether the sides match.
+OPPOSITE, NEAR = 0.2, 0.5
 
 
 def opposite(secondary: Surface, primary: Surface, points: Array) -> bool:

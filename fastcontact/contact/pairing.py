@@ -23,7 +23,6 @@ from fastcontact.contact.projection import (
     places,
     smooth_normals,
 )
-from fastcontact.contact.projection_kernels import INSIDE
 from fastcontact.contact.search.closest import Closest, closest_of_kinds
 from fastcontact.contact.surface import Surface
 from fastcontact.mesh import elements
@@ -159,7 +158,7 @@ def pair(
     if normals == "facet" and not rounded:
         inner = _at_smooth_ends(primary, coordinates, closest)
         paired = closest.overhang <= np.where(inner, max(projection_tolerance, FOLDED), projection_tolerance)
-        outside = paired & ~inner & (closest.overhang > INSIDE)
+        outside = paired & ~inner & (closest.overhang > LENGTH_ROUND_OFF)
         return _straight_on(
             Pairing(closest.facet, closest.xi, closest.normal, paired), candidates, primary, coordinates, outside
         )
@@ -175,7 +174,7 @@ def pair(
         normal = _round_edges(primary, coordinates, facet, xi, normal)
     paired = overhang <= projection_tolerance
     return _straight_on(
-        Pairing(facet, xi, normal, paired), candidates, primary, coordinates, paired & (overhang > INSIDE)
+        Pairing(facet, xi, normal, paired), candidates, primary, coordinates, paired & (overhang > LENGTH_ROUND_OFF)
     )
 
 

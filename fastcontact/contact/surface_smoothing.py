@@ -28,11 +28,10 @@ from fastcontact.contact.search.closest import closest_of_kinds
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import flat_area_vectors
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# Heights below this fraction of the size of a facet, and curvatures below this fraction of its inverse, are rounding errors.
-FLAT = 1e-10
-# Columns of a fit are scaled by this factor per degree, and damped by this fraction of the smallest column: where nodes leave
-# terms undetermined, as on a strip one facet wide, the terms of low degree are preferred.
+# Columns of a fit are scaled by this with each degree, and its squares damped by this part of the least column: where nodes
+# leave terms undetermined, as on a strip one facet wide, those of low degree take all.
 LOWER, DAMPING = 0.1, 1e-5
 # Circles, spheres and cylinders are matched to (L / R)^(2 PASSES).
 PASSES = 3
@@ -170,7 +169,7 @@ def _neighbours(side: Surface, normal: Array) -> tuple[csr_array, Indices, Mask]
     at = np.repeat(np.arange(side.n_facets), size), nodes
     incidence = csr_array((np.ones(len(nodes)), at), shape=(side.n_facets, len(side.points)))
     i, j = (incidence @ incidence.T).tocoo().coords
-    smooth = np.einsum("nd,nd->n", normal[i], normal[j]) > np.cos(np.radians(CORNER)) - FLAT
+    smooth = np.einsum("nd,nd->n", normal[i], normal[j]) > np.cos(np.radians(CORNER)) - LENGTH_ROUND_OFF
     near = csr_array((np.ones(smooth.sum()), (i[smooth], j[smooth])), shape=(side.n_facets, side.n_facets))
     around = csr_array(near @ incidence)
     taken = np.arange(np.diff(around.indptr).max()) < np.diff(around.indptr)[:, None]
@@ -182,7 +181,7 @@ def _neighbours(side: Surface, normal: Array) -> tuple[csr_array, Indices, Mask]
 def _in_one_plane(points: Array) -> bool:
     """Return whether points (n, dim) lie in one plane."""
     away = points - points.mean(axis=0)
-    return bool(np.linalg.svd(away, compute_uv=False)[-1] <= FLAT * np.linalg.norm(away))
+    return bool(np.linalg.svd(away, compute_uv=False)[-1] <= LENGTH_ROUND_OFF * np.linalg.norm(away))
 
 
 def _flat(around: Array, taken: Mask) -> bool:
@@ -191,7 +190,7 @@ def _flat(around: Array, taken: Mask) -> bool:
     away = np.where(taken[:, :, None], around, 0.0)
     away = np.where(taken[:, :, None], away - (away.sum(axis=1) / count)[:, None], 0.0)
     least = np.linalg.eigvalsh(away.transpose(0, 2, 1) @ away)[:, 0]
-    return bool((least <= (FLAT * np.linalg.norm(away, axis=(1, 2))) ** 2).all())
+    return bool((least <= (LENGTH_ROUND_OFF * np.linalg.norm(away, axis=(1, 2))) ** 2).all())
 
 
 @dataclass(frozen=True, eq=False)
@@ -282,11 +281,11 @@ def _heights(block: FacetBlock, points: Array, smooth: _Fit) -> tuple[Array, Arr
     (xi, powers), (corners, _) = _lattice(element, k), smooth.in_planes(points[block.facets])
     shape = element.shape(xi)
     height = smooth.at(np.einsum("qk,nke->nqe", shape, corners)) - smooth.at(corners) @ shape.T
-    height = smooth.size[:, None] * np.where(np.abs(height) > FLAT, height, 0.0)
+    height = smooth.size[:, None] * np.where(np.abs(height) > LENGTH_ROUND_OFF, height, 0.0)
     heights = np.zeros((len(corners), k, k if element.dim == 2 else 1))
     heights[:, powers[0], powers[1]] = np.linalg.solve(_terms(xi, *powers), height.T).T
     curvature = smooth.in_the_middle()[1]
-    curvature = np.where(np.abs(curvature) > FLAT, curvature, 0.0) / smooth.size[:, None, None]
+    curvature = np.where(np.abs(curvature) > LENGTH_ROUND_OFF, curvature, 0.0) / smooth.size[:, None, None]
     return heights, curvature, smooth.axes[:, :-1]
 
 

@@ -79,6 +79,26 @@ def back_substitute(L, y):
 
 
 @kernel
+def add_products(factors, g, slots, c, mine, row, data):
+    """Add ``g^T diag(factors) g`` of a cell, `g` (m, n_nodes * dim), to the rows of the nodes that are `mine` in `data`.
+
+    `row` (n_nodes * dim,) is overwritten.
+    """
+    n_nodes, dim = len(mine), data.shape[1]
+    for a in range(n_nodes):
+        if not mine[a]:
+            continue
+        for i in range(dim):
+            row[:] = 0.0
+            for m in range(len(factors)):
+                for k in range(n_nodes * dim):
+                    row[k] += factors[m] * (g[m, dim * a + i] * g[m, k])
+            for b in range(n_nodes):
+                for j in range(dim):
+                    data[slots[c, a, b], i, j] += row[dim * b + j]
+
+
+@kernel
 def add_stiffness(points, cells, N, dN, weights, basis, bulk, material, axisymmetric, slots, owner, part, data):
     """Add the stiffness of the projected dilatation to `data` (n_blocks, dim, dim), in the rows of a part's nodes.
 
@@ -88,27 +108,16 @@ def add_stiffness(points, cells, N, dN, weights, basis, bulk, material, axisymme
     dim, size = points.shape[1], basis.shape[1]
     x, gradient = np.empty((n_nodes, dim)), np.empty((n_nodes, dim))
     J, inverse = np.empty((dim, dim)), np.empty((dim, dim))
-    mass, g = np.empty((size, size)), np.empty((size, n_nodes * dim))
+    mass, g, factors = np.empty((size, size)), np.empty((size, n_nodes * dim)), np.empty(size)
     row, mine = np.empty(n_nodes * dim), np.empty(n_nodes, np.bool_)
     for c in range(n_cells):
-        mean, rest = bulk[material[c], 0], bulk[material[c], 1]
-        if mean == 0.0 or not owned(cells, c, owner, part, mine):
+        factors[:], factors[0] = bulk[material[c], 1], bulk[material[c], 0]
+        if factors[0] == 0.0 or not owned(cells, c, owner, part, mine):
             continue
         at_nodes(points, cells, c, x)
         _integrate(x, N, dN, weights, basis, axisymmetric, J, inverse, gradient, mass, g)
         reduce(mass, g)
-        for a in range(n_nodes):
-            if not mine[a]:
-                continue
-            for i in range(dim):
-                for k in range(n_nodes * dim):
-                    row[k] = mean * (g[0, dim * a + i] * g[0, k])
-                for m in range(1, size):
-                    for k in range(n_nodes * dim):
-                        row[k] += rest * (g[m, dim * a + i] * g[m, k])
-                for b in range(n_nodes):
-                    for j in range(dim):
-                        data[slots[c, a, b], i, j] += row[dim * b + j]
+        add_products(factors, g, slots, c, mine, row, data)
 
 
 @kernel

@@ -75,29 +75,15 @@ def _integrate_products(x, slopes, weights, gradient, g):
 
 
 @kernel
-def _add_block(flat, at_upper, at_lower, upper, lower, k00, k01, k02, k10, k11, k12, k20, k21, k22):
-    """Add the block of a node pair if `at_upper`, and its transpose on the other side of the diagonal if `at_lower`."""
+def _add_block(flat, at_upper, at_lower, upper, lower, block):
+    """Add the `block` (9,) of a node pair if `at_upper`, and its transpose beyond the diagonal if `at_lower`."""
     u, v = 9 * upper, 9 * lower
     if at_upper:
-        flat[u] += k00
-        flat[u + 1] += k01
-        flat[u + 2] += k02
-        flat[u + 3] += k10
-        flat[u + 4] += k11
-        flat[u + 5] += k12
-        flat[u + 6] += k20
-        flat[u + 7] += k21
-        flat[u + 8] += k22
+        for k in range(9):
+            flat[u + k] += block[k]
     if u != v and at_lower:
-        flat[v] += k00
-        flat[v + 1] += k10
-        flat[v + 2] += k20
-        flat[v + 3] += k01
-        flat[v + 4] += k11
-        flat[v + 5] += k21
-        flat[v + 6] += k02
-        flat[v + 7] += k12
-        flat[v + 8] += k22
+        for k in range(9):
+            flat[v + k] += block[3 * (k % 3) + k // 3]
 
 
 @inlined_kernel
@@ -112,10 +98,8 @@ def _add_isotropic_block(flat, pair, at_upper, at_lower, upper, lower, coupling,
     k10, k20, k21 = coupling * yx + shear * xy, coupling * zx + shear * xz, coupling * zy + shear * yz
     if not pair:  # equal up to round-off; keeps K bitwise symmetric
         k10, k20, k21 = k01, k02, k12
-    _add_block(
-        flat, at_upper, at_lower, upper, lower,
-        both * xx + trace, k01, k02, k10, both * yy + trace, k12, k20, k21, both * zz + trace,
-    )  # fmt: skip
+    block = both * xx + trace, k01, k02, k10, both * yy + trace, k12, k20, k21, both * zz + trace
+    _add_block(flat, at_upper, at_lower, upper, lower, block)
 
 
 @kernel
@@ -146,10 +130,7 @@ def _add_general(g, tensor, products, block, slots, c, mine, flat):
                 block[row] = total
             if a == b:  # equal up to round-off; keeps K bitwise symmetric
                 block[3], block[6], block[7] = block[1], block[2], block[5]
-            _add_block(
-                flat, mine[a], mine[b], slots[c, a, b], slots[c, b, a],
-                block[0], block[1], block[2], block[3], block[4], block[5], block[6], block[7], block[8],
-            )  # fmt: skip
+            _add_block(flat, mine[a], mine[b], slots[c, a, b], slots[c, b, a], block)
 
 
 @kernel

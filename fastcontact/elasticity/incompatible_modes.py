@@ -14,9 +14,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fastcontact.arrays import Array, Mask
+from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.mesh import elements
 
 # Elements with incompatible modes, and the flag of the moduli that select them.
@@ -41,7 +40,7 @@ class Tables(NamedTuple):
     xi: Array
     weights: Array
     middle: Array
-    pairs: NDArray[np.int64]
+    pairs: Indices
 
 
 def tables(name: str) -> Tables:
@@ -51,8 +50,8 @@ def tables(name: str) -> Tables:
     return Tables(dN, element.quadrature[0], weights, element.gradient(np.zeros((1, element.dim))), PAIRS[element.dim])
 
 
-def asked(name: str, treatment: NDArray[np.generic] | None) -> Mask | None:
-    """Return which moduli (n_moduli,) have modes in an element; None if none has."""
+def asked(name: str, treatment: AnyArray | None) -> Mask | None:
+    """Return which moduli (n_moduli,) have modes in an element; None where none has."""
     if treatment is None or name not in BENDING:
         return None
     bends = (np.asarray(treatment).astype(np.uint8) & MODES) > 0

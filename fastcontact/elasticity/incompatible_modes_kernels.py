@@ -15,7 +15,7 @@ stiffness.
 import numpy as np
 
 from fastcontact._jit.decorators import kernel
-from fastcontact.elasticity.dilatation_kernels import back_substitute, reduce
+from fastcontact.elasticity.dilatation_kernels import add_products, back_substitute, reduce
 from fastcontact.elasticity.element_2d_kernels import owned
 from fastcontact.mesh.jacobian_kernels import at_nodes, gradients, inverse_jacobian
 
@@ -85,24 +85,14 @@ def subtract_stiffness(
     dim = points.shape[1]
     n_modes = 4 if dim == 2 else 13
     x, row, mine = np.empty((n_nodes, dim)), np.empty(n_nodes * dim), np.empty(n_nodes, np.bool_)
-    own, mixed = np.empty((n_modes, n_modes)), np.empty((n_modes, n_nodes * dim))
+    own, mixed, factors = np.empty((n_modes, n_modes)), np.empty((n_modes, n_nodes * dim)), np.full(n_modes, -1.0)
     for c in range(n_cells):
         if not bends[material[c, 0]] or not owned(cells, c, owner, part, mine):
             continue
         at_nodes(points, cells, c, x)
         _integrate(x, dN, xi, weights, middle, pairs, moduli, material[c], own, mixed)
         reduce(own, mixed)
-        for a in range(n_nodes):
-            if not mine[a]:
-                continue
-            for i in range(dim):
-                row[:] = 0.0
-                for m in range(n_modes):
-                    for k in range(n_nodes * dim):
-                        row[k] += mixed[m, dim * a + i] * mixed[m, k]
-                for b in range(n_nodes):
-                    for j in range(dim):
-                        data[slots[c, a, b], i, j] -= row[dim * b + j]
+        add_products(factors, mixed, slots, c, mine, row, data)
 
 
 @kernel

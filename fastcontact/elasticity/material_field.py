@@ -8,9 +8,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fastcontact.arrays import Array, Mask, Numbers
+from fastcontact.arrays import AnyArray, Array, Mask, Numbers
 from fastcontact.elasticity.incompatible_modes import MODES
 from fastcontact.elasticity.initial_states import InitialState, StressOffset
 from fastcontact.elasticity.materials import MODULI, Material
@@ -90,8 +89,8 @@ class MaterialField:
         return np.asarray(averaged[self.owner] & (self.kinematics != "plane_stress"))
 
     @cached_property
-    def treatment(self) -> NDArray[np.uint8]:
-        """Modification of the strain for each of the moduli (n_moduli,): 1 mean dilatation, 2 incompatible modes, 0 none.
+    def treatment(self) -> AnyArray:
+        """What elements make of the strain, by moduli (n_moduli,): 1 a mean dilatation, 2 incompatible modes, 0 nothing.
 
         Their sum means incompatible modes in the elements that have them, and a mean dilatation in others. Axisymmetric cells
         have no incompatible modes.

@@ -10,10 +10,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array, diags_array, vstack
 
-from fastcontact.arrays import Array
+from fastcontact.arrays import AnyArray, Array
 from fastcontact.errors import ModelError
 from fastcontact.linear.sparse_rows import nodal_rows, sum_of_blocks
 from fastcontact.round_off import ROUND_OFF
@@ -49,7 +48,7 @@ class Springs:
 
 def grounded(
     name: str,
-    nodes: NDArray[np.integer],
+    nodes: AnyArray,
     stiffness: Mapping[int, float],
     n_dofs: int,
     dim: int,
@@ -68,7 +67,7 @@ def grounded(
 def joined(
     name: str,
     points: Array,
-    ends: tuple[NDArray[np.integer], NDArray[np.integer]],
+    ends: tuple[AnyArray, AnyArray],
     stiffness: Mapping[int, float],
     along: Mapping[str, float],
     direction: Array | None = None,

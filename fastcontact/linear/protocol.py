@@ -146,26 +146,18 @@ class LinearSolver(Protocol):
     asked : float, optional
         The original tolerance, if `improve` has lowered it [-].
     counters : Counters
-    error : float
-        Difference of solutions for nearly the same right-hand side, relative to their largest component, however small
-        `tolerance` is [-].
     gave_up : str
         Reason why another method replaced this one; empty if none did.
     contrast : float
-        Ratio of the largest to the smallest stiffness among the deformations of a cell: relative errors of displacements may
-        exceed residuals by this factor, by which inexact iterations are therefore continued [-].
-    basis_transformation : csr_array (n, n), optional
-        Rows of mid nodes of quadratic facets: their displacements for unit displacements of corners, if gaps are
-        weighted with functions that are linear on facets. A hint which motions to eliminate [-].
+        By how much some deformations of a cell are stiffer than others: errors of displacements may exceed residuals by so
+        much, and iterations that need not end with exact solutions go on by so much further [-].
     """
 
     tolerance: float
     counters: Counters
     asked: float | None = None
-    error: float = 0.0
     gave_up: str = ""
     contrast: float = 1.0
-    basis_transformation: csr_array | None = None
 
     @property
     def iterative(self) -> bool:

@@ -10,7 +10,6 @@ from typing import Concatenate, ParamSpec, TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
@@ -92,8 +91,8 @@ def _check_folds(mesh: Mesh) -> None:
         )
 
 
-def _direction(facets: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return three nodes (n, 3) that identify facets and their orientation: the lowest, the next, the last."""
+def _direction(facets: Indices) -> Indices:
+    """Return three nodes (n, 3) by which facets and their orientation differ: the lowest, the next, the last."""
     first = facets.argmin(axis=1)
     rows, count = np.arange(len(facets)), facets.shape[1]
     # The orientation of a line is the order of its two ends.

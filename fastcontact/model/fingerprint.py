@@ -142,13 +142,15 @@ def _take_object(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: A
     """Add a description with fields, an obstacle or a function."""
     add(type(value).__qualname__.encode())
     points = _points_of(value, mesh, points)
-    fields = [field for field in dataclasses.fields(value) if field.init] if dataclasses.is_dataclass(value) else []
+    is_material = isinstance(value, Material)
+    fields = list(dataclasses.fields(value)) if dataclasses.is_dataclass(value) else []
+    fields = [field for field in fields if field.init or is_material]
     if hasattr(value, "distance"):
         _take(list(value.distance(points)), add, mesh, points)
         fields = [field for field in fields if not callable(getattr(value, field.name))]
     elif not fields and callable(value):
         _take(_called(value, points), add, mesh, points)
-    if isinstance(value, Material):  # densities and expansions that are not given are left out, as in older files
+    if is_material:  # a density or expansion that is not given counts as little as in older files
         fields = [field for field in fields if getattr(value, field.name) is not None]
         fields = [field for field in fields if field.name != "incompatible_modes"]
     if isinstance(value, (ContactPair, Support)) and value.rotation is None:  # likewise

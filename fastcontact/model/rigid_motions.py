@@ -9,11 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import block_diag
 from scipy.sparse import csr_array, vstack
 
-from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.stiffness import rigid_modes
 from fastcontact.errors import ModelError
@@ -81,8 +80,8 @@ class FreeMotions:
         return [(body, " with ".join(motions)) for body, motions in mixed.items()]
 
 
-def body_name(mesh: Mesh, body: NDArray[np.integer], number: int) -> str:
-    """Return the name of a body, given the body of each point: the cell group that equals it, or its number."""
+def body_name(mesh: Mesh, body: AnyArray, number: int) -> str:
+    """Return a name for a body, given that of each point: a cell group whose solid cells are all of it, or its number."""
     members = np.flatnonzero(body == number)
     return _group_of(mesh, members) or f"number {number + 1} (around {mesh.points[members].mean(axis=0)})"
 

@@ -20,6 +20,7 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.cell_stress import CellStress, beside
 from fastcontact.elasticity.energy import cell_volumes, elastic_energy, integration_rule
 from fastcontact.elasticity.initial_states import StressOffset
+from fastcontact.elasticity.loads import check_solids, solid_rows
 from fastcontact.errors import ModelError
 from fastcontact.mesh import elements
 from fastcontact.mesh.elements import Element
@@ -137,25 +138,14 @@ def error_against(
         )
     if n_points is not None and n_points < 1:
         raise ModelError(f"n_points = {n_points} points along each direction of a cell must be at least 1")
-    chosen = _rows(model, (groups,) if isinstance(groups, str) else groups)
+    names = (groups,) if isinstance(groups, str) else groups
+    check_solids(model.mesh, names, " to integrate over")
     offset = model.material_field().offset(rise, [(1.0, state) for state in model.initial_states], model.mesh.n_points)
     total = np.zeros(4)
-    for name, rows in chosen.items():
+    for name, rows in solid_rows(model.mesh, names).items():
         for rows_of_part in _portions(rows, elements.get(name), n_points):
             total += _squares(theory, model, u, name, rows_of_part, n_points, offset)
     return ErrorNorms(*(math.sqrt(square) for square in total))
-
-
-def _rows(model: Model, groups: Sequence[str] | None) -> dict[str, Indices]:
-    """Return, by solid element, the cells to integrate over."""
-    mesh = model.mesh
-    if groups is None:
-        return {name: np.arange(len(block)) for name, block in mesh.solids.items()}
-    for group in groups:
-        if not mesh.cells_of(group, dim=mesh.dim):
-            raise ModelError(f"group '{group}' holds no solid cells to integrate over")
-    cells = np.unique(np.concatenate([mesh.cell_groups[group] for group in groups]))
-    return {name: rows for name, rows in mesh.split(cells).items() if name in mesh.solids}
 
 
 def _portions(rows: Indices, element: Element, n_points: int | None) -> Iterator[Indices]:

@@ -218,14 +218,7 @@ def fields_of(kind: type, result: dict[str, Any]) -> dict[str, Any]:
 
 def last_step(case: Case) -> StepResult:
     """Solve a case and return its last step; no earlier one is kept in memory."""
-    steps = solve_steps(
-        case.model,
-        case.ramp,
-        linear_solver=case.linear_solver,
-        linear_tolerance=case.linear_tolerance,
-        criteria=case.criteria,
-    )
-    return deque(steps, maxlen=1).pop()
+    return deque(solve_steps(case.model, case.ramp, **case.solution), maxlen=1).pop()
 
 
 def profile(last: StepResult, pair: str | None) -> dict[str, list[float]]:

@@ -133,8 +133,6 @@ INTERFACES = [
     ({"element": "tet4"}, 3.5),
     ({"element": "tet10", "divisions": 6}, 4.0),
     ({"element": "hex20", "divisions": 6}, 4.0),
-    ({"element": "tet10", "divisions": 6, "multipliers": "standard"}, 4.0),
-    ({"element": "hex20", "divisions": 6, "multipliers": "standard"}, 4.0),
     ({"curvature": 0.02}, 3.5),
     ({"stretch": 20.0}, 3.5),
 ]

@@ -25,11 +25,10 @@ from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ModelError
+from fastcontact.round_off import DIFFERENCES
 
 REMEDY = "Take another load a little off this one, or differences of two solutions to either side"
-# Step of the displacements over the shortest edge: the error of central differences is then about 1e-10.
-MOVED = 1e-5
-# Step of constants and forces, relative to the admissible range or to the largest one.
+# By how much constants and forces are changed, relative to what is allowed, or to the largest.
 CHANGED = 1e-3
 # Largest difference of one-sided derivatives where they are smooth, over the effect of rotating a facet by an edge.
 SMOOTH = 1e-3
@@ -141,7 +140,7 @@ class MovingContact:
         for block in (block for side in self._surfaces() for block in side.blocks):
             corners = self.problem.model.mesh.points[block.facets]
             edges.append(float(np.linalg.norm(np.ptp(corners, axis=1), axis=1).min()))
-        return MOVED * min(edges)
+        return DIFFERENCES * min(edges)
 
     def _surfaces(self) -> list[Surface]:
         pairs = self.problem.pairs.values()
@@ -169,7 +168,7 @@ class MovingContact:
     def kinks(self, forward: csr_array, backward: csr_array) -> csr_array:
         """Return half the difference of the two `derivatives` where points lie on the line between two facets."""
         apart, n = csr_array(0.5 * (forward - backward)), len(self.u)
-        force = float(np.abs(self.solution.multiplier).max(initial=0.0)) * MOVED / self.step
+        force = float(np.abs(self.solution.multiplier).max(initial=0.0)) * DIFFERENCES / self.step
         row = np.repeat(np.arange(apart.shape[0]), np.diff(apart.indptr))
         # Pressures follow from forces: they are smooth where forces are.
         size = np.where(row < n, force, np.where(row < n + len(self.active), 1.0, np.inf))

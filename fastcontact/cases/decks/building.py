@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
@@ -452,17 +451,18 @@ def _law(content: Content, material: Material, axes: Any, modes: bool) -> Any:
         return _with_axes(material, HELD, axes, conductivity=_conductivity(content, material))
     assert material.law is not None
     law, expansion = material.law(axes), material.expansion
+    law = replace(law, density=material.density)
     if isinstance(law, NonlinearElastic) and modes:
         content.note(material, f"material '{material.name}': incompatible modes are left out, since it is nonlinear")
-        modes = False
-    law = _with(law, incompatible_modes=modes, density=material.density)
+    elif modes:
+        law = replace(law, incompatible_modes=True)
     if content.heat or material.conductivity is not None:
         law = _with_axes(material, law, axes, conductivity=_conductivity(content, material))
     heated = content.heat or any(given.block.keyword == "TEMPERATURE" for step in content.steps for given in step.given)
     if expansion is None:
         if heated:
             content.note(material, f"material '{material.name}' has no *EXPANSION: temperatures do not strain it")
-        return _with(law, expansion=0.0) if heated else law
+        return replace(law, expansion=0.0) if heated else law
     if not heated:
         content.note(material, f"material '{material.name}': without temperatures the expansion has no effect")
     return _with_axes(material, law, axes, expansion=expansion)
@@ -480,16 +480,6 @@ def _conductivity(content: Content, material: Material) -> float | tuple[float, 
     return None
 
 
-def _with(law: Any, **constants: Any) -> Any:
-    """Return a material with further constants; hyperelastic ones are not made from their fields."""
-    if not isinstance(law, NonlinearElastic):
-        return replace(law, **constants)
-    law = copy.copy(law)
-    for name, value in constants.items():
-        object.__setattr__(law, name, value)
-    return law
-
-
 def _with_axes(material: Material, law: Any, axes: Any, **constants: Any) -> Any:
     """Return a material with further constants, orthotropic where these differ along the axes."""
     if isinstance(law, LinearElastic) and any(isinstance(value, tuple) for value in constants.values()):
@@ -500,7 +490,7 @@ def _with_axes(material: Material, law: Any, axes: Any, **constants: Any) -> Any
         G = law.E / (2.0 * (1.0 + law.nu))
         kept = {name: getattr(law, name) for name in ("density", "expansion", "conductivity")}
         law = Orthotropic((law.E,) * 3, (law.nu,) * 3, (G,) * 3, axes, **kept)
-    return _with(law, **constants)
+    return replace(law, **constants)
 
 
 def _parts(step: Step) -> list[float]:

@@ -19,13 +19,10 @@ from fastcontact.contact.search.closest import closest
 from fastcontact.contact.surface import FacetBlock, Surface, line_neighbours
 from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.mesh import elements, quadrature
+from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
-# Parts of a facet shorter than this, in its own length, are rounding errors of the cut.
-SLIVER = 1e-10
-# Lines face each other if their normals enclose more than 120 degrees: beside a corner the flank is closest but not faced.
+# Lines face each other if their normals enclose more than 120 degrees: beside a corner the flank is closest, but not faced.
 OPPOSITE = -0.5
-# A projection tolerance below this, in facet lengths, only covers rounding errors.
-ROUNDING = 1e-3
 NO_BORDERS = np.empty(0, np.intp), np.empty(0)
 
 
@@ -80,7 +77,7 @@ def _cuts(
     xi = np.concatenate([np.full(n, -1.0), np.full(n, 1.0), along, borders[1], xi_of_end])
     order = np.lexsort((xi, facet))
     facet, xi = facet[order], xi[order]
-    piece = (facet[1:] == facet[:-1]) & (np.diff(xi) > SLIVER)
+    piece = (facet[1:] == facet[:-1]) & (np.diff(xi) > LENGTH_ROUND_OFF)
     return facet[:-1][piece], xi[:-1][piece], xi[1:][piece]
 
 
@@ -105,7 +102,7 @@ def _opposite_nodes(block: FacetBlock, primary: Surface, deformed: Array, normal
     along = opposite.xi[:, 0]
     inner = primary.inner_ends.ravel()[first]
     smooth = inner & ~_corners(primary, deformed, normals)[ends]
-    inside = np.flatnonzero((opposite.overhang == 0.0) & (np.abs(along) < 1.0 - SLIVER) & ~smooth)
+    inside = np.flatnonzero((opposite.overhang == 0.0) & (np.abs(along) < 1.0 - LENGTH_ROUND_OFF) & ~smooth)
     rows = np.flatnonzero(inner)
     facets = np.column_stack([opposite.facet[rows], line_neighbours(block.local)[opposite.facet[rows]]])
     crossed = _across(deformed[block.facets[facets]], foot[rows][:, None], normal[rows][:, None])
@@ -133,8 +130,8 @@ def _opposite_ends(
     block: FacetBlock, primary: Surface, deformed: Array, normals: Array, tolerance: float
 ) -> tuple[Indices, Array]:
     """Return (facet, xi) of the points of a block that lie on the normals at the ends of the primary side."""
-    # A tolerance for rounding errors does not extend the side: a cut there would leave a strip that faces it.
-    ends = (1.0, 1.0 + 2.0 * tolerance) if tolerance > ROUNDING else (1.0,)
+    # A tolerance for rounding errors alone is no part of the side: a cut there would leave a strip that faces it.
+    ends = (1.0, 1.0 + 2.0 * tolerance) if tolerance > SINGLE_PRECISION else (1.0,)
     first, facets, places = 0, [], []
     for other in primary.blocks:
         shape = elements.get(other.element).shape
@@ -161,7 +158,7 @@ def _zeros(values: Array) -> tuple[Indices, Array]:
     with np.errstate(divide="ignore", invalid="ignore"):
         both = np.stack([half / bend, middle / half], axis=1)
     both[slope**2 < 4.0 * bend * middle] = np.nan
-    row, which = np.nonzero(np.abs(both) < 1.0 - SLIVER)
+    row, which = np.nonzero(np.abs(both) < 1.0 - LENGTH_ROUND_OFF)
     return row, both[row, which]
 
 

@@ -23,6 +23,7 @@ from fastcontact.contact.pair_options import PairOptions
 from fastcontact.contact.pairing import Candidates, Pairing, gap_rows, pair, rows_along, tangents
 from fastcontact.contact.prescribed_normals import Normals, checked_normals, opposed
 from fastcontact.contact.projection import at_nodes_of_facets, interpolated, nodal_normals, places, smooth_normals
+from fastcontact.contact.search.closest import BESIDE
 from fastcontact.contact.surface import Surface
 from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.contact.tied import TiedPair, tied
@@ -31,10 +32,7 @@ from fastcontact.errors import ContactError, unknown
 from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
 
 SLIPS = ("symmetric", "primary")
-# In facet lengths: nodes on an axis or plane of symmetry lie slightly beyond inclined facets, and nodes at the end of
-# one side beyond the end of the other where the two strain differently.
-ON_SYMMETRY = 0.05
-# In 3D a sliding body leaves edges and planes of symmetry node by node; with a smaller tolerance pairings of nodes oscillate.
+# In 3D a body that slides leaves edges and planes of symmetry node by node; a node that is dropped earlier comes and goes.
 LEAVING = 0.5
 # Sine of the angle to a plane of symmetry above which a surface has a corner there.
 LEANING = 0.38
@@ -108,7 +106,7 @@ class Formulation(ABC):
         if not (np.isfinite(self.friction) and self.friction >= 0):
             raise ContactError(f"the coefficient of friction {self.friction} must be a number >= 0")
         if self.projection_tolerance is None:
-            self.projection_tolerance = ON_SYMMETRY if self.points.shape[1] == 2 else LEAVING
+            self.projection_tolerance = BESIDE if self.points.shape[1] == 2 else LEAVING
         if not self.projection_tolerance >= 0:
             raise ContactError(f"projection_tolerance = {self.projection_tolerance} must not be negative")
         if self.surface_smoothing and not isinstance(self.primary, Surface):
@@ -143,14 +141,6 @@ class Formulation(ABC):
     def faceted(self) -> bool:
         """Whether normals are those of single facets, so that the pairing of points may alternate between two."""
         return isinstance(self.primary, Surface) and self.normals == "facet" and not self.options.tied
-
-    @property
-    def basis_transformation(self) -> csr_array | None:
-        """Values at mid nodes of the test functions of gaps, where these are linear on quadratic facets.
-
-        A matrix (n_points, n_points) with rows of mid nodes and columns of corners [-]; None where there are none.
-        """
-        return None
 
     @classmethod
     def variant(cls, dim: int, options: Mapping[str, Any]) -> type[Formulation]:
@@ -362,7 +352,7 @@ class Formulation(ABC):
         points = self.secondary.points[nodes]
         both, moved = self.held.at(points), (at.displacement - at.start)[points]
         candidates = Candidates(points[:, None], np.ones((len(nodes), 1)))
-        pairing = self.facing(candidates, at, max(self.projection_tolerance or 0.0, ON_SYMMETRY))
+        pairing = self.facing(candidates, at, max(self.projection_tolerance or 0.0, BESIDE))
         if isinstance(self.primary, RigidSide):
             moved = moved - (at.obstacle - at.obstacle_start)
             turning = self.turning(candidates, at)
@@ -449,7 +439,7 @@ class Formulation(ABC):
         `displacement` (n_points, dim) is given, the gaps are those at this displacement in the pairing of `at` [length].
         """
         nodes = Candidates.nodes_of(self.secondary)
-        pairing = self.facing(nodes, at, max(self.projection_tolerance or 0.0, ON_SYMMETRY))
+        pairing = self.facing(nodes, at, max(self.projection_tolerance or 0.0, BESIDE))
         G, gap0 = gap_rows(nodes, pairing, self.primary, self.points)
         gap0 -= self.overlap_of_smooth(nodes, pairing, at)
         if with_clearance:

@@ -85,29 +85,8 @@ class WeightedMortar(Formulation):
 
     @property
     def eliminable(self) -> bool:
-        """See `Formulation`; with a penalty, corner gaps of quadratic facets would need additional unknowns."""
-        if self.multipliers == "dual" or self.secondary.order == 1:
-            return True
-        exact = self.options.penalty is None and self.options.tangential_penalty is None
-        return exact and self.points.shape[1] == 3
-
-    @property
-    def basis_transformation(self) -> csr_array | None:
-        """See `Formulation`."""
-        if self.multipliers == "dual" or self.secondary.order == 1:
-            return None
-        rows, columns, values = [], [], []
-        for block, T in zip(self.secondary.blocks, self._test, strict=True):
-            corner, mid = np.nonzero(T)
-            beside = mid >= elements.get(block.element).n_corners
-            corner, mid = corner[beside], mid[beside]
-            rows.append(block.facets[:, mid].ravel())
-            columns.append(block.facets[:, corner].ravel())
-            values.append(np.tile(T[corner, mid], len(block.facets)))
-        at = np.concatenate(rows), np.concatenate(columns)
-        shape, count = (len(self.points),) * 2, csr_array((np.ones(len(at[0])), at), shape=(len(self.points),) * 2)
-        total = csr_array((np.concatenate(values), at), shape=shape)
-        return csr_array((total.data / count.data, total.indices, total.indptr), shape=shape)
+        """See `Formulation`; standard multipliers couple the corners of quadratic facets through their mid nodes."""
+        return self.multipliers == "dual" or self.secondary.order == 1
 
     def _test_functions(self, name: str) -> Array:
         """Return the non-negative functions of a facet that sum to one, as coefficients (n_nodes, n_nodes)."""

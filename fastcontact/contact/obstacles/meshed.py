@@ -9,14 +9,14 @@ import numpy as np
 from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.obstacles._facets import Block, SurfaceFacets, surface_facets
-from fastcontact.contact.search.closest import Closest, closest_of_kinds
+from fastcontact.contact.search.closest import BESIDE, Closest, closest_of_kinds
 from fastcontact.errors import ContactError
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 
-# A point counts as beyond the border of an open surface if it lies farther out than this fraction of a facet, and of its
-# height: at borders on a plane of symmetry, to which facets are never exactly perpendicular, contact is then still found.
-BEYOND, LEAN = 0.05, 0.27
+# A point counts as beyond the border of an open surface if it stands out by more than BESIDE, and leans by more than this
+# over its height: borders on a plane of symmetry, where facets never stand quite upright, still hold.
+LEAN = 0.27
 
 
 @typed(ContactError)
@@ -112,7 +112,7 @@ class MeshedSurface:
         normal[turned] = apart[turned] / distance[turned, None]
         height = np.abs(np.einsum("nd,nd->n", apart, sense))
         aside = np.sqrt(np.maximum(closest.distance**2 - height**2, 0.0))
-        nothing = on_border & (aside > BEYOND * size) & (aside > LEAN * height)
+        nothing = on_border & (aside > BESIDE * size) & (aside > LEAN * height)
         return np.where(nothing, np.inf, distance), normal
 
     def _frames(self, closest: Closest) -> tuple[Array, Array, Mask, Mask]:

@@ -15,6 +15,8 @@ from fastcontact.arrays import Array
 
 # Capacity of the stack of boxes still to open; a squared distance that no facet exceeds.
 DEPTH, FAR = 64, 1e300
+# Squared distances to boxes and facets are rounded: from far away by more than the size of the places that are the same.
+ROUNDING = 1.0 + 1e-14
 
 
 class Tree(NamedTuple):

@@ -7,10 +7,7 @@ Facets are straight lines (2 nodes) or parabolas (3 nodes, the middle last): ``c
 import numpy as np
 
 from fastcontact._jit.decorators import inlined_kernel, interpretable_kernel, kernel
-from fastcontact.contact.search.box_tree_kernels import DEPTH, FAR, open_box, square_to_box
-
-# Squared distances to boxes and facets are rounded.
-ROUNDING = 1.0 + 1e-14
+from fastcontact.contact.search.box_tree_kernels import DEPTH, FAR, ROUNDING, open_box, square_to_box
 
 
 @inlined_kernel

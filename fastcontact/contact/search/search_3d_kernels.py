@@ -4,13 +4,10 @@
 import numpy as np
 
 from fastcontact._jit.decorators import inlined_kernel, interpretable_kernel
-from fastcontact.contact.search.box_tree_kernels import DEPTH, FAR, open_box, square_to_box
+from fastcontact.contact.search.box_tree_kernels import DEPTH, FAR, ROUNDING, open_box, square_to_box
 from fastcontact.contact.search.projection_3d_kernels import component, frame, onto_sides, project, vector
 from fastcontact.contact.search.straight_3d_kernels import ON_SIDE, along, cross, dot, minus, on_bilinear, on_flat, unit
 from fastcontact.round_off import LENGTH_ROUND_OFF
-
-# Squared distances to boxes and facets are rounded: from far away by more than the distance of points that count as equal.
-ROUNDING = 1.0 + 1e-14
 
 
 @interpretable_kernel

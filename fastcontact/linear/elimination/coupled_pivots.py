@@ -83,9 +83,7 @@ class CoupledPivots:
     Attributes
     ----------
     sparse : SparseInverse
-        Approximate inverse for a preconditioner: that of `lumped`.
-    beyond_lumped : csr_array (m, m)
-        The matrix minus `lumped`.
+        Close enough to the inverse for a preconditioner: that of `lumped`.
 
     Raises
     ------
@@ -98,7 +96,7 @@ class CoupledPivots:
         kept = np.asarray(abs(L).sum(axis=1)) / np.asarray(abs(P).sum(axis=1))
         if not kept.min() >= LUMPED:
             raise CoupledError()
-        self.sparse, self.beyond_lumped = SparseInverse(block_inverse(L)), csr_array(P - L)
+        self.sparse = SparseInverse(block_inverse(L))
         try:
             self._factors = splu(csc_array(P))
         except RuntimeError:  # exactly singular

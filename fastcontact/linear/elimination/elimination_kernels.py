@@ -26,12 +26,6 @@ def move_forces(pivots, indptr, indices, weights, r):
     for p in range(pivots.shape[0]):
         forces[p] = r[pivots[p]]
         r[pivots[p]] = 0
-    add_rows(indptr, indices, weights, forces, r)
-
-
-@kernel
-def add_rows(indptr, indices, weights, factors, r):
-    """Add ``W.T factors`` to r (n,), factors (m,)."""
-    for p in range(factors.shape[0]):
+    for p in range(pivots.shape[0]):
         for k in range(indptr[p], indptr[p + 1]):
-            r[indices[k]] += weights[k] * factors[p]
+            r[indices[k]] += weights[k] * forces[p]

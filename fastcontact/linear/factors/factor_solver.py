@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from scipy.sparse import bsr_array, csc_array, csr_array
+from scipy.sparse import bsr_array, csr_array
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.linear.cholesky.symmetric_factors import SymmetricFactors
@@ -22,16 +22,15 @@ LAST_UP_TO = 4000
 # Number of unknowns up to which a factorisation is affordable, by the dimension.
 AFFORDABLE = {1: 3_000_000, 2: 3_000_000, 3: 150_000}
 ATTAINABLE = 1e-14
-# Error of one solution over that of another.
-MARGIN = 10.0
+NONE = np.empty(0, np.intp)
 
 
 class FactorSolver(LinearSolver):
-    """A direct solver; sub-classes factorise and solve.
+    """A direct solver; sub-classes factorise.
 
-    If a sub-class provides factors in which the unknowns involved in equations come last, their Delassus operator is the
-    inverse of the trailing block, ``(K^-1)_cc = (L_cc D_c L_cc.T)^-1``, without any solution with K; the displacement of
-    the other unknowns under contact forces then follows by half a solution.
+    Unknowns that equations may involve are eliminated last. Their Delassus operator is the inverse of the trailing block,
+    ``(K^-1)_cc = (L_cc D_c L_cc.T)^-1``, and costs no solution with K at all; the displacement of the other unknowns under
+    contact forces follows from theirs by half a solution.
 
     Parameters
     ----------
@@ -46,22 +45,14 @@ class FactorSolver(LinearSolver):
         self.tolerance = ATTAINABLE  # regardless of the argument
         self.counters = Counters()
         self.n = 0
-        self._factors: SymmetricFactors | None = None
+        self._factors: SymmetricFactors
         self.last: Indices | None = None
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({f'{self.n} unknowns' if self.n else 'not prepared'})"
 
-    def _factorise(self, K: csc_array) -> None:
-        """Factorise K (n, n) in any order, or raise ModelError if it is singular."""
-        raise NotImplementedError
-
-    def _solve(self, F: Array) -> Array:
-        """Return ``K^-1 F`` for right-hand sides (n,) or (n, k), after `_factorise`."""
-        raise NotImplementedError
-
-    def _with_last(self, K: bsr_array, last: Indices) -> SymmetricFactors | None:
-        """Factorise K (n, n) as `_factorise` does, with the unknowns `last` (m,) last; None where this has no advantage."""
+    def _factorised(self, K: bsr_array, last: Indices) -> SymmetricFactors:
+        """Return the factors of K (n, n), with the unknowns `last` (m,) last, or raise ModelError if it is singular."""
         raise NotImplementedError
 
     def prepare(
@@ -74,39 +65,21 @@ class FactorSolver(LinearSolver):
         ModelError
             If K is singular.
         """
-        self.n, self._factors, self.last = K.shape[0], None, None
-        self._K, self.refines = K, False
-        if involved is not None and len(involved) <= LAST_UP_TO:
-            self._factors = self._with_last(K, involved)
-        self.error = 0.0
-        if self._factors is None:
-            self._factorise(K.tocsc())
-            self.error = MARGIN * self._error(K)
+        self.n, self._K, self.refines = K.shape[0], K, False
+        last = NONE if involved is None or len(involved) > LAST_UP_TO else involved
+        self._factors = self._factorised(K, last)
         self.counters.setups += 1
-        self.columns, self.known_loads = InverseColumns(self.n, self._solution), KnownLoads()
-        if self._factors is not None and involved is not None and len(involved):
-            self.last, self.inverse = involved, self._factors.last_inverse()
+        self.columns, self.known_loads = InverseColumns(self.n, self._factors.solve), KnownLoads()
+        self.last = last if len(last) else None
+        if self.last is not None:
+            self.inverse = self._factors.last_inverse()
             self.columns.give(self.last, self.inverse)
         return K
-
-    def _error(self, K: bsr_array) -> float:
-        """Return the largest correction of a solution by a step of iterative refinement, relative to the solution.
-
-        Displacements of the last unknowns are computed with one inverse, so that errors of the factors are the same in all
-        pairings; those of full solutions vary.
-        """
-        f = np.random.default_rng(0).normal(size=self.n)
-        u = self._solve(f)
-        size = float(np.abs(u).max(initial=0.0))
-        return float(np.abs(self._solve(f - K @ u)).max(initial=0.0)) / size if size else 0.0
 
     @property
     def condenses(self) -> bool:
         """See `LinearSolver`."""
         return self.last is not None
-
-    def _solution(self, F: Array) -> Array:
-        return self._solve(F) if self._factors is None else self._factors.solve(F)
 
     def load(self, f: Array) -> Any:
         """Return the prepared matrix with right-hand side `f` (n,)."""
@@ -121,7 +94,7 @@ class FactorSolver(LinearSolver):
         """See `LinearSolver.put_back`."""
         self.refines = snapshot.get("refines", False)
         self.columns.put_back(snapshot["asked"])
-        self.known_loads.put_back(snapshot["loads"], self.n, self._solution)
+        self.known_loads.put_back(snapshot["loads"], self.n, self._factors.solve)
 
     def improve(self, excess: float) -> bool:
         """See `LinearSolver.improve`: one step of iterative refinement for later solutions."""
@@ -139,11 +112,10 @@ class FactorSolver(LinearSolver):
     def back_substitute(self, f: Array) -> Array:
         """Return ``K^-1 f``, shape (n,)."""
         self.counters.iterations += 1
-        return self._solution(f)
+        return self._factors.solve(f)
 
     def extend(self, u: Array) -> Array:
-        """Return the displacement (n,) under forces on the unknowns `last` alone, whose displacement is u (m,)."""
-        assert self._factors is not None
+        """Return the displacement (n,) under forces on the unknowns `last` alone, which move by u (m,)."""
         self.counters.iterations += 1
         return self._factors.extended(u)
 

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 
 from fastcontact.arrays import Array
+from fastcontact.round_off import SUM_ROUND_OFF
 
 # Number of stored right-hand sides: loads and supports seldom have more independent ramps.
 KEPT = 4
-# Largest relative residual (2-norm) of a combination: round-off.
-MISSED = 16 * np.finfo(float).eps
 
 
 class KnownLoads:
@@ -28,7 +27,7 @@ class KnownLoads:
         if size == 0.0:
             return np.zeros_like(f)
         weights, left = self._projected(f)
-        if len(weights) and np.linalg.norm(left) <= MISSED * size:
+        if len(weights) and np.linalg.norm(left) <= SUM_ROUND_OFF * size:
             return sum((w * u for w, u in zip(weights, self._solutions, strict=True)), np.zeros_like(f))
         f = f / size
         u = solve(f)

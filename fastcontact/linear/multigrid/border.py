@@ -15,11 +15,10 @@ from scipy.sparse.linalg import splu
 
 from fastcontact.arrays import Array
 from fastcontact.linear.krylov.iterations import Multiply, Precondition
+from fastcontact.round_off import ROUND_OFF
 
 # Compliance of displacements over the inverse diagonal of their matrix.
 SOFTER = 2.0
-# Relative regularisation of the multipliers in the preconditioner, since some constraints are linearly dependent.
-REPEATED = 1e-10
 
 
 class Border:
@@ -45,7 +44,8 @@ class Border:
         diagonal_of_S = S.diagonal()
         # Residuals of these equations are scaled to forces.
         self.stiffness = 1.0 / diagonal_of_S
-        self._factors = splu(csc_array(S + diags_array(REPEATED * diagonal_of_S)))
+        # Some multipliers are linearly dependent.
+        self._factors = splu(csc_array(S + diags_array(ROUND_OFF * diagonal_of_S)))
 
     def multiply(self, multiply: Multiply, move_forces: Callable[[Array], None]) -> Multiply:
         """Return the product with the bordered matrix, from that with A; forces (n,) move from eliminated unknowns."""

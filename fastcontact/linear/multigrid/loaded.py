@@ -14,7 +14,6 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.linear.elimination.basis_transformation import eliminated
 from fastcontact.linear.elimination.elimination import Elimination, eliminate
 from fastcontact.linear.elimination.loaded import LoadedIteration
 from fastcontact.linear.elimination.pivot_order import RepeatedError
@@ -52,11 +51,6 @@ class LoadedMultigrid(LoadedIteration):
         if parts is None:
             return super().solve(B, c, C, guess, monitor, tolerance, nodes)
         return self._solved(parts, c, guess, monitor, tolerance)
-
-    @property
-    def _functions(self) -> csr_array | None:
-        functions: csr_array | None = self._solver.basis_transformation
-        return functions
 
     @property
     def contrast(self) -> float:
@@ -97,12 +91,7 @@ class LoadedMultigrid(LoadedIteration):
             assert monitor is not None
             return monitor(u, parts.multiplier(u, multiplier, c), error)
 
-        if parts.giving and self._functions is not None:
-            # Excesses at mid nodes are not eliminated here: conjugate gradients broke down, conjugate residuals do not.
-            start = np.zeros(len(f)) if guess is None else guess
-            u = solver.nonsymmetric_solution(f, elimination, springs, start, tolerance or solver.tolerance)
-        else:
-            u = solver.solution(f, elimination, guess, monitor and watch, tolerance, springs)
+        u = solver.solution(f, elimination, guess, monitor and watch, tolerance, springs)
         return u, parts.multiplier(u, solver.multiplier(elimination, u, f, springs), c)
 
     def _solved_for_field(
@@ -144,15 +133,15 @@ class LoadedMultigrid(LoadedIteration):
         """
         size = self._solver.K.blocksize[0]
         if C is None or not C.any():
-            elimination = eliminated(B, c, through, nodes, size, self._functions) if len(c) else None
+            elimination = eliminate(B, c, through, nodes, size) if len(c) else None
             return _Parts(np.ones(len(c), bool), elimination, None)
         diagonal = self._solver.diagonal()
         yielding = np.divide(1.0, diagonal, out=np.zeros(len(diagonal)), where=diagonal > 0.0)
         softness = B.multiply(B) @ yielding
         try:
-            return _Parts.of(B, c, C, softness > STIFF * C, nodes, size, through, self._functions)
+            return _Parts.of(B, c, C, softness > STIFF * C, nodes, size, through)
         except RepeatedError:
-            return _Parts.of(B, c, C, C == 0.0, nodes, size, through, self._functions)
+            return _Parts.of(B, c, C, C == 0.0, nodes, size, through)
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,29 +155,21 @@ class _Parts:
     @classmethod
     def of(
         cls, B: csr_array, c: Array, C: Array, stiff: Mask, nodes: Indices | None, size: int,
-        through: csr_array | None, functions: csr_array | None,
+        through: csr_array | None,
     ) -> _Parts:  # fmt: skip
         """Return the parts of ``B u + C multiplier = c``; RepeatedError if stiff ones are linearly dependent."""
-        gives = C[stiff].any()
-        if gives:  # excesses replace nodal pivots as unknowns
-            functions = None
         if stiff.all():
-            elimination = eliminated(B, c, through, nodes, size, functions) if len(c) else None
+            elimination = eliminate(B, c, through, nodes, size) if len(c) else None
         else:
             rows, acting = csr_array(B[stiff]), None if through is None else csr_array(through[stiff])
             of_rows = None if nodes is None else nodes[stiff]
-            elimination = eliminated(rows, c[stiff], acting, of_rows, size, functions) if stiff.any() else None
-        if elimination is not None and gives:
+            elimination = eliminate(rows, c[stiff], acting, of_rows, size) if stiff.any() else None
+        if elimination is not None and C[stiff].any():  # excesses take the places of pivots
             elimination = dataclasses.replace(elimination, compliance=C[stiff])
         if stiff.all():
             return cls(stiff, elimination, None)
         acting = None if through is None else csr_array(through[~stiff])
         return cls(stiff, elimination, Springs(csr_array(B[~stiff]), 1.0 / C[~stiff], acting))
-
-    @property
-    def giving(self) -> bool:
-        """Whether eliminated constraints have a compliance."""
-        return self.elimination is not None and self.elimination.compliance is not None
 
     def pushed(self, f: Array, c: Array) -> Array:
         """Return forces f (n,) plus those of the springs at u = 0."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 import logging
 
 import numpy as np
-from scipy.sparse import bsr_array, csr_array
+from scipy.sparse import bsr_array
 
 from fastcontact._jit.decorators import check_threads
 from fastcontact.arrays import Array
@@ -50,9 +50,7 @@ CHANGE = 15
 # doubled, up to LONGEST_WARM, each time that the next start is not better by STOOD.
 WARM, WARM_LEAST, MOST_WARM = 0.05, 1e-3, 10
 STOOD, LONGEST_WARM = 0.2, 40
-# A nonsymmetric iteration stagnates if its residual does not decrease to this fraction in this many iterations.
-FALLS, STANDING = 0.99, 40
-# If the smoother amplifies errors, its bound of the spectrum is raised by this factor, at most this many times.
+# Where the smoother amplifies something, its bound of the spectrum is raised by this factor, at most so often.
 RAISE, RAISES = 1.3, 4
 
 
@@ -76,7 +74,7 @@ class Multigrid:
 
     Attributes
     ----------
-    contrast, basis_transformation
+    contrast
         See `LinearSolver`.
     patience : int
         Largest number of iterations of a nonsymmetric solution.
@@ -97,7 +95,6 @@ class Multigrid:
         self.tolerance, self.precision = tolerance, precision
         self.counters = Counters()
         self.contrast = 1.0
-        self.basis_transformation: csr_array | None = None
         self.patience, self.work = MAX_NONSYMMETRIC, 0
         self.allowed: int | None = None
         self.begin()
@@ -294,22 +291,18 @@ class Multigrid:
         if begun > STOOD * self._cut_short and self._constrained.stiffening > MILD:
             self._most_warm = min(2 * self._most_warm, LONGEST_WARM)
         self._cut_short = np.inf
-        least, fallen = iteration.norm, 0  # the residual at its last decrease, and the iterations until then
         while iteration.norm > wanted:
             done = iteration.norm <= enough
             if done and made >= self._most_warm:
                 self._cut_short = begun
                 return
-            stands = made - fallen >= STANDING
-            if stands or made >= self.patience or not iteration.step(multiply, precondition):
+            if made >= self.patience or not iteration.step(multiply, precondition):
                 if done:
                     return
                 left = iteration.norm / enough
                 raise StallError(f"conjugate residuals stand at {left:.1e} times the tolerance after {made} iterations")
             made += 1
             self._count()
-            if iteration.norm < FALLS * least:
-                least, fallen = iteration.norm, made
 
     def _count(self) -> None:
         self.counters.iterations += 1

@@ -40,12 +40,9 @@ from fastcontact.round_off import ROUND_OFF
 log = logging.getLogger("fastcontact")
 # Number of unknowns up to which a factorisation replaces multigrid.
 FACTORS_UP_TO = AFFORDABLE
-# If equations stiffen a node by more than the first factor, the softer body is too inaccurate at multigrid's tolerance; with
-# coupled equations, whose weights are approximate, hundreds of iterations are needed from the second factor on.
-STIFFENED, STIFFENED_COUPLED = 3e4, 6.0
-# Work in one load step, in iterations, above which a factorisation is certainly cheaper: a constant, and an amount per
-# unknown, by the dimension. In 3D a factorisation and a step with it cost 300 and 0.04 for two bodies in contact, three
-# times as much in stacks with friction (measured, see bench/README.md).
+# Work in one load step, in iterations, from which on factors are cheaper for certain: so much, and so much for each unknown,
+# by the number of components of a displacement. In 3D a factorisation and a step by it cost 300 and 0.04 where two bodies
+# touch, three times as much in stacks with friction (measured, see bench/README.md).
 COST, COST_OF_UNKNOWN = 1000, {1: 0.0, 2: 0.0, 3: 0.08}
 
 
@@ -134,8 +131,8 @@ class Amg(Multigrid, LinearSolver):
         if (instead := snapshot.get("instead")) is not None:
             (self.instead or self._factorise(instead["why"])).put_back(instead)
             return
-        if self.instead is not None:  # multigrid was replaced after the snapshot
-            self._factored, self.instead, self.gave_up, self.error = self.instead, None, "", 0.0
+        if self.instead is not None:  # multigrid was given up later
+            self._factored, self.instead, self.gave_up = self.instead, None, ""
         put_back_tolerance(self, snapshot)
         if snapshot["precision"] != self.precision:
             self.build_in(snapshot["precision"])
@@ -148,23 +145,6 @@ class Amg(Multigrid, LinearSolver):
             equations, springs = equations and _elimination(equations, n), springs and Springs.from_dict(springs, n)
             self._change_hierarchy(equations, springs)
         self.hierarchy.bounds = snapshot["bounds"]
-
-    def constrain(self, elimination: Elimination | None, springs: Springs | None = None) -> None:
-        """See `Multigrid.constrain`.
-
-        Raises
-        ------
-        StallError
-            If multigrid would need hundreds of iterations and a factorisation can replace it.
-        """
-        super().constrain(elimination, springs)
-        coupled = elimination is not None and elimination.coupled
-        stiffening = self._constrained.stiffening
-        if stiffening > (STIFFENED_COUPLED if coupled else STIFFENED) and self._may_factorise:
-            raise StallError(
-                f"contact makes nodes {stiffening:.1e} times as stiff as they are, where the secondary side is much stiffer "
-                "than the primary one: let the softer body be the secondary side"
-            )
 
     def give_up(self, stalled: StallError | TooManyColumnsError) -> None:
         """Factorise the matrix, because the iteration stalls or columns of the inverse cost more.
@@ -200,7 +180,7 @@ class Amg(Multigrid, LinearSolver):
         self.gave_up, self.instead = why, self._factored
         # Later tolerances are those of a factorisation.
         self.asked = self.tolerance if self.asked is None else self.asked
-        self.tolerance, self.error = self.instead.tolerance, self.instead.error
+        self.tolerance = self.instead.tolerance
         return self.instead
 
 

@@ -5,18 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._tools.argument_types import typed
-from fastcontact.arrays import Array
+from fastcontact.arrays import Array, Indices
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.elements import Element
 from fastcontact.mesh.generate._check import affordable, count, each, number, one_of, positive
 from fastcontact.mesh.generate.blocks import block as rectangle
 from fastcontact.mesh.mesh import Mesh
-
-Indices = NDArray[np.int64]
 
 AXES = "xyz"
 # All nodes of all elements are on a lattice of four steps per hexahedron, including mid nodes of the inner edges of pyramids.

@@ -8,33 +8,19 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._tools.argument_types import typed
-from fastcontact.arrays import AnyArray, Array
+from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
+from fastcontact.mesh.generate.forest import RED
 from fastcontact.mesh.generate.quadratic import ON_CURVE, Circle, Curve, all_on, facets_of
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
 
-# Corners of the children in the reference cell, each child oriented like its parent.
-_CHILDREN = {
-    "line2": [[[-1.0], [0.0]], [[0.0], [1.0]]],
-    "tri3": [
-        [[0.0, 0.0], [0.5, 0.0], [0.0, 0.5]],
-        [[0.5, 0.0], [1.0, 0.0], [0.5, 0.5]],
-        [[0.0, 0.5], [0.5, 0.5], [0.0, 1.0]],
-        [[0.5, 0.5], [0.0, 0.5], [0.5, 0.0]],
-    ],
-    "quad4": [
-        [[-1.0, -1.0], [0.0, -1.0], [0.0, 0.0], [-1.0, 0.0]],
-        [[0.0, -1.0], [1.0, -1.0], [1.0, 0.0], [0.0, 0.0]],
-        [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]],
-        [[-1.0, 0.0], [0.0, 0.0], [0.0, 1.0], [-1.0, 1.0]],
-    ],
-}
-# Largest angle between consecutive segments of a line that may be a circle.
+# Quadratic elements whose nodes are the corners of the children that `RED` names, each child turned like its parent.
+_LATTICE = {"line2": "line3", "tri3": "tri6", "quad4": "quad9"}
+# A line that turns by more than this from one node to the next does not count as a circle.
 _TURN = np.pi / 5
 
 
@@ -55,12 +41,12 @@ class _Pattern:
 @cache
 def _pattern(name: str) -> _Pattern:
     element = elements.get(name)
-    if element.linear not in _CHILDREN:
+    if element.linear not in _LATTICE:
         raise MeshError(f"cells of {name} cannot be refined: only lines, triangles and quadrangles are divided here")
     points = [tuple(node) for node in element.nodes.tolist()]
     children = []
-    for corners in _CHILDREN[element.linear]:
-        places = element.corner_shape(element.nodes) @ np.array(corners)
+    for corners in elements.get(_LATTICE[element.linear]).nodes[RED[element.linear]]:
+        places = element.corner_shape(element.nodes) @ corners
         child = []
         for fraction_of_edge in np.round(places * 8.0).tolist():  # eighths are exact
             node = tuple(x / 8.0 for x in fraction_of_edge)
@@ -232,7 +218,7 @@ def linearised(mesh: Mesh) -> Mesh:
         used[block] = True
     number = np.cumsum(used) - 1
     merged: dict[str, AnyArray] = {}
-    order: list[NDArray[np.int64]] = []
+    order: list[Indices] = []
     for linear in dict.fromkeys(elements.get(name).linear for name in cells):
         parts = [name for name in cells if elements.get(name).linear == linear]
         merged[linear] = number[np.concatenate([cells[name] for name in parts])]

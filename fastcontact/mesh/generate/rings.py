@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._tools.argument_types import typed
 from fastcontact.errors import MeshError
@@ -14,8 +13,6 @@ from fastcontact.mesh.generate._check import FACES, TRIANGLES, affordable, count
 from fastcontact.mesh.generate.quadratic import Circle, in_element
 from fastcontact.mesh.generate.transform import union
 from fastcontact.mesh.mesh import Mesh
-
-Array = NDArray[np.float64]
 
 
 @typed(MeshError)

@@ -16,6 +16,8 @@ from fastcontact.results.step import ContactResult, StepResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+else:  # which is imported where a picture is drawn
+    Axes = Any
 
 Units = Mapping[str, str]
 UNITS: Units = {"length": "mm", "force": "N", "pressure": "MPa"}

@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._tools.argument_types import typed
-from fastcontact.arrays import AnyArray, Array
+from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.elasticity.recovery import von_mises
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.plot._axes import UNKNOWN, Units, contacts_of, new_axes
+from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, contacts_of, new_axes
 from fastcontact.results.step import StepResult
 from fastcontact.results.units import labelled
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-# Depth of the picture, in contact radii.
+# How deep the picture goes, in contact radii.
 DEEP = 4.0
 COMPONENTS = {"along the axis": 1, "across the axis": 0}
 # Colours of these, and of von Mises.
@@ -102,7 +98,7 @@ def axis_stress(
     return axes
 
 
-def stresses_on_axis(mesh: Mesh, step: StepResult, pair: str) -> tuple[Array, NDArray[np.int64], Array]:
+def stresses_on_axis(mesh: Mesh, step: StepResult, pair: str) -> tuple[Array, Indices, Array]:
     """Return depth (n,) [length], side (n,) and stress (n, 4) of the nodes on the axis.
 
     The side is 1 above the surface and -1 below (right and left of it for a horizontal axis). Components are rotated: xx

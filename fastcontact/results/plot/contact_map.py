@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,16 +13,13 @@ from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.errors import FastcontactError, check_known
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets
-from fastcontact.results.plot._axes import UNKNOWN, Panels, Units, new_panels
+from fastcontact.results.plot._axes import UNKNOWN, Axes, Panels, Units, new_panels
 from fastcontact.results.plot.hiding import seen_along
 from fastcontact.results.plot.patches import fill
 from fastcontact.results.step import ContactResult
 from fastcontact.results.units import labelled, valued
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-# Margin of the drawn part of the surface around the closed part, in its half widths.
+# The part of the surface that is drawn reaches so far beyond the closed one, in its own half widths.
 MARGIN = 0.15
 # Smallest length of the mean of the facets' normals for which a surface is drawn in projection along it.
 LEAST_MEAN = 0.3

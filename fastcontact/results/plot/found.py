@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._tools.argument_types import typed
 from fastcontact.contact.found_contacts import FoundContacts
 from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.topology import outer_facets
-from fastcontact.results.plot._axes import new_axes, settled, size_around
+from fastcontact.results.plot._axes import Axes, new_axes, settled, size_around
 from fastcontact.results.plot.patches import outlines
 from fastcontact.results.plot.solid import show_box
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-Array = NDArray[np.float64]
 
 
 @typed(FastcontactError)

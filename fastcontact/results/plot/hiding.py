@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fastcontact.arrays import Array, Mask
+from fastcontact.arrays import Array, Indices, Mask
 
 # A point less than this fraction of the total size behind a triangle lies on it.
 ON_IT = 1e-4
@@ -46,7 +45,7 @@ class Screen:
         self.members = number[order]
         self.starts = np.searchsorted(square[order], np.arange(self.n_bins**2 + 1))
 
-    def _square(self, points: Array) -> NDArray[np.int64]:
+    def _square(self, points: Array) -> Indices:
         return np.clip(((points - self.origin) / self.bin).astype(np.int64), 0, self.n_bins - 1)
 
     def hidden(self, places: Array) -> Mask:
@@ -62,8 +61,8 @@ class Screen:
         behind = self._behind(flat[index], triangle)
         return np.asarray(np.bincount(index[behind], minlength=len(flat)).astype(bool).reshape(places.shape[:-1]))
 
-    def _behind(self, flat: Array, triangle: NDArray[np.int64]) -> Mask:
-        """Return which positions (n, 3) on the screen lie within and behind their triangle (n,)."""
+    def _behind(self, flat: Array, triangle: Indices) -> Mask:
+        """Return which places (n, 3) on the screen lie within and behind their triangle (n,)."""
         a, b, c = np.moveaxis(self.corners[triangle], 1, 0)
         area = _cross(b - a, c - a)
         area = np.where(area == 0.0, np.inf, area)

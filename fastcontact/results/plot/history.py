@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -11,14 +11,11 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.analytic.pressure_curve import NAMES
 from fastcontact.arrays import Array
 from fastcontact.errors import FastcontactError
-from fastcontact.results.plot._axes import UNKNOWN, Panels, Units, contacts_of, new_axes, new_panels
+from fastcontact.results.plot._axes import UNKNOWN, Axes, Panels, Units, contacts_of, new_axes, new_panels
 from fastcontact.results.step import StepResult
 from fastcontact.results.units import labelled, units_of_results
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-# Largest number of counts of closed nodes above the zones.
+# So many numbers of closed nodes stand beside each other above the zones.
 MOST_COUNTS = 20
 STATES = {"open": "0.85", "closed": "C0", "sticking": "C0", "sliding": "C1"}
 

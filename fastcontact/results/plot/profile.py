@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import is_dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,12 +12,9 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.analytic.pressure_curve import PressureCurve, pressure_curve
 from fastcontact.arrays import Array
 from fastcontact.errors import FastcontactError
-from fastcontact.results.plot._axes import UNKNOWN, Units, new_axes
+from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, new_axes
 from fastcontact.results.step import ContactResult, half_width
 from fastcontact.results.units import labelled, valued
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 
 @typed(FastcontactError)

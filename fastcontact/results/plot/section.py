@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.plot._axes import (
     UNKNOWN,
+    Axes,
     Units,
     bar_beside,
     legend_below,
@@ -30,10 +31,7 @@ from fastcontact.results.plot.shape import framed, scaled
 from fastcontact.results.plot.solid import MOST_EDGES
 from fastcontact.results.step import StepResult
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-# Distance, over the size of the body, by which a plane that only touches it is moved inside.
+# By how much of the size of the body a plane that only touches it is moved inside.
 INSIDE = 1e-7
 # Orders of the corners of a tetrahedron in which those on one side come first, by which of the four lie there.
 _FIRST = {k: [i for i in range(4) if k >> i & 1] for k in range(16)}

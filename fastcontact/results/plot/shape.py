@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from fastcontact.errors import FastcontactError
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.plot._axes import (
     UNKNOWN,
+    Axes,
     Units,
     bar_beside,
     legend_below,
@@ -29,10 +30,7 @@ from fastcontact.results.plot.solid import MOST_EDGES, draw_solid, is_seen, view
 from fastcontact.results.step import StepResult
 from fastcontact.results.units import labelled
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-LARGEST = 1e30  # largest coordinate that can be drawn: the libraries multiply them
+LARGEST = 1e30  # of coordinates that can be drawn: the libraries multiply them
 
 
 def scaled(points: Array, scale: float, displacement: Array) -> Array:

@@ -133,21 +133,14 @@ def test_nonsymmetric_equations_with_springs_against_a_dense_solution():
     assert np.abs(out).max() < 1e-8 * np.abs(f).max()
 
 
-@pytest.mark.parametrize("stands", [False, True])
-def test_an_iteration_that_does_not_end_is_told(monkeypatch, stands):
-    if stands:
-        monkeypatch.setattr(ConjugateResiduals, "step", lambda *args: True)
+def test_an_iteration_that_does_not_end_is_told():
     analysis = Stepping(rubbing(), "amg", 1e-12, Criteria())
-    if not stands:
-        analysis.solver.patience = 1
+    analysis.solver.patience = 1
     n = analysis.model.n_dofs
     rows = csr_array((np.ones(2), ([0, 0], np.flatnonzero(analysis.system.free)[[0, 40]])), shape=(1, n))
     drag = FrictionTerms(csr_array(2.0 * rows))
     f = np.where(analysis.system.free, 1.0, 0.0)
-    made = solver.STANDING if stands else 1
-    with pytest.raises(
-        ConvergenceError, match=rf"conjugate residuals stand at .* times the tolerance after {made} iter"
-    ):
+    with pytest.raises(ConvergenceError, match=r"conjugate residuals stand at .* times the tolerance after 1 iter"):
         analysis.solver.load(f).solve_nonsymmetric(rows, np.zeros(1), np.zeros(1, np.int64), np.zeros(n), 1e-12, drag)
 
 
