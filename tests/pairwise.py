@@ -1,4 +1,4 @@
-"""Few of many cases: of a product of parameters, those that hold every pair of values; the others are slow.
+"""Covering arrays: of a product of parameters, the cases that contain every pair of values; the others are slow.
 
 Almost all faults show with one or two parameters (Kuhn, Wallace and Gallo, IEEE Trans. Software Eng. 30, 2004). A test
 with the mark `pairwise` runs a covering array of its cases by default, all of them with ``-m ''``. A test with the mark

@@ -236,7 +236,7 @@ class Anisotropic(Material):
         return f"D with the diagonal ({', '.join(f'{self.D[i][i]:g}' for i in range(6))})"
 
     def compliances(self, constants: Any) -> Array:
-        """Return the compliance (1, 6, 6) [1 / pressure], which does not vary."""
+        """Return the constant compliance (1, 6, 6) [1 / pressure]."""
         return np.asarray(np.linalg.inv(np.array(self.D)[None]))
 
     def admissible(self, constants: Any) -> Any:

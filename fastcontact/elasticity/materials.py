@@ -68,7 +68,7 @@ class Material:
 
     @property
     def contact_modulus(self) -> float:
-        """The least plane-strain modulus E / (1 - nu^2) along the axes, by which contact is scaled [pressure]."""
+        """Smallest plane-strain modulus E / (1 - nu^2) along the axes, the scale of contact stiffness [pressure]."""
         D = np.moveaxis(np.linalg.inv(self._all_compliances()), 0, -1)
         free = [D[i, i] - D[i, j] * D[j, i] / D[j, j] for i, j in ((0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1))]
         return float(np.min(free))
@@ -91,12 +91,12 @@ class Material:
 
     @property
     def varies(self) -> bool:
-        """Whether axes, moduli or expansion depend on the position."""
+        """Whether axes, moduli or expansion depend on position."""
         return callable(self.axes) or self.graded or bool(varying(self.expansion) or varying(self.axes))
 
     @property
     def graded(self) -> bool:
-        """Whether constants of the moduli depend on the position."""
+        """Whether constants of the moduli depend on position."""
         return any(varying(getattr(self, name, None)) for name in MODULI)
 
     @property
@@ -188,7 +188,7 @@ class Material:
     def moduli_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
         """Return the moduli (n, 4, 4), in 3D (n, 6, 6) [pressure] at `points` (n, dim) [length]; see `moduli`.
 
-        `constants` are those of `constants_at` there, where they vary.
+        `constants` are those of `constants_at` there, if they vary.
         """
         compliance = self._compliance6(points, kinematics, constants)
         if kinematics == "3d":
@@ -203,15 +203,16 @@ class Material:
     def compliance_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
         """Return the compliance (n, 4, 4), in 3D (n, 6, 6) [1 / pressure] at `points` (n, dim) [length].
 
-        Stress : strain is that of the whole stress in any kinematics, since stresses yz and xz are zero in the plane.
+        In the plane it includes zz, so that stress : compliance : stress is complete; stresses yz and xz are zero
+        there.
         """
         size = 6 if kinematics == "3d" else 4
         return np.asarray(self._compliance6(points, kinematics, constants)[:, :size, :size])
 
     def expansion_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
-        """Return the strains (n, 4), in 3D (n, 6) [1 / temperature] of a degree at `points` (n, dim) [length].
+        """Return the thermal strain (n, 4), in 3D (n, 6) [1 / temperature] per degree at `points` (n, dim) [length].
 
-        NaN without expansion. ModelError if it is a shear out of the plane, in kinematics that have none.
+        NaN without expansion. ModelError if it has an out-of-plane shear that the kinematics exclude.
         """
         size = 6 if kinematics == "3d" else 4
         if self.expansion is None:
@@ -229,7 +230,7 @@ class Material:
     def conductivity_at(self, points: Array, kinematics: str, constants: Any) -> Array:
         """Return the conductivity (n, dim, dim) [power / (length temperature)] at `points` (n, dim) [length].
 
-        `constants` are those of `constants_at` there. ModelError if axes that leave the plane turn heat out of it.
+        `constants` are those of `constants_at` there. ModelError if inclined axes conduct heat out of the plane.
         """
         given, dim = constants.conductivity, points.shape[1]
         if not isinstance(given, tuple):
@@ -398,12 +399,12 @@ class LinearElastic(Material):
 
     @property
     def young(self) -> tuple[float, float]:
-        """Young's modulus, twice; where it varies, the smallest and the largest."""
+        """Smallest and largest Young's modulus, equal unless it varies [pressure]."""
         return self.E.range if isinstance(self.E, Varying) else (self.E, self.E)
 
     @property
     def contact_modulus(self) -> float:
-        """E / (1 - nu^2) [pressure]; the least where they vary."""
+        """E / (1 - nu^2) [pressure]; the smallest value if they vary."""
         if not self.graded:
             return self.E / (1 - self.nu**2)
         samples = [self.constants_at(*sample) for sample in self._cells().samples()]
@@ -411,7 +412,7 @@ class LinearElastic(Material):
 
     @property
     def largest_nu(self) -> float:
-        """Poisson's ratio [-]; where it varies, the largest, and zero while no cells have the material."""
+        """Poisson's ratio [-]; if it varies, the largest, and zero before the material is assigned to cells."""
         if not isinstance(self.nu, Varying):
             return self.nu
         return 0.0 if self.nu.cells is None else self.nu.range[1]
@@ -432,7 +433,7 @@ class LinearElastic(Material):
 
     @property
     def averaged(self) -> bool:  # type: ignore[override]
-        """Whether elements have a mean dilatation, where they can and kinematics are not plane stress."""
+        """Whether elements use a mean dilatation, if they support it and kinematics are not plane stress."""
         nearly = self.largest_nu >= NEARLY_INCOMPRESSIBLE
         return self.volumetric == "mean_dilatation" or (self.volumetric == "auto" and nearly)
 

@@ -176,7 +176,13 @@ class NeoHookean(Hyperelastic):
 
 @dataclass(frozen=True)
 class OwnConstants(Hyperelastic):
-    """A law by constants of its own, among them the `bulk` modulus, which E and nu of small strains follow from."""
+    """A law with its own constants and a `bulk` modulus, from which E and nu follow.
+
+    Parameters
+    ----------
+    volumetric, density, expansion, conductivity
+        Further properties, as for `LinearElastic`.
+    """
 
     E: Constant = field(init=False, default=0.0)
     nu: Constant = field(init=False, default=0.0)

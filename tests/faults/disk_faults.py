@@ -1,4 +1,4 @@
-"""A harness for commands on a disk that fails: builds the library, runs the worker, judges what came of each fault."""
+"""Test harness for commands on a failing disk: build the library, run the worker, judge each fault."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Run commands on a disk that fails at one call after the other. Started with the library of `disk.c` preloaded.
+"""Run commands on a disk that fails at one call after the other, with the library of `disk.c` preloaded.
 
 Arguments: folder to work in, folder of the files to start from, number of faults a command (0: at every call), commands as
 JSON. Then all writes are short once, which is no fault. Each command runs in a child of its own, on a fresh copy of the

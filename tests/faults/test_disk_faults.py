@@ -1,4 +1,4 @@
-"""Whatever call of whatever command a disk refuses: one line, exit code 1, nothing lost, nothing left behind."""
+"""If a disk fails at any call of a command: one line, exit code 1, no data lost, no files left behind."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Any bytes, any text and any table: hypothesis looks for what is neither read nor refused."""
+"""Any bytes, text or table is either read or refused (hypothesis)."""
 
 import tomllib
 import warnings

@@ -1,4 +1,4 @@
-"""Case files hold data: whatever a text in them says, nothing of it is evaluated, expanded, imported or run."""
+"""Case files are data: no text in them is evaluated, expanded, imported or run."""
 
 import itertools
 import os

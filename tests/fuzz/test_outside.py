@@ -1,4 +1,4 @@
-"""What leads out of a file is refused before anything there is opened: links, outer storage, virtual data sets, paths."""
+"""References to other files are refused before opening them: links, external storage, virtual data sets, paths."""
 
 import sys
 from xml.etree import ElementTree

@@ -1,4 +1,4 @@
-"""What may be wrong with a place to write to: functions that arrange it, the command, and a pattern of the message."""
+"""Failures of output files: functions that provoke them, the command, and a pattern of the message."""
 
 import errno
 import os

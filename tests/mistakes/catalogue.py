@@ -1,4 +1,4 @@
-"""Mistakes in a case file: what is replaced by what in the FORMA04 A case, and a pattern of the message."""
+"""Mistakes in a case file: a replacement in the FORMA04 A case, and a pattern of the message."""
 # ruff: noqa: E501 (messages stay in one piece)
 
 # fmt: off

@@ -1,4 +1,4 @@
-"""Cases that are solved but doubtful: what their mesh and case file are, and a pattern of the warning with its number."""
+"""Solvable but doubtful cases: mesh and case file, and a pattern of the warning with its number."""
 # ruff: noqa: E501 (messages stay in one piece)
 
 from typing import NamedTuple

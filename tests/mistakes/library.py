@@ -1,4 +1,4 @@
-"""Mistakes in calls of the library: what is done wrong, the kind of the error, and a pattern of its message."""
+"""Mistakes in calls of the library: the call, the class of the error, and a pattern of its message."""
 # ruff: noqa: E501 (messages stay in one piece)
 
 from collections.abc import Callable

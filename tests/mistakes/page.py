@@ -1,4 +1,4 @@
-"""The page of the documentation about mistakes, made from the catalogue: ``python tests/mistakes/page.py`` writes it."""
+"""Generate the documentation page on mistakes from the catalogue: ``python tests/mistakes/page.py``."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Mistakes that few make with files: functions that make one, the kind of error, a pattern of the message.
+"""Rare mistakes with files: functions that provoke them, the class of error, a pattern of the message.
 
 No function names a device or anything else outside the folder it is given: a check that is missing could destroy it.
 """

@@ -1,4 +1,4 @@
-"""What goes wrong inside, or around: a part is made to fail, and the failure must be told. Kinds and patterns likewise."""
+"""Failures inside the library or of its environment, which must be reported: classes of errors and patterns."""
 # ruff: noqa: E501 (messages stay in one piece)
 
 import errno

@@ -1,4 +1,4 @@
-"""Mistakes that few make in models, formulations and pictures: what is done, the kind of error, a pattern of the message."""
+"""Rare mistakes in models, formulations and pictures: the call, the class of error, a pattern of the message."""
 # ruff: noqa: E501 (messages stay in one piece)
 
 import sys

@@ -1,4 +1,4 @@
-"""Mistakes that few make in case files and studies: changes of the FORMA04 A case, commands, and calls."""
+"""Rare mistakes in case files and studies: changes of the FORMA04 A case, commands, and calls."""
 # ruff: noqa: E501 (messages stay in one piece)
 
 import errno

@@ -1,4 +1,4 @@
-"""Meshes with a mistake in them: functions that write a spoilt copy of a MED file, and a pattern of the message."""
+"""Damaged meshes: functions that write a damaged copy of a MED file, and a pattern of the message."""
 # ruff: noqa: E501 (messages stay in one piece)
 
 import shutil

@@ -1,4 +1,4 @@
-"""A doubtful result says so, with a number: on screen, in the summary, in the result file and to who calls the library."""
+"""A doubtful result gives a warning with a number: on screen, in the summary, in the result file and in Python."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""Compiled kernels kept on disk: where nothing may be written, and where two processes write at once."""
+"""Cache of compiled kernels: read-only folders, and two processes that write at once."""
 
 import json
 import os

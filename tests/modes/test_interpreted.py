@@ -1,4 +1,4 @@
-"""NUMBA_DISABLE_JIT=1: the same kernels in plain Python find the same numbers."""
+"""NUMBA_DISABLE_JIT=1: interpreted kernels give the same numbers."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""Children of multiprocessing: they find what their parent finds, or are told why they cannot."""
+"""Children of multiprocessing give the results of their parent, or an error that states why they cannot."""
 
 import json
 import sys

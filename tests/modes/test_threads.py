@@ -1,4 +1,4 @@
-"""The same bits with one and with two threads, ours and those of BLAS: displacement, stress, contact force of whole runs."""
+"""Whole runs have the same bits with one and two threads, of kernels and of BLAS."""
 
 import json
 

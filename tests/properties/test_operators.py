@@ -1,4 +1,4 @@
-"""Operators that theory says are symmetric and positive are so: stiffness, compliance, preconditioner."""
+"""Stiffness, compliance and preconditioner are symmetric and positive, as theory requires."""
 
 import numpy as np
 from hypothesis import assume, given

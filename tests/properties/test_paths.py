@@ -1,4 +1,4 @@
-"""What depends on the path and what does not: forces that grow with the approach, states without memory, work."""
+"""Path dependence and independence: force over approach, states without history, work."""
 
 import numpy as np
 from hypothesis import assume, given

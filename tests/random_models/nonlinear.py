@@ -1,4 +1,4 @@
-"""Random models whose bodies yield or stretch: two blocks on each other, or one below a rigid ball; what must hold of them.
+"""Random models of nonlinear bodies: two blocks, or a block below a rigid ball; invariants of their results.
 
 `python tests/random_models/nonlinear.py FIRST COUNT` prints a line for each seed.
 """

@@ -1,4 +1,4 @@
-"""Random models end in results that are right, or in errors of our own; `bench/random_models.py` solves two thousand."""
+"""Random models end in correct results or errors of the package; `bench/random_models.py` solves two thousand."""
 
 from dataclasses import replace
 from types import SimpleNamespace

@@ -1,4 +1,4 @@
-"""Errors and answers that few users meet: wrong histories, places, fields of files, streams; systems that lack something."""
+"""Less common errors: wrong histories, positions, fields of files, streams; incomplete systems."""
 
 import dataclasses
 import errno

@@ -1,4 +1,4 @@
-"""Loads in equilibrium: exact fields, thick cylinders, coupled faces, histories, bodies that only contact holds."""
+"""Loads in equilibrium: exact fields, thick cylinders, coupled faces, histories, floating bodies."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Two like spheres in three dimensions, pressed and then drawn along: Cattaneo's and Mindlin's partial slip.
+"""Two equal spheres in three dimensions, pressed and loaded tangentially: partial slip of Cattaneo and Mindlin.
 
 Poisson's ratio is 0, where slip goes along the force exactly, and like bodies do not couple pressure and shear. The model
 is the half z >= 0, forces below are those of the whole. Theory is taken at the forces found.

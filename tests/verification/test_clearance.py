@@ -1,4 +1,4 @@
-"""Clearance and interference: what the option adds to the gap is what moving the bodies would."""
+"""Clearance and interference: the option has the effect of moving the bodies."""
 
 import numpy as np
 import pytest

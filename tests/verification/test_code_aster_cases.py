@@ -1,4 +1,4 @@
-"""code_aster's validation cases, read from folders of specs (``pytest --cases DIR``) and run through our interface.
+"""code_aster's validation cases, read from folders of specs (``pytest --cases DIR``) and run through the public API.
 
 Every tested value must lie within the tolerance of its spec, but for the `AMENDMENTS`: there the stated value is wrong, or
 belongs to something else than the case, or its tolerance stands for something, or an exact method must do better; and

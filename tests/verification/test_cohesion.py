@@ -1,4 +1,4 @@
-"""Cohesive layers: the law traced exactly, mixed modes, a double cantilever beam, work, restarts, adhesion of a sphere."""
+"""Cohesive layers: the exact law, mixed modes, a double cantilever beam, work, restarts, adhesion of a sphere."""
 
 import numpy as np
 import pytest

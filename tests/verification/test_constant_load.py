@@ -1,4 +1,4 @@
-"""Load steps in which no load changes: with friction, too, forces and displacements stay."""
+"""Load steps with constant load: forces and displacements do not change, also with friction."""
 
 import numpy as np
 import pytest

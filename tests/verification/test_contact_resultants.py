@@ -1,4 +1,4 @@
-"""Force, moment, area, centre, mean gap, work of friction and wear of contacts that are known exactly."""
+"""Force, moment, area, centre, mean gap, work of friction and wear of contacts with exact solutions."""
 
 import json
 

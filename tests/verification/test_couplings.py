@@ -1,4 +1,4 @@
-"""Couplings, moments and hydrostatic pressure: beams by the theory of bending, statics, and motions as of rigid bodies."""
+"""Couplings, moments and hydrostatic pressure: beam theory, statics, and rigid-body motions."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Contact in finite strain on the deformed surfaces: patch tests, sliding over facets, rings held by contact alone."""
+"""Contact in finite strain on deformed surfaces: patch tests, sliding over facets, floating rings."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The estimated error against the true one on Hertz in a box, and what an exact solution gives."""
+"""The estimated error compared with the true one for Hertz in a box, and for an exact solution."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""One table that shows that results do not depend on the linear solver: multigrid beside factors.
+"""Results do not depend on the linear solver: multigrid compared with the direct solver.
 
 Every element, formulation and dimension, rigid obstacles too, with and without friction and penalty, either side secondary.
 The default run takes each element with two formulations (in space one), with friction and without, in turn with a penalty or

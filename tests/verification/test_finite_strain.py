@@ -1,4 +1,4 @@
-"""Finite strains against closed forms: bars of every law, simple shear, an inflated tube, the elastica; contact."""
+"""Finite strains compared with closed forms: bars of every law, simple shear, an inflated tube, the elastica; contact."""
 
 import numpy as np
 import pytest

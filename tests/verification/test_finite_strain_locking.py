@@ -1,4 +1,4 @@
-"""Nearly incompressible bodies in finite strain do not lock: a thick sphere blown up, a block squeezed by rough plates."""
+"""Nearly incompressible bodies in finite strain do not lock: an inflated thick sphere, a compressed block."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Nodes that flip between two facets whichever of their normals is taken: equilibrium is at the edge, and it is found."""
+"""Nodes that alternate between two facets: the equilibrium at their common edge is found."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Fluid that penetrates a contact: a flat seal by statics, a front by pressure, pockets, friction, restarts."""
+"""Fluid penetration of a contact: a flat seal by statics, a front by pressure, pockets, friction, restarts."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The training case on our own meshes: near code_aster's meshes, and towards the mesh-converged solution."""
+"""The training case on meshes of the generator: close to code_aster's meshes, and converging to the reference."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The training case on code_aster's own meshes, against what code_aster computes there."""
+"""The training case on code_aster's meshes, compared with results of code_aster."""
 
 import csv
 

@@ -1,4 +1,4 @@
-"""Coulomb friction: stick, slip, partial slip after Cattaneo and Mindlin, residual tractions."""
+"""Coulomb friction: stick, slip, partial slip of Cattaneo and Mindlin, residual tractions."""
 
 import warnings
 

@@ -1,4 +1,4 @@
-"""Work of friction: a block just below and just above its limit, and the energy balance when the load turns round."""
+"""Work of friction: a block just below and above its limit, and the energy balance on load reversal."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""A ring squeezed into a groove of three rigid walls with friction, whose corner nodes two walls hold at once."""
+"""A ring compressed in a groove of three rigid walls with friction, with corner nodes held by two walls."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Steady heat: exact solutions, rates of convergence, conductance of contacts, exchange with contact and friction."""
+"""Steady heat: exact solutions, rates of convergence, conductance of contacts, coupling with contact and friction."""
 
 import itertools
 

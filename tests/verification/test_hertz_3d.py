@@ -1,4 +1,4 @@
-"""Point contact in three dimensions against Hertz at equal force: spheres and ellipsoids on a rigid plane or as one.
+"""Point contact in three dimensions compared with Hertz at equal force: spheres and ellipsoids.
 
 A quarter of every body is meshed. Radii are taken from first moments of the contact force: under Hertz's pressure its
 mean distance from an axis of the ellipse is 3/8 of the semi-axis.

@@ -1,4 +1,4 @@
-"""Turning, mirroring, moving far away and renumbering change rounding only."""
+"""Rotation, reflection, distant translation and renumbering change results by round-off only."""
 
 from functools import cache
 

@@ -1,4 +1,4 @@
-"""A body driven by a force ends where one driven by a displacement does, to 1e-8, in every formulation."""
+"""Force-driven and displacement-driven bodies have the same result, to 1e-8, in every formulation."""
 
 import numpy as np
 import pytest

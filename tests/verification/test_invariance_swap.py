@@ -1,4 +1,4 @@
-"""Swapping the two sides of a mortar contact changes results by less than the mesh does."""
+"""Swapping the two sides of a mortar contact changes results by less than the discretisation error."""
 
 from functools import cache
 

@@ -1,4 +1,4 @@
-"""The unit system makes no difference: SI, mm-N-MPa and nanometre units give the same answer with the same iterations."""
+"""The unit system has no effect: SI, mm-N-MPa and nanometre units give the same result with the same iterations."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Contact geometry is linearised: derivatives against differences, and load steps that converge quadratically."""
+"""Linearised contact geometry: derivatives compared with differences, and quadratic convergence of load steps."""
 
 import numpy as np
 import pytest

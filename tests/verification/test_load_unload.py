@@ -1,4 +1,4 @@
-"""Loading and unloading, and swapping the sides: what must not matter does not."""
+"""Loading and unloading, and swapping the sides: invariants of the result."""
 
 import numpy as np
 import pytest

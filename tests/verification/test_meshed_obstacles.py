@@ -1,4 +1,4 @@
-"""Rigid meshed surfaces as obstacles: the same as the exact shapes they mesh, up to how well they mesh them."""
+"""Rigid meshed surfaces as obstacles: equal to the exact shapes up to their discretisation."""
 
 import numpy as np
 import pytest

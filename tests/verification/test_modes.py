@@ -1,4 +1,4 @@
-"""Modes: bars, beams, plates and rings of the textbooks; bodies joined by contact as whole ones; closed forms of preload."""
+"""Modes: bars, beams, plates and rings of textbooks; bodies joined by contact as one body; closed forms with preload."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Mortar contact with dual multipliers: patch tests, partial cover, the training case, one pivot a gap."""
+"""Mortar contact with dual multipliers: patch tests, partial cover, the training case, one pivot per gap."""
 
 import numpy as np
 import pytest

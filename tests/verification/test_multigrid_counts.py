@@ -1,4 +1,4 @@
-"""Contact at the price of a linear solution: iterations counted, not timed, so that the same holds on any machine."""
+"""Contact at the cost of a linear solution, measured by iterations, which are the same on any machine."""
 
 import numpy as np
 import pytest

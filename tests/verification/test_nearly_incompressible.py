@@ -1,4 +1,4 @@
-"""Nearly incompressible bodies: Cook's membrane, a bonded pad, Hertz's contact, each against a refined mesh."""
+"""Nearly incompressible bodies: Cook's membrane, a bonded pad, Hertz contact, each compared with a refined mesh."""
 
 import numpy as np
 import pytest

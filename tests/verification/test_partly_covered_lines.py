@@ -1,4 +1,4 @@
-"""Mortar in the plane on sides that face each other with any part of any facet: no singular field, and a balanced result."""
+"""Mortar in the plane with partly covered facets: no singular field, and a balanced result."""
 
 import numpy as np
 import pytest

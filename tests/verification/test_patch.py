@@ -1,4 +1,4 @@
-"""Contact patch tests on matching meshes, and motion without deformation."""
+"""Contact patch tests on matching meshes, and rigid-body motion."""
 
 import numpy as np
 import pytest

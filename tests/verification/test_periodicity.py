@@ -1,4 +1,4 @@
-"""One period or one sector for the whole: against the whole, against Lame, against Westergaard's wavy surface."""
+"""One period or sector compared with the whole structure, with Lame, and with Westergaard's wavy surface."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Plastic bodies against closed forms: bars, cycles, simple shear, Hill's tube; contact past yield."""
+"""Plasticity compared with closed forms: bars, cycles, simple shear, Hill's tube; contact beyond yield."""
 
 import numpy as np
 import pytest

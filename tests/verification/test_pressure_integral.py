@@ -1,4 +1,4 @@
-"""The pressure that is reported carries the force: its integral over the secondary side, by every formulation."""
+"""The reported pressure integrates to the contact force, in every formulation."""
 
 import warnings
 

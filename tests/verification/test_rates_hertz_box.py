@@ -1,4 +1,4 @@
-"""Rates of convergence on Hertz in a box: exact fields with the regularity that contact has, and no model error.
+"""Rates of convergence for Hertz in a box: exact fields with the regularity of contact, and no model error.
 
 Expected orders: the energy of the error h for linear and h^(3/2) for quadratic elements, whatever their order, since
 the displacement has 5/2 derivatives only; its mean square h^2 (Drouet and Hild, 2015). Rates are fitted over at least

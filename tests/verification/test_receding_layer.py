@@ -1,4 +1,4 @@
-"""A layer without weight, pressed on its base by a line load: the contact recedes at once and then stays as it is.
+"""A weightless layer pressed on its base by a line load: the contact recedes at once, then does not change.
 
 Keer, Dundurs and Tsai (1972): the half-width of the contact does not depend on the load.
 """

@@ -1,4 +1,4 @@
-"""A tangential penalty: what sticks slips by its shear over the penalty, from step to step; beyond the limit it slides."""
+"""Tangential penalty: elastic slip of shear over penalty, accumulated over steps; sliding beyond the limit."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Tied contact: bodies glued along meshes that need not match."""
+"""Tied contact between meshes that need not match."""
 
 import numpy as np
 import pytest

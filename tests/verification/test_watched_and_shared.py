@@ -1,4 +1,4 @@
-"""Pairs that are only watched, that search near by, that share nodes or are paired node by node; forces on both sides."""
+"""Gap-only pairs, search distance, shared nodes, node-to-node pairing; forces on both sides."""
 
 import numpy as np
 import pytest

@@ -247,8 +247,8 @@ class ModelInitialStates(ModelLoads):
     ) -> StressOffset | None:  # fmt: skip
         """Return the stresses of temperatures and initial states, to add to those of displacements; None without any.
 
-        The factors are those of `StepResult.iterations`; `field` is the `material_field`, if known; `temperature`
-        (n_points,) [temperature] is that of the step result, with heat conduction.
+        With heat conduction `temperature` (n_points,) [temperature] is that of the step result. The factors are those
+        of `StepResult.iterations`; `field` is the `material_field`, if known.
         """
         rise, states = self.expanding_rise(temperature_factors, temperature), []
         if len(initial_factors):

@@ -1,4 +1,4 @@
-"""Kernels on disk: compiled anew when a kernel of another file that they call has changed."""
+"""Cached kernels are compiled again if a kernel of another file that they call has changed."""
 
 import logging
 import os

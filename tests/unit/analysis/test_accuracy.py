@@ -1,4 +1,4 @@
-"""The accuracy that is promised: forces balance to the criterion whatever the linear solver, or an error says why not."""
+"""Forces balance to the criterion with every linear solver, or an error states why not."""
 
 import logging
 from dataclasses import replace

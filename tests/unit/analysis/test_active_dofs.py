@@ -1,4 +1,4 @@
-"""Pairings that find the displacements of contact surfaces alone: what they say is what all displacements say."""
+"""Pairings that solve for displacements of contact surfaces only agree with those for all displacements."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""A side cut in several node-to-segment pairs: results do not depend on where, with friction and penalties too."""
+"""A side divided into several node-to-segment pairs: results do not depend on the division, with friction and penalties."""
 
 import numpy as np
 import pytest

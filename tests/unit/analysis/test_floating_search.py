@@ -1,4 +1,4 @@
-"""Bodies held by contact alone: springs whose anchors follow the bodies, and what a step costs."""
+"""Floating bodies: springs whose anchors follow the bodies, and the cost of a step."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""Friction on eliminated constraints: pivots in groups, multipliers through other rows, the iteration, and results."""
+"""Friction with eliminated constraints: grouped pivots, nonsymmetric rows, iteration and results."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The warning of locking: its number against two solutions, and no word where nothing locks."""
+"""Locking warning: its number compared with two solutions, and no warning without locking."""
 
 import re
 import warnings

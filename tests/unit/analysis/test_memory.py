@@ -1,4 +1,4 @@
-"""A finished analysis goes at once: nothing large waits in a reference cycle for the garbage collector."""
+"""A finished analysis is freed at once: no large object waits in a reference cycle."""
 
 import gc
 

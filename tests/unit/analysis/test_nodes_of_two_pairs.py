@@ -1,4 +1,4 @@
-"""Nodes that two node-to-segment pairs share: one condition, whose force both carry by their areas."""
+"""Nodes shared by two node-to-segment pairs: one constraint, whose force both carry by area."""
 
 import logging
 

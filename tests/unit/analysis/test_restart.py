@@ -1,4 +1,4 @@
-"""An analysis that goes on after some steps ends as if it had never stopped, and only with the case that it was."""
+"""A resumed analysis ends like an uninterrupted one, and requires the same case."""
 
 import warnings
 from dataclasses import fields

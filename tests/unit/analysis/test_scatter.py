@@ -1,4 +1,4 @@
-"""What a geometry loop can attain: slow convergence goes on, round-off ends it with a note, and the result is right."""
+"""Limits of the geometry loop: slow convergence continues, round-off ends it with a note, and the result is correct."""
 
 import logging
 

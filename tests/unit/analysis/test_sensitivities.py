@@ -1,4 +1,4 @@
-"""Sensitivities against differences of whole solutions, in every formulation, dimension and kind of parameter."""
+"""Sensitivities compared with differences of solutions, in every formulation, dimension and kind of parameter."""
 
 from __future__ import annotations
 

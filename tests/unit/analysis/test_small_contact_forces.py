@@ -1,4 +1,4 @@
-"""Friction whose forces linear solutions leave less accurate than asked for: multigrid settles at what they are worth."""
+"""Friction with forces that are small relative to the accuracy of linear solutions converges with multigrid."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Steps one at a time: computed when asked for, kept by nobody, the same as all at once."""
+"""Steps one at a time: computed on request, not kept, equal to those of `solve`."""
 
 import gc
 import itertools

@@ -1,4 +1,4 @@
-"""Stacks of blocks with friction by multigrid: bodies in the middle are held by contact alone."""
+"""Stacks of blocks with friction and multigrid: contact alone holds the middle bodies."""
 
 import numpy as np
 import pytest

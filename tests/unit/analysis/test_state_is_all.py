@@ -1,4 +1,4 @@
-"""The same step from the same state gives the same bits and counts, after any other step and in another problem."""
+"""A step from the same state gives the same bits and counts, after any other step and in another problem."""
 
 from dataclasses import replace
 

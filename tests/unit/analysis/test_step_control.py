@@ -1,4 +1,4 @@
-"""Load steps cut in halves: the same end as with those steps asked for, and nothing left of what failed."""
+"""Halved load steps: the same end as with prescribed steps, and no trace of failed ones."""
 
 from dataclasses import replace
 from types import SimpleNamespace

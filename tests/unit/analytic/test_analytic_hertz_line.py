@@ -1,4 +1,4 @@
-"""Hertz's cylinders against tables, integrals and the equations of elasticity."""
+"""Hertz contact of cylinders compared with tables, integrals and the equations of elasticity."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""The ready cases: found by name, listed, copied, and each within the tolerances it states."""
+"""The ready cases: found by name, listed, copied, and each within its stated tolerances."""
 
 import json
 import re

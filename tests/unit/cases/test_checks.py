@@ -1,4 +1,4 @@
-"""Checks of case files: what may be compared with what, and what comes out."""
+"""Checks of case files: admissible comparisons and their results."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Whatever stands behind any key of a case file: the case is read, or one line names the file and the key."""
+"""Any value of any key of a case file is read, or one line names the file and the key."""
 
 from __future__ import annotations
 

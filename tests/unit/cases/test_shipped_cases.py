@@ -1,4 +1,4 @@
-"""Every case file of the project is whole, and its first step runs."""
+"""Every case file of the project is complete, and its first step runs."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Ctrl-C at any time ends a command with one line; it is neither lost nor told with the program's inside."""
+"""Ctrl-C at any time ends a command with one line, without a traceback."""
 
 import contextlib
 import ctypes

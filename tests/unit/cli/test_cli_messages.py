@@ -1,4 +1,4 @@
-"""What a command says of numbers and texts that cannot be drawn: one line, no traceback."""
+"""Messages of commands about numbers and texts that cannot be drawn: one line, no traceback."""
 
 import os
 import shutil

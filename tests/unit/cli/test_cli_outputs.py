@@ -1,4 +1,4 @@
-"""No command replaces what it reads, or one of its outputs by another; no output is left half written."""
+"""No command replaces its inputs, or one output by another; no output remains incomplete."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`fastcontact run` and `run --resume` when something goes wrong: one line, the right exit code, nothing damaged."""
+"""`fastcontact run` and `run --resume` on failures: one line, the right exit code, no damage."""
 
 import importlib.util
 import os

@@ -1,4 +1,4 @@
-"""What commands of studies say on the way: progress on a terminal, interruptions, values of parameters."""
+"""Output of study commands: progress on a terminal, interruptions, values of parameters."""
 
 import argparse
 import inspect

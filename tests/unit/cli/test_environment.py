@@ -1,4 +1,4 @@
-"""Environments in which libraries would end with a traceback: one line, exit code 1."""
+"""Environments in which libraries would raise a traceback: one line, exit code 1."""
 
 import os
 import subprocess

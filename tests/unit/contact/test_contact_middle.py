@@ -1,4 +1,4 @@
-"""Places are measured from the middle of a contact, wherever it lies and whichever way it faces; what is drawn of it."""
+"""Distances from the middle of a contact, at any position and orientation; their pictures."""
 
 import csv
 

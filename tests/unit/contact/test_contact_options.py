@@ -1,4 +1,4 @@
-"""Options of contact pairs: from Python and from case files alike, and what is said when they are wrong."""
+"""Options of contact pairs, from Python and from case files, and their messages."""
 
 import copy
 import tomllib

@@ -1,4 +1,4 @@
-"""Where the primary side has a corner or ends nothing beside it carries force, and both sides balance in moment."""
+"""Beyond corners and ends of the primary side no node carries force, and moments balance."""
 
 import numpy as np
 import pytest

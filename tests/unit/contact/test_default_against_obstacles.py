@@ -1,4 +1,4 @@
-"""What a side gets against a rigid obstacle without asking: by its cells, and right on them."""
+"""The default formulation against rigid obstacles: chosen by facet type, and accurate on each."""
 
 import pytest
 from models import elastic_model

@@ -1,4 +1,4 @@
-"""The formulation that a pair gets without asking for one: right on any two surfaces, also where others are not."""
+"""The default formulation is accurate on any two surfaces, also where others are not."""
 
 import logging
 

@@ -1,4 +1,4 @@
-"""The smooth surfaces that facets stand for: exact on circles, cylinders and spheres, nothing on flats, and what is told."""
+"""Surface smoothing: exact on circles, cylinders and spheres, no effect on flat sides; messages."""
 
 import warnings
 

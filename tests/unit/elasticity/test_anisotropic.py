@@ -1,4 +1,4 @@
-"""Orthotropic and anisotropic materials: moduli, conditions, axes, element loops against NumPy twins."""
+"""Orthotropic and anisotropic materials: moduli, conditions, axes, element loops compared with NumPy twins."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Element loops against plain NumPy twins, and what stiffness must satisfy."""
+"""Element loops compared with plain NumPy twins, and invariants of the stiffness."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Three dimensions: element loops against NumPy twins, patch tests, exact solutions, orientation, mixed meshes."""
+"""Three dimensions: element loops compared with NumPy twins, patch tests, exact solutions, orientation, mixed meshes."""
 
 import numpy as np
 import pytest

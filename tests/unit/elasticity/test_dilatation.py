@@ -1,4 +1,4 @@
-"""Mean dilatation: element loops against NumPy twins, patch tests, no motion free but rigid ones, no locking."""
+"""Mean dilatation: element loops compared with NumPy twins, patch tests, no spurious modes, no locking."""
 
 from dataclasses import replace
 

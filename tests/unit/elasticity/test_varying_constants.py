@@ -1,4 +1,4 @@
-"""Constants of materials that vary over cells, over points, or by a function: exact solutions, equivalences, mistakes."""
+"""Material constants that vary over cells, points or by a function: exact solutions, equivalences, mistakes."""
 
 import dataclasses
 

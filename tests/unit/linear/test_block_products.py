@@ -1,4 +1,4 @@
-"""Products of small blocks in vectors, against NumPy; nothing beside the blocks counts."""
+"""Products of small blocks by vector instructions, compared with NumPy."""
 
 import numpy as np
 import pytest

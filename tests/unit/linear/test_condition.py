@@ -1,4 +1,4 @@
-"""The estimate of condition numbers beside exact ones, and matrices that are singular though their factors hide it."""
+"""Estimates of condition numbers compared with exact ones; singular matrices with inconspicuous factors."""
 
 import numpy as np
 import pytest

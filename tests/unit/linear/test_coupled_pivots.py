@@ -1,4 +1,4 @@
-"""Equations of many nodes that share unknowns: their pivots are factorised, and no column of the inverse is solved for."""
+"""Constraints that share unknowns: pivots are factorised, and no column of the inverse is computed."""
 
 import numpy as np
 import pressed_blocks

@@ -1,4 +1,4 @@
-"""Forces of points that a field represents in part: the equations of the field, and continuous contact by multigrid."""
+"""Forces at points that a field represents in part: equations of the field, and continuous contact by multigrid."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Pivots of equations in layers: the inverse of the pivots' columns is exact, and refused where there is no order."""
+"""Pivots in layers: the inverse of the pivot columns is exact, and refused without an order."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Multigrid against NumPy and SciPy: kernels, set-up, equations; bits, bytes and allocations."""
+"""Multigrid compared with NumPy and SciPy: kernels, set-up, constraints; bits, bytes and allocations."""
 
 import logging
 import tracemalloc

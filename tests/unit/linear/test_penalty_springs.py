@@ -1,4 +1,4 @@
-"""Equations that give way by themselves under multigrid: springs, eliminated excesses; what contact with a penalty costs."""
+"""Compliant constraints with multigrid: springs, eliminated violations, cost of contact with a penalty."""
 
 from functools import cache
 

@@ -1,4 +1,4 @@
-"""Factors with the contact unknowns last: order, triangular kernels, displacements under contact forces, known loads."""
+"""Factors with the contact unknowns last: ordering, triangular kernels, displacements under contact forces, known loads."""
 
 import numpy as np
 import pytest

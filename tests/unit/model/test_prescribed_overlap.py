@@ -1,4 +1,4 @@
-"""Supports that alone bring contact nodes into the other side are told, whatever the formulation."""
+"""Supports that drive contact nodes into the other side give a warning, in every formulation."""
 
 import warnings
 

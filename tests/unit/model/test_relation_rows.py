@@ -1,4 +1,4 @@
-"""Supports and relations along normals, and between groups: a turned model moves as the model, turned."""
+"""Constraints along normals and between groups: a rotated model gives rotated results."""
 
 import tomllib
 

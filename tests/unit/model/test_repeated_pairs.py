@@ -1,4 +1,4 @@
-"""Two pairs may not press the same facets on each other, in whichever roles."""
+"""Two pairs must not join the same facets, in either role."""
 
 import numpy as np
 import pytest

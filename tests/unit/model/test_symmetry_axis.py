@@ -1,4 +1,4 @@
-"""Without any support the axis of an axisymmetric model stays closed, and says so."""
+"""Without a support the axis of an axisymmetric model remains closed, and the description says so."""
 
 import logging
 

@@ -1,4 +1,4 @@
-"""Steps that are written while the next one is computed: the same file, no step lost, and errors that are told."""
+"""Steps written while the next one is computed: the same file, no step lost, and errors reported."""
 
 import contextlib
 import threading

@@ -1,4 +1,4 @@
-"""Many small steps in one file: what one more of them costs does not grow with those that are there."""
+"""Many small steps in one file: the cost of a step does not grow with their number."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Result files of every schema version that there ever was, this one included, are read for ever (resources/make.py)."""
+"""Result files of every schema version, the current one included, remain readable (resources/make.py)."""
 
 from __future__ import annotations
 

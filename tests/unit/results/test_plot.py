@@ -1,4 +1,4 @@
-"""Pictures: what is drawn of a solid, and where; looked at through the artists and through the pixels."""
+"""Pictures of solids: contents and positions, checked by artists and by pixels."""
 
 import numpy as np
 import pytest

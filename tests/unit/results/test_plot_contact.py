@@ -1,4 +1,4 @@
-"""Pictures of what happens under and along a contact: the numbers they show, and the commands that make them."""
+"""Pictures of contacts: their numbers, and the commands that make them."""
 
 import numpy as np
 import pytest

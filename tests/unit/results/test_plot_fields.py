@@ -1,4 +1,4 @@
-"""Pictures of fields, sections and contact surfaces: the numbers that they show, and where."""
+"""Pictures of fields, sections and contact surfaces: their numbers and positions."""
 
 import base64
 import dataclasses

@@ -1,4 +1,4 @@
-"""Pictures of bodies of any proportions: nothing is cut off, no text lies on another, edges lie on the faces."""
+"""Layout of pictures of any proportions: nothing is cut off, and no texts overlap."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A loss of power: whatever part of the last writes is on the disk, the file opens with all steps that were acknowledged.
+"""After a loss of power the file opens with all acknowledged steps, whatever part of the last writes is on the disk.
 
 The disk is simulated: what was written before the last synchronisation is there, of later writes any pages of 4 kB, and the
 file has any of the sizes that it has had since.

@@ -1,4 +1,4 @@
-"""Result files: what goes in comes out bit for bit, other programs read it, and no accident costs a step."""
+"""Result files: bitwise round trip, readable by other programs, and no step lost by failures."""
 
 from __future__ import annotations
 

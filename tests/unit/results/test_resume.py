@@ -1,4 +1,4 @@
-"""Result files survive whatever ends their writer, and are written on after it."""
+"""Result files survive any end of their writer, and can be continued."""
 
 from __future__ import annotations
 

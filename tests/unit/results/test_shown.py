@@ -1,4 +1,4 @@
-"""What notebooks and terminals show of results, meshes, models, studies and pictures: short, and right."""
+"""Short displays of results, meshes, models, studies and pictures in notebooks and terminals."""
 
 import contextlib
 import io

@@ -1,4 +1,4 @@
-"""Adaptive meshes: accuracy where it is asked for, with few unknowns; files; what is refused."""
+"""Adaptive meshes: the requested accuracy with few unknowns; files; refusals."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""The benchmark suite runs at its smallest size, and its files hold what they promise."""
+"""The benchmark suite runs at its smallest size, and its files are complete."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""A study of made-up runs, whose limits and model errors are known: tables, sentences, pictures, JSON and CSV."""
+"""A study of synthetic runs with known limits and model errors: tables, sentences, pictures, JSON and CSV."""
 
 import json
 

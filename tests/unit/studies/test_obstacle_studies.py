@@ -1,4 +1,4 @@
-"""Studies of any case: rigid obstacles, every generator, theories that are exact, limits that do not settle."""
+"""Studies of any case: rigid obstacles, every generator, exact theories, limits that do not settle."""
 
 import json
 

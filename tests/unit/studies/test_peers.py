@@ -1,4 +1,4 @@
-"""The comparison with other programs: ours runs, absent ones are told as absent, those that are there agree."""
+"""The comparison with other programs: fastcontact runs, missing programs are reported, present ones agree."""
 
 import importlib.util
 import json

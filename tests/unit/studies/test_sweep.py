@@ -1,4 +1,4 @@
-"""Sweeps: right numbers, tables and files, the store, failures that do not end the rest."""
+"""Sweeps: numbers, tables and files, the store, failures that do not end the others."""
 
 import json
 import re

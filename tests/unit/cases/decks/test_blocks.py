@@ -1,4 +1,4 @@
-"""Keyword blocks: parameters, quoted names, lines that go on, files that are included."""
+"""Keyword blocks: parameters, quoted names, continuation lines, included files."""
 
 import pytest
 

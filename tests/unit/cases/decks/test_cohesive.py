@@ -1,4 +1,4 @@
-"""Cohesive behaviour of decks: tractions of layers between stiff cubes by the laws as Abaqus writes them; what is refused."""
+"""Cohesive behaviour of decks: tractions between stiff cubes by the laws of Abaqus; refusals."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Decks as models: every keyword translated or refused by its line, histories over steps, results as decks mean them."""
+"""Decks as models: every keyword translated or refused with its line, histories over steps, results."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Heat of decks against exact solutions: two bars, films, sources, histories, expansion; and what is refused."""
+"""Heat in decks compared with exact solutions: two bars, films, sources, histories, expansion; refusals."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Initial stresses of decks: released, held, overridden by later lines, and what is refused."""
+"""Initial stresses in decks: released, held, overridden by later lines; refusals."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Keywords of decks that few use: each must do what it says, which forces and displacements tell."""
+"""Less common keywords of decks, verified by forces and displacements."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What a deck may not say: each is refused with its keyword, its line and a sentence."""
+"""Invalid decks: each is refused with its keyword, its line and a sentence."""
 
 import pytest
 from deck_text import CONTACT, MATERIAL, NODES, STEP, WHOLE, deck_of

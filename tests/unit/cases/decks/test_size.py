@@ -1,4 +1,4 @@
-"""Memory and time of decks: at most 20 bytes a byte, and time that grows as the deck does."""
+"""Memory and time of decks: at most 20 bytes per byte, and time proportional to their size."""
 
 import sys
 import tracemalloc

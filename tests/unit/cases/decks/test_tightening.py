@@ -1,4 +1,4 @@
-"""Pretension sections of decks: a bar of two cubes, stretched by a force, then locked."""
+"""Pretension sections in decks: a bar of two cubes, stretched by a force, then locked."""
 
 import pytest
 from case_texts import square

@@ -1,4 +1,4 @@
-"""Files that declare what they cannot hold are refused within limits of memory and time."""
+"""Files that declare more than they can hold are refused within limits of memory and time."""
 
 import base64
 import errno

@@ -1,4 +1,4 @@
-"""MED files: against the MED library and medcoupling, code_aster's own files, and any mesh there and back."""
+"""MED files: compared with the MED library and medcoupling, files of code_aster, and round trips."""
 
 import json
 import shutil

@@ -1,4 +1,4 @@
-"""Mesh files of every format: orientation, groups there and back, what meshio loses, and messages."""
+"""Mesh files of every format: orientation, round trips of groups, losses through meshio, messages."""
 
 import logging
 import os

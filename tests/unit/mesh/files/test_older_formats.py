@@ -1,4 +1,4 @@
-"""Gmsh's files of versions 1 to 4.1 and code_aster's text: the same mesh from each."""
+"""Gmsh files of versions 1 to 4.1 and code_aster's text: the same mesh from each."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The meshes of the Hertz study: geometry, groups, sizes, symmetry, and repeatability."""
+"""Meshes of half-spheres: geometry, groups, sizes, symmetry, and repeatability."""
 
 import json
 import math

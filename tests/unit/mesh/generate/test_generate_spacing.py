@@ -1,4 +1,4 @@
-"""Where the nodes of a line stand, and the triangulation of other outlines than a disc."""
+"""Spacing of nodes on a line, and triangulation of other outlines than a disc."""
 
 import numpy as np
 import pytest
