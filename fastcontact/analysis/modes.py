@@ -36,6 +36,8 @@ from fastcontact.results.step import StepResult
 # Shift that regularises free bodies, over the eigenvalue of a uniform deformation: below the eigenvalues of all but thin
 # bodies.
 SHIFT = 1e-4
+# Part of its motion that a shape slides by at least where it slides at all; of others it is round-off.
+SLIDES = 1e-3
 
 
 @typed(ModelError)
@@ -113,6 +115,7 @@ def modes(
     vibration = _Vibration.of(model, sectors, step if stress_stiffening else None, step, hold_sliding)
     if sectors is None or asked is None:
         values, vectors = vibration.lowest(n, linear_solver, None if sectors is None else Wave(sectors, 0))
+        vibration.warn_of_slides(values, vectors)
         return _modes(vibration, values, vectors)
     waves = [Wave(sectors, d) for d in asked]
     return _of_ring(vibration, sectors, [(wave, *vibration.of_wave(wave, n, linear_solver)) for wave in waves])
@@ -150,6 +153,7 @@ class _Vibration:
     contact: list[Conditions]
     supported: Mask
     shift: float
+    with_sliding: list[Conditions]  # conditions that would hold what slides, too; empty where nothing does
 
     @classmethod
     def of(
@@ -164,7 +168,23 @@ class _Vibration:
         model = model if sectors is None else without_ends(model, sectors)
         held = HeldMotions.of(supported, stacked_rows(model.relations, model.n_dofs))
         contact = held_contact(model, step, held, hold_sliding)
-        return cls(model, field, K, M, contact, supported, SHIFT * _uniform(model, K, M))
+        slides = step is not None and any((own.active & ~own.sticking).any() for own in step.contact.values())
+        further = held_contact(model, step, held, True) if slides and not hold_sliding else []
+        return cls(model, field, K, M, contact, supported, SHIFT * _uniform(model, K, M), further)
+
+    def warn_of_slides(self, values: Array, vectors: Array) -> None:
+        """Warn of eigenvalues (n,) next to zero whose shapes (n_dofs, n) slide where friction holds small motions."""
+        low = vectors[:, np.abs(values) < self.shift]
+        moved = [
+            np.abs(own.rows @ low) > SLIDES * (abs(own.rows) @ np.abs(low)).max(initial=0.0)
+            for own in self.with_sliding
+        ]
+        if low.shape[1] and (count := int(np.any([own.any(axis=0) for own in moved], axis=0).sum())):
+            warn(
+                f"{count} of {len(values)} modes have frequencies next to zero (the lowest {_frequencies(values)[0]:.3g}), "
+                "since nodes that slide in this step are free along the surface: hold_sliding=True holds them, as friction "
+                "holds small motions"
+            )
 
     def lowest(self, n: int, linear_solver: str, wave: Wave | None = None) -> tuple[Array, Array]:
         """Return the n lowest eigenvalues (n,) and displacements (n_dofs, n), in the real form of a wave."""

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_array, diags_array
 
+from fastcontact._tools.neighbours import nearest
 from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
 from fastcontact.arrays import AnyArray, Array
 from fastcontact.contact.configuration import Configuration
@@ -62,10 +63,8 @@ class ContactForces:
             return self.pressure, self.traction
         if not len(self.positions):
             return np.zeros(len(positions)), np.zeros_like(positions)
-        from scipy.spatial import cKDTree
-
-        nearest = cKDTree(self.positions).query(positions)[1]
-        return self.pressure[nearest], self.traction[nearest]
+        rows = nearest(self.positions, positions)[1]
+        return self.pressure[rows], self.traction[rows]
 
     def kept(self, other: ContactForces, moved: Array) -> float:
         """Return half the work of normal forces that also act at the `other` end of the step [energy].

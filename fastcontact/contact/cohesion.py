@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array
 
 # Opening at the largest traction over the opening at break, where no stiffness is given.
@@ -121,7 +122,5 @@ class Bond:
         """Return sliding (n, dim) [length] and damage (n,) at the positions nearest to `positions` (n, dim) [length]."""
         if np.array_equal(positions, self.positions):
             return self.sliding, self.damage
-        from scipy.spatial import cKDTree
-
-        nearest = cKDTree(self.positions).query(positions)[1]
-        return self.sliding[nearest], self.damage[nearest]
+        rows = nearest(self.positions, positions)[1]
+        return self.sliding[rows], self.damage[rows]

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fastcontact._jit.parallel import on_one_blas_thread
+from fastcontact._tools.neighbours import close_pairs
 from fastcontact.arrays import AnyArray, Array, Numbers
 from fastcontact.elasticity.energy import gradients_at, integration_rule
 from fastcontact.elasticity.loads import BodyForce, Load, Pressure, Traction, Value, evaluated, facets_of
@@ -44,8 +45,6 @@ SOME = 1000
 INTEGRAL, STIFFNESS = 1e-3, 5e-2
 # Nodes nearer to each other than this fraction of the edges there, and than single precision, are probably meant to coincide.
 NEAR = 1e-2
-# A direction, no longer than 1, along which no regular mesh has nodes of equal height.
-NO_AXIS = np.array([0.46, 0.5718, 0.6789])
 # Largest plausible coefficient of friction: rubber on rough ground has 1 to 2.
 RUBBING = 3.0
 
@@ -174,13 +173,8 @@ def _coincident(model: Model) -> list[str]:
         for group in (pair.secondary, pair.primary):
             lone[mesh.points_of(group) if group else []] = False
     lone[model.holding_rows().indices // mesh.dim] = False
-    numbers, within = np.flatnonzero(lone), SINGLE_PRECISION * size
-    along = np.sort(mesh.points[numbers] @ NO_AXIS[: mesh.dim])
-    if not (np.diff(along) <= within).any():  # no two nodes can be near; importing a tree takes a tenth of a second
-        return []
-    from scipy.spatial import cKDTree
-
-    pairs = numbers[cKDTree(mesh.points[numbers]).query_pairs(within, output_type="ndarray").reshape(-1, 2)]
+    numbers = np.flatnonzero(lone)
+    pairs = numbers[close_pairs(mesh.points[numbers], SINGLE_PRECISION * size)]
     apart = np.linalg.norm(mesh.points[pairs[:, 0]] - mesh.points[pairs[:, 1]], axis=1)
     near = apart < NEAR * edge[pairs].min(axis=1)
     pairs, apart = pairs[near], apart[near]

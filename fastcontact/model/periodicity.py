@@ -10,6 +10,7 @@ import numpy as np
 from scipy.sparse import csr_array, kron, vstack
 from scipy.sparse.csgraph import connected_components
 
+from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.obstacles.rotation import Rotation
 from fastcontact.contact.projection import places
@@ -178,11 +179,8 @@ def _turned(
     mesh: Mesh, first: Indices, second: Indices, rotation: Rotation, sign: float
 ) -> tuple[Array, Indices, Array]:
     """Return the distances of rotated first nodes to the nearest second nodes [length], these nodes, and the matrix."""
-    from scipy.spatial import cKDTree
-
     turn, centre = rotation.matrix(sign * rotation.angle), np.array(rotation.centre)
-    distance, match = cKDTree(mesh.points[second]).query((mesh.points[first] - centre) @ turn.T + centre)
-    return np.asarray(distance), np.asarray(match, np.intp), turn
+    return *nearest(mesh.points[second], (mesh.points[first] - centre) @ turn.T + centre), turn
 
 
 def _differences(interface: PeriodicInterface, directions: Array, mesh: Mesh) -> csr_array:

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.sparse import csr_array, vstack
 
 from fastcontact._tools.argument_types import finite_vector
+from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.surface import FacetBlock, Surface
@@ -68,8 +69,6 @@ def matched(
     ModelError
         If the groups have different numbers of nodes, or do not coincide.
     """
-    from scipy.spatial import cKDTree
-
     (name, nodes), (other, opposite) = first, second
     if len(nodes) != len(opposite):
         raise ModelError(
@@ -83,7 +82,7 @@ def matched(
         if given is None:
             raise ModelError(f"the translation {translation} of '{name}' must be {mesh.dim} numbers")
         shift = given
-    distance, match = cKDTree(theirs).query(ours + shift)
+    distance, match = nearest(theirs, ours + shift)
     size = max(float(np.ptp(ours, axis=0).max()), 1e-3 * float(np.ptp(mesh.points, axis=0).max()))
     far = int(np.argmax(distance))
     if distance[far] > SINGLE_PRECISION * size or len(np.unique(match)) < len(match):
@@ -91,4 +90,4 @@ def matched(
             f"point {nodes[far]} of '{name}', moved by {shift}, lies {distance[far]:.3g} from the nearest node of '{other}': "
             "groups are joined nodes upon nodes; give the translation that brings them there, or another mesh"
         )
-    return np.asarray(match, np.intp)
+    return match

@@ -186,6 +186,30 @@ def test_what_slides_is_free_along_the_surface_unless_it_is_held():
     assert found["slides"] == pytest.approx(found["tied"], rel=1e-3)
 
 
+def test_a_warning_counts_modes_that_friction_would_hold():
+    """A body that nothing but sliding friction holds along the joint; one that slides without friction has no remedy."""
+    mesh = union(
+        bar("quad8", "plane_strain", (4, 4), "LOW", height=0.1), bar("quad8", "plane_strain", (4, 4), "UP", 0.1, 0.1)
+    )
+
+    def pressed(push: dict[str, float], **options: float) -> fc.Model:
+        model = model_of(mesh, "plane_strain")
+        model.fix("LOW BOTTOM", "xy")
+        model.add_contact("joint", secondary="UP BOTTOM", primary="LOW TOP", **options)
+        if push:
+            model.prescribe("UP TOP", **push)
+        return model
+
+    (step,) = fc.solve(pressed({"x": 2e-4, "y": -2e-4}, friction=0.05), 1)
+    free, own = pressed({}, friction=0.05), {"stress_stiffening": False, "n": 3}
+    with pytest.warns(fc.FastcontactWarning, match=r"1 of 3 modes .* next to zero .*hold_sliding=True holds"):
+        loose = fc.modes(free, step, **own).frequencies
+    held = fc.modes(free, step, hold_sliding=True, **own).frequencies
+    assert abs(loose[0]) < 1e-3 * held[0]
+    (step,) = fc.solve(pressed({"x": 0.0, "y": -2e-4}), 1)
+    assert abs(fc.modes(pressed({}), step, **own).frequencies[0]) < 1e-3 * held[0]
+
+
 @pytest.mark.filterwarnings("ignore:contact 'joint' penetrates")
 def test_what_is_open_is_free_and_penalties_are_springs():
     """Two bars of length 1 joined by a spring k: ``w cos w sin w = k (cos^2 w - sin^2 w)`` with w the angular frequency."""

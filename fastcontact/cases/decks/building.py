@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_array, vstack
-from scipy.spatial import cKDTree
 
+from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import Assembled, Element, assembled
 from fastcontact.cases.decks.blocks import folded
@@ -406,8 +406,8 @@ class Building:
         self.content.note(pair, f"ADJUST: the distance {apart} of the sides counts as none")
         if np.ptp(gaps) <= size:
             return {"clearance": -float(gaps.mean())}
-        nodes, closing = cKDTree(places), -np.where(gaps <= within, gaps, 0.0)
-        return {"clearance": lambda points: closing[nodes.query(points)[1]]}
+        closing = -np.where(gaps <= within, gaps, 0.0)
+        return {"clearance": lambda points: closing[nearest(places, points)[1]]}
 
     def _ramp(self, conditions: Conditions) -> Ramp:
         """Return the ramp: ends of all steps, of increments of steps with friction, and the corners of all histories."""

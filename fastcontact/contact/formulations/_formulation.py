@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 from scipy.sparse import csr_array
 
+from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.contact.cohesive_layer import bonded
 from fastcontact.contact.configuration import Configuration
@@ -462,7 +463,5 @@ def _without_whole_facets(held: Array, side: Surface) -> Array:
 
 def _at_places(known: tuple[Array, AnyArray], positions: Array) -> AnyArray:
     """Return `known` values (k, ...) at the point (k, dim) [length] nearest to each of `positions`."""
-    from scipy.spatial import cKDTree
-
     places_before, values = known
-    return np.asarray(values[cKDTree(places_before).query(positions)[1]])
+    return np.asarray(values[nearest(places_before, positions)[1]])

@@ -16,6 +16,7 @@ from typing import ClassVar
 import numpy as np
 from scipy.sparse.linalg import SuperLU, splu
 
+from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints, NodalField
@@ -70,17 +71,15 @@ class NodeToSegment(Formulation):
         pairing = super().facing(candidates, at, tolerance)
         if self.opposite == "facet":
             return pairing
-        from scipy.spatial import cKDTree
-
         assert isinstance(self.primary, Surface)
         deformed, nodes = self.points + at.displacement, Candidates.nodes_of(self.primary)
-        nearest = cKDTree(deformed[self.primary.points]).query(candidates.positions(deformed))[1]
+        rows = nearest(deformed[self.primary.points], candidates.positions(deformed))[1]
         normal = pairing.normal
         if self.normals in ("facet", "averaged"):  # normals of the primary side: the means of the facets there
-            normal = nodal_normals(self.primary, deformed)[nearest]
+            normal = nodal_normals(self.primary, deformed)[rows]
         assert nodes.facet is not None
         assert nodes.xi is not None
-        return replace(pairing, facet=nodes.facet[nearest], xi=nodes.xi[nearest], normal=normal, beyond=None)
+        return replace(pairing, facet=nodes.facet[rows], xi=nodes.xi[rows], normal=normal, beyond=None)
 
     def unilateral(self, at: Configuration) -> Constraints:
         """Pair on the displaced configuration and return one gap per secondary node."""

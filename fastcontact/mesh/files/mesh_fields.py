@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fastcontact._tools.argument_types import typed
+from fastcontact._tools.neighbours import nearest
 from fastcontact._tools.paths import PathLike
 from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.errors import FileError, MeshError, check_known
@@ -159,18 +160,16 @@ def _nearest(
     `numbers` (n,) are those of the points or cells at the positions; `nouns` name them, and the items on which the field
     is to be written, in messages.
     """
-    from scipy.spatial import cKDTree
-
     assert field.places is not None
     reach = SAME_PLACE * float(np.ptp(mesh.points, axis=0).max())
-    distance, rows = cKDTree(_in_space(field.places)).query(_in_space(places))
+    distance, rows = nearest(_in_space(field.places), _in_space(places))
     off = np.flatnonzero(~(distance <= reach))
     if len(off):
         raise MeshError(
             f"{name} has no {nouns[0]} where {len(off)} {nouns[0]}s of the mesh are (first: {nouns[0]} {numbers[off[0]]} "
             f"{places[off[0]]}, {distance[off[0]]:.3g} from the next): write it on the {nouns[1]} of this mesh"
         )
-    return np.asarray(rows, np.intp), reach
+    return rows, reach
 
 
 def _known(values: Array, places: Array, numbers: Indices, noun: str, name: str) -> Array:

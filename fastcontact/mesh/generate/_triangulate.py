@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array, Indices
 from fastcontact.errors import MeshError
 from fastcontact.mesh.generate._check import affordable
@@ -73,8 +74,6 @@ def smallest_angle(points: Array, triangles: Indices) -> float:
 
 def _attempt(outline: Array, spacing: Spacing, density: float) -> Array | None:
     """Return the points of a triangulation whose edges are short enough, or None."""
-    from scipy.spatial import cKDTree
-
     n_fixed = len(outline)
     points = np.vstack([outline, inner_seeds(outline, spacing, density)])
     movable = np.arange(len(points)) >= n_fixed
@@ -87,7 +86,7 @@ def _attempt(outline: Array, spacing: Spacing, density: float) -> Array | None:
         points = np.vstack([points, added])
         movable = np.arange(len(points)) >= n_fixed
         # Only around the new points: elsewhere the positions are already good.
-        near = cKDTree(added).query(points)[0] < _AROUND * spacing(points)
+        near = nearest(added, points)[0] < _AROUND * spacing(points)
         points = relax(points, movable & near, spacing, 16)
     return None
 
@@ -117,8 +116,6 @@ def _checked(triangles: Indices, n_points: int, n_outline: int) -> Indices:
 
 def inner_seeds(outline: Array, spacing: Spacing, density: float) -> Array:
     """Return points (m, 2) [length] inside a convex `outline` (n, 2) [length], about ``density * spacing`` apart."""
-    from scipy.spatial import cKDTree
-
     low, high = outline.min(axis=0), outline.max(axis=0)
     field = _lattice(spacing, density, low, high) if spacing.uniform else _rings(spacing, density, low, high)
     corners = _apart(_corner_seeds(outline, spacing, density), outline, spacing, density)
@@ -126,7 +123,7 @@ def inner_seeds(outline: Array, spacing: Spacing, density: float) -> Array:
     inside = field[_depth(outline, field) > _CLEAR * size]
     if not len(corners):
         return inside
-    free = cKDTree(corners).query(inside)[0] > 0.7 * density * spacing(inside)
+    free = nearest(corners, inside)[0] > 0.7 * density * spacing(inside)
     return np.vstack([corners, inside[free]])
 
 

@@ -10,6 +10,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from fastcontact._tools.argument_types import typed
+from fastcontact._tools.neighbours import close_pairs
 from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
@@ -193,11 +194,9 @@ def merge_points(mesh: Mesh, tolerance: float) -> Mesh:
     >>> generate.merge_points(generate.union(first, second), 1e-9).n_points
     45
     """
-    from scipy.spatial import cKDTree
-
     if not number("tolerance", tolerance) >= 0.0:
         raise MeshError(f"tolerance = {tolerance:g} is out of range: it must be at least 0")
-    pairs = cKDTree(mesh.points).query_pairs(tolerance, output_type="ndarray")
+    pairs = close_pairs(mesh.points, tolerance)
     if not len(pairs):
         return mesh
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(mesh.n_points,) * 2)
