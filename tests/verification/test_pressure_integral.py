@@ -2,10 +2,8 @@
 
 import warnings
 
-import aster_spec
 import numpy as np
 import pytest
-from aster_mesh import MissingError
 from models import elastic_model
 from two_bodies import blocks, boxes, held, touching
 
@@ -212,21 +210,3 @@ def test_barely_covered_faces_have_no_wild_pressure(element, multipliers, carrie
         check(steps, carried)
         largest.append(steps[-1].contact["pair"].pressure_max)
     assert np.ptp(largest) < 0.5 * np.mean(largest)
-
-
-@pytest.mark.slow
-def test_code_aster_cases(carried, pytestconfig):
-    """Every run of the specs that is translated."""
-    tried = 0
-    for path, run in aster_spec.specs(pytestconfig.getoption("--cases")):
-        try:
-            problem = aster_spec.problem(path, run)
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", fc.FastcontactWarning)
-                steps = aster_spec.solve(problem)
-        except MissingError:
-            continue
-        check(steps, carried, kinds={pair.options.get("kind", "unilateral") for pair in problem.model.contact})
-        tried += 1
-    if not tried:
-        pytest.skip("there are no specs")
