@@ -80,6 +80,7 @@ def test_two_outputs_need_two_files(name, files, monkeypatch, capsys):
     assert not Path("both.png").exists()
 
 
+@pytest.mark.slow
 def test_a_folder_that_is_mounted_twice_is_one(files):
     """No link and no other path tells a bind mount."""
     other, mounting = (
