@@ -65,9 +65,10 @@ def test_every_call_that_fails_ends_a_command_with_one_line(command, library, so
     check(library, source, tmp_path, [command], 0)
 
 
-@pytest.mark.parametrize("count", [2, pytest.param(30, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("count", [2, 30])
 def test_a_disk_that_fails_under_a_history(count, library, tmp_path):
-    """The first and the last call while a plastic body is solved; at all times the six cases."""
+    """The first and the last call while a plastic body is solved; at thirty calls the six cases."""
     (folder := tmp_path / "source").mkdir()
     commands = of_histories(folder)
     check(library, folder, tmp_path / "work", commands if count > 2 else commands[:1], count)

@@ -33,7 +33,7 @@ def one_seed(prepared, tmp_path):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of memory and time as Linux knows them")
-@pytest.mark.parametrize("count", [20, pytest.param(1000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [39, pytest.param(1000, marks=pytest.mark.slow)])
 def test_damaged_files_are_read_or_refused_and_nothing_else(prepared, count):
     """Within the limits of memory and time, beyond which the worker ends: that is a failure, too."""
     found = fuzz_run.run(list(range(count)), 1, prepared)

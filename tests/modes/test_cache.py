@@ -44,6 +44,7 @@ def test_a_read_only_install_compiles_in_every_process_and_says_so_once(asked, i
     assert not list(folder.iterdir())
 
 
+@pytest.mark.slow
 @linux
 def test_a_read_only_install_keeps_kernels_where_it_is_told(installed, tmp_path):
     environment = installed | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}

@@ -16,6 +16,7 @@ def found(method, run, before="run", **environment):
     return answer
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", [pytest.param("spawn", marks=pytest.mark.slow), "forkserver"])
 def test_started_children_find_the_same_bits(method):
     answer = found(method, "small")

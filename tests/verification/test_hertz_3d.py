@@ -93,17 +93,6 @@ def test_a_sphere_on_a_rigid_plane_is_hertz_at_equal_force(element, formulation,
     assert np.abs(errors(contact, 1, 1.0, 1.0, fit)).max() < 0.01
 
 
-@pytest.mark.slow
-def test_a_sphere_driven_by_its_force_carries_it():
-    """Hertz's force for a contact radius of a tenth of the sphere's; pressure and radius as above."""
-    theory = fc.analytic.hertz_point(E1=E, nu1=NU, R1=1.0, radius=0.1)
-    contact = ellipsoid_on_plane("hex8", "node_to_segment", 0.2, force=theory.force / 4)
-    force, pressure, radii, _ = measured(contact, 1)
-    assert force == pytest.approx(theory.force, rel=1e-8)
-    assert pressure == pytest.approx(theory.pressure_max, rel=0.01)
-    assert radii == pytest.approx(theory.radius, rel=0.01)
-
-
 @pytest.mark.parametrize(
     ("element", "formulation", "size", "growth", "fit"),
     [

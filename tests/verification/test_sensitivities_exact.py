@@ -98,7 +98,7 @@ def test_hertz_and_what_scaling_leaves_the_same():
 
 
 def test_prescribed_displacements_scale_forces_with_moduli():
-    mesh = fc.generate.sphere_on_block("hex8", R=10.0, contact_size=3.0, size=8.0)
+    mesh = fc.generate.sphere_on_block("hex8", R=10.0, contact_size=2.0, size=5.0)
     model = fc.Model(mesh, kinematics="3d")
     model.add_material(fc.LinearElastic(E=1000.0, nu=0.3), "SPHERE")
     model.add_material(fc.LinearElastic(E=3000.0, nu=0.2), "BLOCK")

@@ -60,11 +60,11 @@ CASES = {
 }
 
 
-# Multigrid keeps most: every case with it by default; with factors, and pyamg, which keep columns and a tolerance, some.
+# Multigrid keeps most: most cases with it by default; with factors, and pyamg, which keep columns and a tolerance, some.
 PLASTICITY = "plastic, friction"
 BY_DEFAULT = {
     "direct": [PLASTICITY, "mortar, friction", "held by contact, friction"],
-    "amg": [case for case in CASES if case != PLASTICITY],
+    "amg": [case for case in CASES if case not in (PLASTICITY, "mortar", "held by contact", "space, continuous")],
     "pyamg": ["mortar, friction"],
 }
 COMBINATIONS = [

@@ -80,6 +80,7 @@ def test_two_outputs_need_two_files(name, files, monkeypatch, capsys):
     assert not Path("both.png").exists()
 
 
+@pytest.mark.slow
 def test_a_folder_that_is_mounted_twice_is_one(files):
     """No link and no other path tells a bind mount."""
     other, mounting = (
@@ -246,7 +247,7 @@ def test_standard_output_on_a_full_disk_is_told_in_one_line(files):
             [sys.executable, "-c", PRINTING], stdout=full, stderr=subprocess.PIPE, text=True, check=False, cwd=files
         )
     said = "error: cannot write to standard output (No space left on device): send it elsewhere"
-    commands = ["info old.vtkhdf", "--help", "--print-completion bash"]
+    commands = ["info old.vtkhdf", "profile old.vtkhdf", "--help", "--version", "--print-completion bash"]
     assert done.stderr.splitlines() == [line for command in commands for line in (said, f"1 {command}")]
 
 

@@ -74,7 +74,7 @@ def little_garbage() -> Iterator[None]:
 @pytest.mark.usefixtures("little_garbage")
 @pytest.mark.parametrize("shared", [write_arrays.SHARED, 0], ids=["steps share a chunk", "a chunk a step"])
 @pytest.mark.parametrize("error", [OSError(errno.EIO, "Input/output error"), KeyboardInterrupt()], ids=["disk", "user"])
-@pytest.mark.parametrize("apart", [15, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("apart", [9, pytest.param(1, marks=pytest.mark.slow)])
 def test_any_write_may_fail(
     apart: int, error: BaseException, shared: int, path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

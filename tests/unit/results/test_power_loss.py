@@ -106,9 +106,8 @@ SHARES = (0.0, 0.95)  # of what was written since the disk was synchronised
     ("largest", "shares"),
     [
         (journal.LARGEST, SHARES),
-        (2100, (0.5,)),
-        pytest.param(journal.LARGEST, 3 * SHARES, marks=pytest.mark.slow),
-        pytest.param(2100, SHARES, marks=pytest.mark.slow),
+        pytest.param(journal.LARGEST, 6 * SHARES, marks=pytest.mark.slow),
+        pytest.param(2100, (0.0, 0.5, 0.95), marks=pytest.mark.slow),
     ],
 )
 def test_a_loss_of_power_costs_no_step(recorded, largest, shares, tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ from fastcontact.studies.convergence import convergence_study
 
 
 def test_the_report_stands_alone_and_says_everything(root):
-    study = convergence_study(root / "data/cases/forma04c.toml", levels=2, workers=1)
+    study = convergence_study(root / "data/cases/forma04c.toml", levels=3, workers=1)
     names = [str(series.combination) for series in study.series]
     captions = [caption for caption, _ in study.tables()]
     assert captions[:-1] == [caption for name in names for caption in (name, f"{name}: limits")]
