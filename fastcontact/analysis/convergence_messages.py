@@ -11,8 +11,11 @@ from fastcontact.analysis.floating_bodies import FloatingBodies, RigidPosition
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.scatter import WINDOW
 from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
+from fastcontact.analysis.state import State
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.constraints import StackedConstraints
+from fastcontact.elasticity.nonlinear_bodies import PLASTIC_STRAIN
+from fastcontact.elasticity.nonlinear_materials import LARGEST_PLASTIC_STRAIN
 
 Nodes = dict[str, list[int]]
 
@@ -83,6 +86,24 @@ def not_balanced(bodies: FloatingBodies, rigid: RigidPosition, load: float, fric
         f"contact does not hold {'; '.join(bodies.moving(rigid))}: after {rigid.positions} positions "
         f"tried, a force of {np.abs(rigid.spring_force).max():.3g} is still missing for equilibrium under a load of "
         f"{load:.3g}. {more} or use more load steps"
+    )
+
+
+def limit_load(problem: Problem, state: State) -> str:
+    """Return what to add to the message of a load step after `state` whose bodies yield; nothing for others."""
+    if problem.bodies is None or problem.bodies.finite:
+        return ""
+    strain = max(float(history[..., PLASTIC_STRAIN].max(initial=0.0)) for history in state.history.values())
+    if not strain:
+        return ""
+    beyond = (
+        f", beyond the {LARGEST_PLASTIC_STRAIN} up to which linear kinematics serve: such bodies bear less than real ones"
+        if strain > LARGEST_PLASTIC_STRAIN
+        else ""
+    )
+    return (
+        f"; before it the largest plastic strain is {strain:.2g}{beyond}. Bodies that yield may bear no larger forces: "
+        "prescribe displacements in their place to find the largest"
     )
 
 

@@ -173,7 +173,7 @@ def _approach(step: StepContext, bodies: FloatingBodies, constraints: Constraint
     ConvergenceError
         If no contact stops them.
     """
-    work = generalised(bodies.motions, step.load.force)
+    work = generalised(bodies.motions, step.load.force, step.state.largest_rigid_force)
     rows, gap0 = resisting(constraints)
     size = float(np.ptp(step.problem.model.mesh.points, axis=0).max())
     stop = stopped_at(rows @ bodies.motions.displacement, gap0 + rows @ u, work, size)

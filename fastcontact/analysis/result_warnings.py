@@ -22,6 +22,7 @@ from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity import element_kernels, recovery
 from fastcontact.elasticity.materials import LinearElastic, Material
+from fastcontact.elasticity.nonlinear_materials import LARGEST_PLASTIC_STRAIN
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.step import ContactResult, StepResult
@@ -29,10 +30,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 
 # Equivalent strain, and wear depth over the size of the model, beyond which linear kinematics give a warning.
 STRAIN = 0.1
-# The same for plastic strain, which concentrates in a few cells: under a ball without hardening the mean contact
-# pressure falls from 2.6 times the yield stress, where it reaches 0.1, to 2.3 at 0.5 and 2.1 at 1.1.
-PLASTIC_STRAIN = 0.5
-# The same for rotations [radian]: linear kinematics neglect half their square as strain.
+# Rotation [radian] beyond which they are: half its square is the strain that they leave out.
 ROTATION = 0.3
 # Largest factor on the number of steps that is recommended; a larger one indicates a wrong coefficient.
 MANY_STEPS = 1000
@@ -185,10 +183,10 @@ def _large_strain(problem: Problem, last: StepResult) -> Iterator[str]:
     else:
         yield from _large_stress_free_strain(problem, last)
     plastic = last.cell_fields.get("plastic_strain")
-    if plastic is not None and (most := float(plastic.max())) > PLASTIC_STRAIN:
+    if plastic is not None and (most := float(plastic.max())) > LARGEST_PLASTIC_STRAIN:
         yield (
-            f"the largest plastic strain is {most:.2f}, beyond the {PLASTIC_STRAIN} up to which linear kinematics serve: "
-            "pressures on it are too low"
+            f"the largest plastic strain is {most:.2f}, beyond the {LARGEST_PLASTIC_STRAIN} up to which linear kinematics "
+            "serve: pressures on it are too low"
         )
 
 

@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fastcontact.analysis.convergence_messages import limit_load
 from fastcontact.analysis.load_step import load_step
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
@@ -60,8 +61,9 @@ def _parts(
             part = (
                 f"step {index} was cut in halves {often}, the part {where} fails" if halved else f"step {index} {where}"
             )
-            final = ConvergenceError(f"{error} ({part})", error.history, smaller_steps_help=False)
-            # Raised from the original cause: a chained traceback would only repeat the message.
+            limit = limit_load(problem, state)
+            final = ConvergenceError(f"{error} ({part}{limit})", error.history, smaller_steps_help=False)
+            # As raised where it was found: the same words twice, in two tracebacks, would tell nothing more.
             raise final.with_traceback(error.__traceback__) from None
         reason = str(error).split(". ")[0]
         for listener in listeners:

@@ -97,11 +97,8 @@ def check_penetration(name: str, pair: Formulation) -> None:
 
     An intended interference is smaller, or given as a clearance.
     """
-    gap = initial_gaps(pair)
-    size = np.zeros(len(gap))
-    for block in pair.secondary.blocks:
-        long = np.linalg.norm(np.ptp(pair.points[block.facets], axis=1), axis=1)
-        np.maximum.at(size, block.local, long[:, None])
+    gap, _ = initial_gaps(pair)
+    size = facet_lengths(pair)
     row = int(np.argmin(gap / size))
     if gap[row] < -size[row]:
         point = pair.secondary.points[row]
@@ -112,18 +109,28 @@ def check_penetration(name: str, pair: Formulation) -> None:
         )
 
 
-def initial_gaps(pair: Formulation) -> Array:
-    """Return the gaps (n_nodes,) before any load, including positive clearances [length].
+def facet_lengths(pair: Formulation) -> Array:
+    """Return the length of the longest facet at each secondary node (n_nodes,) [length]."""
+    size = np.zeros(len(pair.secondary.points))
+    for block in pair.secondary.blocks:
+        long = np.linalg.norm(np.ptp(pair.points[block.facets], axis=1), axis=1)
+        np.maximum.at(size, block.local, long[:, None])
+    return size
+
+
+def initial_gaps(pair: Formulation) -> tuple[Array, Array]:
+    """Return gaps (n_nodes,) before any load, clearances counting where they open them [length], and normals (n_nodes, dim).
 
     Infinite at nodes that face nothing or are excluded, and where penetration is admissible: in tied pairs and gap_only.
     """
     if pair.options.tied or pair.options.gap_only:
-        return np.full(len(pair.secondary.points), np.inf)
+        shape = len(pair.secondary.points), pair.points.shape[1]
+        return np.full(shape[0], np.inf), np.zeros(shape)
     at_rest = Configuration.undeformed(pair.points)
-    gap = pair.nodal_gap(at_rest, with_clearance=False)[0]
+    gap, normal = pair.nodal_gap(at_rest, with_clearance=False)
     if pair.options.clearance is not None or pair.options.clearance_primary is not None:
         gap = np.maximum(gap, pair.nodal_gap(at_rest)[0])
-    return np.where(pair.options.excluded_nodes(pair.secondary), np.inf, gap)
+    return np.where(pair.options.excluded_nodes(pair.secondary), np.inf, gap), normal
 
 
 def check_overlap(mesh: Mesh, kinematics: str, paired: Iterable[tuple[str, str]]) -> None:

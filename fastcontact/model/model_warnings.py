@@ -21,7 +21,7 @@ from fastcontact.mesh.elements import Element
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import poorest_cell
 from fastcontact.mesh.topology import outer_facets, remembered
-from fastcontact.model.checks import initial_gaps
+from fastcontact.model.checks import facet_lengths, initial_gaps
 from fastcontact.model.hanging_nodes import hanging_nodes_warning
 from fastcontact.model.prescribed_overlap import Pairs, Supports, prescribed_overlap_warnings
 from fastcontact.model.ramp import Harmonic, Ramp, Table
@@ -45,7 +45,11 @@ SOME = 1000
 INTEGRAL, STIFFNESS = 1e-3, 5e-2
 # Nodes nearer to each other than this fraction of the edges there, and than single precision, are probably meant to coincide.
 NEAR = 1e-2
-# Largest plausible coefficient of friction: rubber on rough ground has 1 to 2.
+# A direction, no longer than 1, in which nodes of no regular mesh are at one height.
+NO_AXIS = np.array([0.46, 0.5718, 0.6789])
+# Penetration beside the length of facets: circles of eight facets, whose middles lie inside, touch a round side by less.
+SAG = 0.1
+# Rubber on rough ground has a coefficient of friction of 1 to 2.
 RUBBING = 3.0
 
 
@@ -54,7 +58,7 @@ def model_warnings(model: Model, ramp: Ramp) -> list[str]:
     """Return the warnings about a model accepted by `Model.check`, for an analysis along a ramp."""
     supports = Supports(*model.prescribed_by_ramp(), ramp)
     pairs, pushed = [(pair, model.bind(pair)) for pair in model.contact], _pushed(supports)
-    warnings = _moduli(model) + _named_units(model) + _proportions(model, pushed)
+    warnings = _moduli(model) + _named_units(model) + _proportions(model, float(pushed.max()))
     warnings += [text for text in (poorest_cell(model.mesh), hanging_nodes_warning(model)) if text] + _coincident(model)
     warnings += _friction(model) + _penetrating(model, pairs, pushed) + _unramped(model, ramp)
     warnings += (
@@ -149,10 +153,11 @@ def _proportions(model: Model, moved: float) -> list[str]:
     return texts
 
 
-def _pushed(supports: Supports) -> float:
-    """Return the largest prescribed displacement over its history [length]."""
-    straight = {ramp: at for ramp, at in supports.by_ramp.items() if not isinstance(ramp, Harmonic)}  # no rotations
-    return max((_peak(ramp) * float(np.abs(values).max(initial=0.0)) for ramp, values in straight.items()), default=0.0)
+def _pushed(supports: Supports) -> Array:
+    """Return the largest prescribed displacements (dim,), by their history or as they are given without one [length]."""
+    straight = {ramp: at for ramp, at in supports.by_ramp.items() if not isinstance(ramp, Harmonic)}  # not what turns
+    peaks = [_peak(ramp) * np.abs(values).max(axis=0) for ramp, values in straight.items() if len(values)]
+    return np.max([np.zeros(supports.fixed.shape[1]), *peaks], axis=0)
 
 
 def _peak(ramp: Table | None) -> float:
@@ -216,17 +221,24 @@ def _friction(model: Model) -> list[str]:
     ]
 
 
-def _penetrating(model: Model, pairs: Pairs, pushed: float) -> list[str]:
-    """Return a warning for each contact whose initial penetration exceeds the prescribed displacements."""
+def _penetrating(model: Model, pairs: Pairs, pushed: Array) -> list[str]:
+    """Return a warning for each contact whose sides penetrate by more than motions (dim,) push before they do [length]."""
     texts = []
-    for pair, bound in pairs if pushed else ():
-        gap = initial_gaps(bound)
-        row = int(np.argmin(gap))
-        if -gap[row] > pushed:
+    for pair, bound in pairs:
+        motion = pushed if not any(pair.motion) else np.maximum(pushed, _peak(pair.ramp) * np.abs(pair.motion))
+        if not motion.any():
+            continue  # an interference loads the bodies
+        gap, normal = initial_gaps(bound)
+        along = np.abs(normal) @ motion
+        along = np.where(along > SINGLE_PRECISION * motion.max(), along, SAG * facet_lengths(bound))
+        row = int(np.argmin(gap + along))
+        if -gap[row] > along[row]:
             point = bound.secondary.points[row]
+            driver = "supports push" if motion is pushed else "motions push"
             texts.append(
                 f"contact '{pair.name}' begins with a penetration of {-gap[row]:.4g} at point {point} "
-                f"{np.array2string(model.mesh.points[point], precision=4)}, more than the {pushed:.4g} that supports push: "
+                f"{np.array2string(model.mesh.points[point], precision=4)}, more than the {np.abs(normal[row]) @ motion:.4g} "
+                f"that {driver} along its normal: "
                 "forces are those of the penetration. Move a body apart, or give an interference that is meant as clearance"
             )
     return texts

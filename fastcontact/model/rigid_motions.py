@@ -231,10 +231,14 @@ def _edges(constraints: Constraints) -> tuple[csr_array, Array]:
     return csr_array(vstack(edges, format="csr")), np.tile(constraints.gap0, len(edges))
 
 
-def generalised(motions: FreeMotions, force: Array) -> Array:
-    """Return the work (k,) that nodal forces (n_dofs,) do on each motion; round-off counts as zero [force]."""
+def generalised(motions: FreeMotions, force: Array, largest: float = 0.0) -> Array:
+    """Return the work (k,) that nodal forces (n_dofs,) do on each motion; round-off counts as zero [force].
+
+    That of these forces, or of the `largest` works before, of which they may be what is left.
+    """
     work = motions.displacement.T @ force
-    work[np.abs(work) <= 1e-10 * (np.abs(motions.displacement).T @ np.abs(force))] = 0.0
+    scale = np.maximum(np.abs(motions.displacement).T @ np.abs(force), largest)
+    work[np.abs(work) <= 1e-10 * scale] = 0.0
     return work
 
 

@@ -293,7 +293,7 @@ DOUBTS = [
         lambda: raised(-0.02),
         of(STEEL, BLOCKS, PAIR),
         (
-            r"contact 'pair' begins with a penetration of 0\.02 at point \d+ \[.*\], more than the 0\.01 that supports push: forces are those of the penetration\. Move a body apart, or give an interference that is meant as clearance",
+            r"contact 'pair' begins with a penetration of 0\.02 at point \d+ \[.*\], more than the 0\.01 that supports push along its normal: forces are those of the penetration\. Move a body apart, or give an interference that is meant as clearance",
         ),
     ),
     Doubt(
