@@ -245,7 +245,7 @@ def _add_lists(model: Model, data: dict[str, Any], folder: Path, adding: Mapping
                     raise CaseError(f"{where} needs '{key}'")
             with at(where):
                 given = _from_files(where, entry, model.mesh, folder) if kind == "material" else entry
-                add(model, **_arguments(where, _found(folder, _placed(where, given))))
+                add(model, **_arguments(where, _found(folder, _changed(where, given, VALUES, _function))))
 
 
 def _add_contacts(model: Model, data: dict[str, Any]) -> None:
@@ -277,25 +277,20 @@ def _from_files(where: str, entry: dict[str, Any], mesh: Mesh, folder: Path) -> 
             raise CaseError(f"'{name}' needs 'field', its name in the file")
         return read_field(mesh, groups=entry.get("groups"), **_found(folder, value))
 
-    values = dict(entry)
-    for key in CONSTANTS:
-        value = entry.get(key)
-        if isinstance(value, list):
-            values[key] = [read(f"{where}.{key}[{i}]", member) for i, member in enumerate(value)]
-        elif value is not None:
-            values[key] = read(f"{where}.{key}", value)
-    return values
+    return _changed(where, entry, CONSTANTS, read)
 
 
-def _placed(where: str, entry: dict[str, Any]) -> dict[str, Any]:
-    """Return an entry with functions in place of tables of position-dependent values."""
+def _changed(
+    where: str, entry: dict[str, Any], keys: Sequence[str], change: Callable[[str, Any], Any]
+) -> dict[str, Any]:
+    """Return an entry with the values of some keys changed, those in a list one by one, by their place in the case."""
     values = dict(entry)
-    for key in VALUES:
-        value = entry.get(key)
+    for key in (key for key in keys if key in entry):
+        value = entry[key]
         if isinstance(value, list):
-            values[key] = [_function(f"{where}.{key}[{i}]", member) for i, member in enumerate(value)]
-        elif key in entry:
-            values[key] = _function(f"{where}.{key}", value)
+            values[key] = [change(f"{where}.{key}[{i}]", member) for i, member in enumerate(value)]
+        else:
+            values[key] = change(f"{where}.{key}", value)
     return values
 
 
@@ -312,6 +307,7 @@ def _found(folder: Path, entry: dict[str, Any]) -> dict[str, Any]:
 
 
 def _function(where: str, value: Any) -> Any:
+    """Return a function in place of a table of values that depend on the position."""
     return called(where, Tabulated, value) if isinstance(value, dict) else value
 
 

@@ -9,6 +9,7 @@ strains (xx, yy, zz, 2xy); ``material`` (n_cells,). Axisymmetric integrals run o
 import numpy as np
 
 from fastcontact._jit.decorators import interpretable_kernel, kernel
+from fastcontact.mesh.jacobian_kernels import jacobian_2d, transposed
 
 TWO_PI = 2.0 * np.pi
 
@@ -111,25 +112,16 @@ def stress(points, cells, N, dN, moduli, material, axisymmetric, displacement, o
     functions are not computed.
     """
     n_cells, n_nodes = cells.shape
-    local = np.empty((n_nodes, 4))
+    slopes, x, u = transposed(dN), np.empty((2, n_nodes)), np.empty((2, n_nodes))
     for c in range(n_cells):
         D = moduli[material[c]]
         for a in range(n_nodes):
             p = cells[c, a]
-            local[a, 0], local[a, 1] = points[p, 0], points[p, 1]
-            local[a, 2], local[a, 3] = displacement[p, 0], displacement[p, 1]
+            x[0, a], x[1, a] = points[p, 0], points[p, 1]
+            u[0, a], u[1, a] = displacement[p, 0], displacement[p, 1]
         for q in range(N.shape[0]):
-            x_r = y_r = x_s = y_s = ux_r = uy_r = ux_s = uy_s = 0.0
-            for a in range(n_nodes):
-                along_r, along_s = dN[q, a, 0], dN[q, a, 1]
-                x_r += along_r * local[a, 0]
-                y_r += along_r * local[a, 1]
-                ux_r += along_r * local[a, 2]
-                uy_r += along_r * local[a, 3]
-                x_s += along_s * local[a, 0]
-                y_s += along_s * local[a, 1]
-                ux_s += along_s * local[a, 2]
-                uy_s += along_s * local[a, 3]
+            x_r, y_r, x_s, y_s = jacobian_2d(x, slopes, q)
+            ux_r, uy_r, ux_s, uy_s = jacobian_2d(u, slopes, q)
             inverse = 1.0 / (x_r * y_s - y_r * x_s)
             exx = (ux_r * y_s - ux_s * y_r) * inverse
             eyy = (uy_s * x_r - uy_r * x_s) * inverse
@@ -138,8 +130,8 @@ def stress(points, cells, N, dN, moduli, material, axisymmetric, displacement, o
             if axisymmetric:
                 radius = ux = 0.0
                 for a in range(n_nodes):
-                    radius += N[q, a] * local[a, 0]
-                    ux += N[q, a] * local[a, 2]
+                    radius += N[q, a] * x[0, a]
+                    ux += N[q, a] * u[0, a]
                 ezz = ux / radius
             for i in range(4):
                 out[c, q, i] = D[i, 0] * exx + D[i, 1] * eyy + D[i, 2] * ezz + D[i, 3] * gxy

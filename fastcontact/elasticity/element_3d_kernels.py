@@ -210,38 +210,14 @@ def stress(points, cells, N, dN, moduli, material, axisymmetric, displacement, o
     computed.
     """
     n_cells, n_nodes = cells.shape
-    slopes, local = transposed(dN), np.empty((n_nodes, 6))
+    slopes, x, u = transposed(dN), np.empty((3, n_nodes)), np.empty((3, n_nodes))
     for c in range(n_cells):
-        for a in range(n_nodes):
-            p = cells[c, a]
-            for i in range(3):
-                local[a, i], local[a, 3 + i] = points[p, i], displacement[p, i]
+        _gather(points, cells, c, x)
+        _gather(displacement, cells, c, u)
         D = moduli[material[c]]
         for q in range(dN.shape[0]):
-            xr = yr = zr = ur = vr = wr = 0.0
-            xs = ys = zs = us = vs = ws = 0.0
-            xt = yt = zt = ut = vt = wt = 0.0
-            for a in range(n_nodes):
-                r, s, t = slopes[q, 0, a], slopes[q, 1, a], slopes[q, 2, a]
-                xr += r * local[a, 0]
-                yr += r * local[a, 1]
-                zr += r * local[a, 2]
-                ur += r * local[a, 3]
-                vr += r * local[a, 4]
-                wr += r * local[a, 5]
-                xs += s * local[a, 0]
-                ys += s * local[a, 1]
-                zs += s * local[a, 2]
-                us += s * local[a, 3]
-                vs += s * local[a, 4]
-                ws += s * local[a, 5]
-                xt += t * local[a, 0]
-                yt += t * local[a, 1]
-                zt += t * local[a, 2]
-                ut += t * local[a, 3]
-                vt += t * local[a, 4]
-                wt += t * local[a, 5]
-            # Cofactors of the Jacobian: the derivatives of r, s and t in x, y and z, times its determinant.
+            xr, yr, zr, xs, ys, zs, xt, yt, zt = jacobian_3d(x, slopes, q)
+            ur, vr, wr, us, vs, ws, ut, vt, wt = jacobian_3d(u, slopes, q)
             rx, ry, rz = ys * zt - zs * yt, zs * xt - xs * zt, xs * yt - ys * xt
             sx, sy, sz = zr * yt - yr * zt, xr * zt - zr * xt, yr * xt - xr * yt
             tx, ty, tz = yr * zs - zr * ys, zr * xs - xr * zs, xr * ys - yr * xs

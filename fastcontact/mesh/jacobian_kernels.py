@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from fastcontact._jit.decorators import kernel
+from fastcontact._jit.decorators import innermost_kernel, kernel
 
 
 @kernel
@@ -18,7 +18,20 @@ def transposed(dN):
     return out
 
 
-@kernel
+@innermost_kernel
+def jacobian_2d(x, slopes, q):
+    """Return the four entries of J, row by row, of the nodes x (2, n_nodes) at point q of the slopes (n_q, 2, n_nodes)."""
+    j00 = j01 = j10 = j11 = 0.0
+    for a in range(x.shape[1]):
+        r, s = slopes[q, 0, a], slopes[q, 1, a]
+        j00 += r * x[0, a]
+        j01 += r * x[1, a]
+        j10 += s * x[0, a]
+        j11 += s * x[1, a]
+    return j00, j01, j10, j11
+
+
+@innermost_kernel
 def jacobian_3d(x, slopes, q):
     """Return the nine entries of J, row by row, for nodes x (3, n_nodes) at point q of the slopes (n_q, 3, n_nodes)."""
     j00 = j01 = j02 = j10 = j11 = j12 = j20 = j21 = j22 = 0.0

@@ -4,19 +4,13 @@
 import numpy as np
 
 from fastcontact._jit.decorators import interpretable_kernel, kernel
-from fastcontact.mesh.jacobian_kernels import jacobian_3d, transposed
+from fastcontact.mesh.jacobian_kernels import jacobian_2d, jacobian_3d, transposed
 
 
 @kernel
 def _determinant_2d(x, slopes, q):
     """Return det J of the cell with nodes x (2, n_nodes) at point q of the slopes (n_q, 2, n_nodes)."""
-    j00 = j01 = j10 = j11 = 0.0
-    for a in range(x.shape[1]):
-        r, s = slopes[q, 0, a], slopes[q, 1, a]
-        j00 += r * x[0, a]
-        j01 += r * x[1, a]
-        j10 += s * x[0, a]
-        j11 += s * x[1, a]
+    j00, j01, j10, j11 = jacobian_2d(x, slopes, q)
     return j00 * j11 - j01 * j10
 
 
