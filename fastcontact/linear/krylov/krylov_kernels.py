@@ -10,8 +10,8 @@ CHUNK = 4096
 
 
 @kernel
-def _dot(a, b, low, high):
-    """Return the dot product of a range, in four sums that the processor can vectorise."""
+def stretch_dot(a, b, low, high):
+    """Return the dot product of a stretch, in four sums that the processor can add side by side."""
     s0 = s1 = s2 = s3 = 0.0
     whole = low + (high - low) // 4 * 4
     for i in range(low, whole, 4):
@@ -37,7 +37,7 @@ def dot(a, b, sums):
     """Return the dot product of `a` and `b` (n,); `sums` (ceil(n / CHUNK),) is work space."""
     n = a.shape[0]
     for c in prange(sums.shape[0]):
-        sums[c] = _dot(a, b, c * CHUNK, min(n, (c + 1) * CHUNK))
+        sums[c] = stretch_dot(a, b, c * CHUNK, min(n, (c + 1) * CHUNK))
     return _total(sums)
 
 
@@ -46,7 +46,7 @@ def _advance_part(alpha, p, q, x, r, low, high):
     for i in range(low, high):
         x[i] += alpha * p[i]
         r[i] -= alpha * q[i]
-    return _dot(r, r, low, high)
+    return stretch_dot(r, r, low, high)
 
 
 @parallel_kernel

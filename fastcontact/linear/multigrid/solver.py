@@ -34,8 +34,8 @@ from fastcontact.linear.protocol import MILD, TOLERANCE, Counters, Monitor
 from fastcontact.linear.springs import Springs
 
 log = logging.getLogger("fastcontact")
-MAX_ITERATIONS, MAX_NONSYMMETRIC = 1000, 300
-# Number of columns of K^-1, each a solution, up to which they cost less than a factorisation.
+MAX_ITERATIONS = 1000
+# Columns of K^-1, each a solution, up to which they cost less than factors do.
 MOST_COLUMNS = 300
 # Iterations between two calls of a monitor.
 WATCH_EVERY = 2
@@ -76,8 +76,6 @@ class Multigrid:
     ----------
     contrast
         See `LinearSolver`.
-    patience : int
-        Largest number of iterations of a nonsymmetric solution.
     work : int
         Iterations so far, with updates of the hierarchy converted to iterations.
     allowed : int, optional
@@ -95,7 +93,7 @@ class Multigrid:
         self.tolerance, self.precision = tolerance, precision
         self.counters = Counters()
         self.contrast = 1.0
-        self.patience, self.work = MAX_NONSYMMETRIC, 0
+        self.work = 0
         self.allowed: int | None = None
         self.begin()
 
@@ -296,7 +294,7 @@ class Multigrid:
             if done and made >= self._most_warm:
                 self._cut_short = begun
                 return
-            if made >= self.patience or not iteration.step(multiply, precondition):
+            if made >= MAX_ITERATIONS or not iteration.step(multiply, precondition):
                 if done:
                     return
                 left = iteration.norm / enough

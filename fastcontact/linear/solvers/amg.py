@@ -26,8 +26,6 @@ from fastcontact.linear.lower_tolerance import put_back_tolerance, tighten
 from fastcontact.linear.multigrid.loaded import LoadedMultigrid
 from fastcontact.linear.multigrid.reduced import Reduced
 from fastcontact.linear.multigrid.solver import (
-    MAX_ITERATIONS,
-    MAX_NONSYMMETRIC,
     Multigrid,
     StallError,
     TooManyIterationsError,
@@ -83,7 +81,6 @@ class Amg(Multigrid, LinearSolver):
         """Build the hierarchy of K; see `LinearSolver.prepare`."""
         self.build(K, rigid_modes, release)
         self._involved, self.instead, self._factored, self.gave_up = involved, None, None, ""
-        self.patience = MAX_NONSYMMETRIC if self._may_factorise else MAX_ITERATIONS
         return self.K if release else K
 
     def load(self, f: Array) -> Loaded:
