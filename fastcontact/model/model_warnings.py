@@ -45,11 +45,9 @@ SOME = 1000
 INTEGRAL, STIFFNESS = 1e-3, 5e-2
 # Nodes nearer to each other than this fraction of the edges there, and than single precision, are probably meant to coincide.
 NEAR = 1e-2
-# A direction, no longer than 1, in which nodes of no regular mesh are at one height.
-NO_AXIS = np.array([0.46, 0.5718, 0.6789])
-# Penetration beside the length of facets: circles of eight facets, whose middles lie inside, touch a round side by less.
+# Penetration over the facet length that is no overlap: straight facets of a circle of eight penetrate a round side by less.
 SAG = 0.1
-# Rubber on rough ground has a coefficient of friction of 1 to 2.
+# Largest plausible coefficient of friction: rubber on rough ground has 1 to 2.
 RUBBING = 3.0
 
 
