@@ -151,16 +151,16 @@ def crossing(
     A rigid primary side has no points, and no weights. `shape` is that of the points of the mesh, (n_points, dim).
     """
     n, dim = shape
-    mine = np.zeros(n, bool)
-    mine[secondary.points] = True
+    on_secondary = np.zeros(n, bool)
+    on_secondary[secondary.points] = True
     if isinstance(primary, Surface):
-        mine[primary.points] = False
+        on_secondary[primary.points] = False
     by_axis = [csr_array(constraints.B[:, : n * dim][:, axis::dim]) for axis in range(dim)]
-    normal = np.stack([rows @ mine for rows in by_axis], axis=1)
+    normal = np.stack([rows @ on_secondary for rows in by_axis], axis=1)
     length = np.einsum("md,md->m", normal, normal)
     scale = normal / np.where(length > 0.0, length, np.inf)[:, None]
     rows = sum(diags_array(scale[:, axis]) @ by_axis[axis] for axis in range(dim))
     assert constraints.areas is not None
     facing = np.isfinite(constraints.areas) & (length > 0.0)
-    rows_of_side = csr_array(rows @ diags_array(mine.astype(float)))
+    rows_of_side = csr_array(rows @ diags_array(on_secondary.astype(float)))
     return Crossing(rows_of_side, csr_array(rows_of_side - rows), np.where(facing, constraints.areas, 0.0))

@@ -287,8 +287,8 @@ class Constraints:
         if self.compliance is not None:
             along = self.coupled_directions or self.directions
             forces = multiplier[:, None] * normals(along) + np.einsum("mk,kmd->md", tangential, np.stack(along))
-            gives = np.column_stack([self.compliance.apply(component) for component in forces.T])
-            slips += np.einsum("md,kmd->mk", gives, np.stack(along))
+            elastic = np.column_stack([self.compliance.apply(component) for component in forces.T])
+            slips += np.einsum("md,kmd->mk", elastic, np.stack(along))
         return np.einsum("mk,kmd->md", slips, np.stack(self.directions))
 
     def pressure(self, multiplier: Array) -> Array:
@@ -318,43 +318,43 @@ class StackedConstraints(Constraints):
 
     def state(self, active: Mask) -> AnyArray:
         """Return the set `active` (m,) with the `branches` of all pairs: while these are equal, the problem is smooth."""
-        branches = (part.branches for part in self.parts.values() if part.branches is not None)
+        branches = (pair.branches for pair in self.parts.values() if pair.branches is not None)
         return np.concatenate([active.astype(np.int8), *branches])
 
     def rows(self) -> dict[str, slice]:
         """Return the rows of each pair, by its name."""
-        ends = np.cumsum([0, *(len(part) for part in self.parts.values())]).tolist()
+        ends = np.cumsum([0, *(len(pair) for pair in self.parts.values())]).tolist()
         return {name: slice(first, end) for name, first, end in zip(self.parts, ends[:-1], ends[1:], strict=True)}
 
 
-def stacked(parts: Mapping[str, Constraints]) -> StackedConstraints:
+def stacked(by_pair: Mapping[str, Constraints]) -> StackedConstraints:
     """Return the constraints of pairs, by their names, as one."""
-    pairs = list(parts.values())
+    pairs = list(by_pair.values())
     if len(pairs) == 1:
         values = {entry.name: getattr(pairs[0], entry.name) for entry in fields(Constraints)}
-        return StackedConstraints(**values, parts=parts)
-    count = max(len(part.tangents) for part in pairs)
-    numbers, still = [np.zeros(len(part)) for part in pairs], [np.zeros((count, len(part))) for part in pairs]
+        return StackedConstraints(**values, parts=by_pair)
+    count = max(len(pair.tangents) for pair in pairs)
+    numbers, still = [np.zeros(len(pair)) for pair in pairs], [np.zeros((count, len(pair))) for pair in pairs]
     return StackedConstraints(
-        csr_array(vstack([part.B for part in pairs], format="csr")),
-        np.concatenate([part.gap0 for part in pairs]),
-        np.vstack([part.positions for part in pairs]),
-        _BlockDiagonal(pairs) if any(part.compliance is not None for part in pairs) else None,
+        csr_array(vstack([pair.B for pair in pairs], format="csr")),
+        np.concatenate([pair.gap0 for pair in pairs]),
+        np.vstack([pair.positions for pair in pairs]),
+        _BlockDiagonal(pairs) if any(pair.compliance is not None for pair in pairs) else None,
         tuple(
             csr_array(vstack([p.tangents[j] if p.tangents else csr_array(p.B.shape) for p in pairs], format="csr"))
             for j in range(count)
         ),
         _stacked_directions(pairs),
-        np.concatenate([part.coefficients for part in pairs]),
-        _stacked_values([part.slip0 for part in pairs], still),
-        _stacked_values([part.equality for part in pairs], [zero > 0.0 for zero in numbers]),
-        _stacked_values([part.softness for part in pairs], numbers),
+        np.concatenate([pair.coefficients for pair in pairs]),
+        _stacked_values([pair.slip0 for pair in pairs], still),
+        _stacked_values([pair.equality for pair in pairs], [zero > 0.0 for zero in numbers]),
+        _stacked_values([pair.softness for pair in pairs], numbers),
         _stacked_low_rank(pairs, count),
-        _stacked_values([part.tangential_softness for part in pairs], numbers),
-        _stacked_values([part.elastic_slip for part in pairs], still),
+        _stacked_values([pair.tangential_softness for pair in pairs], numbers),
+        _stacked_values([pair.elastic_slip for pair in pairs], still),
         nodes=_stacked_nodes(pairs),
         coupled_directions=_stacked_directions(pairs, coupled=True),
-        parts=parts,
+        parts=by_pair,
     )
 
 
@@ -367,29 +367,29 @@ def _stacked_values(values: Sequence[Any], zeros: Sequence[AnyArray]) -> Any:
     )
 
 
-def _stacked_nodes(parts: list[Constraints]) -> Indices | None:
+def _stacked_nodes(pairs: list[Constraints]) -> Indices | None:
     """Return the nodes of all pairs; None where a pair has none."""
-    nodes = [part.nodes for part in parts if part.nodes is not None]
-    return np.concatenate(nodes) if len(nodes) == len(parts) else None
+    nodes = [pair.nodes for pair in pairs if pair.nodes is not None]
+    return np.concatenate(nodes) if len(nodes) == len(pairs) else None
 
 
-def _stacked_directions(parts: list[Constraints], coupled: bool = False) -> tuple[Array, ...]:
+def _stacked_directions(pairs: list[Constraints], coupled: bool = False) -> tuple[Array, ...]:
     """Return the tangents of all pairs, zero where a pair has none; with `coupled`, those of the compliances."""
-    directions = [(part.coupled_directions if coupled else ()) or part.directions for part in parts]
+    directions = [(part.coupled_directions if coupled else ()) or part.directions for part in pairs]
     return tuple(
         np.vstack(
-            [along[j] if along else np.zeros_like(p.positions) for along, p in zip(directions, parts, strict=True)]
+            [along[j] if along else np.zeros_like(p.positions) for along, p in zip(directions, pairs, strict=True)]
         )
         for j in range(max(map(len, directions)))
     )
 
 
-def _stacked_low_rank(parts: list[Constraints], count: int) -> Array | None:
+def _stacked_low_rank(pairs: list[Constraints], count: int) -> Array | None:
     """Return the compliances beside C side by side; `count` is the number of tangents."""
-    if all(part.low_rank_compliance is None for part in parts):
+    if all(pair.low_rank_compliance is None for pair in pairs):
         return None
-    none = [np.zeros((1 + count, len(part), 0)) for part in parts]
-    factors = [z if p.low_rank_compliance is None else p.low_rank_compliance for p, z in zip(parts, none, strict=True)]
+    none = [np.zeros((1 + count, len(pair), 0)) for pair in pairs]
+    factors = [z if p.low_rank_compliance is None else p.low_rank_compliance for p, z in zip(pairs, none, strict=True)]
     return np.stack([block_diag(*component) for component in zip(*factors, strict=True)])
 
 
@@ -417,23 +417,25 @@ class _Softened:
 class _BlockDiagonal:
     """Block-diagonal compliance of several pairs; see `Compliance`."""
 
-    def __init__(self, parts: list[Constraints]) -> None:
-        self._parts = [part.compliance for part in parts]
-        self._start = np.cumsum([0] + [len(part) for part in parts])
+    def __init__(self, pairs: list[Constraints]) -> None:
+        self._parts = [pair.compliance for pair in pairs]
+        self._start = np.cumsum([0] + [len(pair) for pair in pairs])
 
     def block(self, rows: Indices) -> Array:
         values = np.zeros((len(rows), len(rows)))
-        for part, first, end in zip(self._parts, self._start[:-1], self._start[1:], strict=True):
-            mine = np.flatnonzero((rows >= first) & (rows < end))
-            if part is not None and len(mine):
-                values[np.ix_(mine, mine)] = part.block(rows[mine] - first)
+        for compliance, first, end in zip(self._parts, self._start[:-1], self._start[1:], strict=True):
+            in_block = np.flatnonzero((rows >= first) & (rows < end))
+            if compliance is not None and len(in_block):
+                values[np.ix_(in_block, in_block)] = compliance.block(rows[in_block] - first)
         return values
 
     def among(self, rows: Indices) -> Array | FieldCompliance:
         blocks = []
         for part, first, end in zip(self._parts, self._start[:-1], self._start[1:], strict=True):
-            mine = rows[(rows >= first) & (rows < end)] - first
-            compliance = FieldCompliance.none(len(mine)) if part is None or not len(mine) else part.among(mine)
+            in_block = rows[(rows >= first) & (rows < end)] - first
+            compliance = (
+                FieldCompliance.none(len(in_block)) if part is None or not len(in_block) else part.among(in_block)
+            )
             if not isinstance(compliance, FieldCompliance):
                 return self.block(rows)
             blocks.append(compliance)

@@ -31,11 +31,11 @@ def default_formulation(dim: int, options: Mapping[str, Any]) -> tuple[str, dict
 
     The options are the user's, `options`, and those that the choice adds.
     """
-    asked = [name for name in OF_STANDARD if name in options] if dim == 2 else []
+    standard_options = [name for name in OF_STANDARD if name in options] if dim == 2 else []
     if "multipliers" in options:
         return "mortar", dict(options), "the pair has the option 'multipliers'"
-    if asked:
-        return "mortar", dict(options), f"the pair has the option '{asked[0]}'"
+    if standard_options:
+        return "mortar", dict(options), f"the pair has the option '{standard_options[0]}'"
     why = "these are right on any two surfaces and cost little with every linear solver"
     return "mortar", {**options, "multipliers": "dual"}, why
 

@@ -163,14 +163,14 @@ def facing(outside: OuterFacets, distance: float | None, angle: float) -> Facing
     far = _search(outside, np.inf, angle, np.isin(face, face[np.concatenate([near.facet, near.other])]))
     both = np.sort(np.column_stack([face[far.facet], face[far.other]]), axis=1) @ [len(face), 1]
     ahead, touching = np.isin(both, key) & (far.gap > 0.0), near.gap <= 0.0
-    parts = ((near.facet, far.facet), (near.other, far.other), (near.gap, far.gap))
-    return Facing(*(np.concatenate([one[touching], other[ahead]]) for one, other in parts))
+    fields = ((near.facet, far.facet), (near.other, far.other), (near.gap, far.gap))
+    return Facing(*(np.concatenate([from_near[touching], from_far[ahead]]) for from_near, from_far in fields))
 
 
 def _search(outside: OuterFacets, distance: float | None, angle: float, among: Mask) -> Facing:
     """Return the facets that the points of the facets `among` (n,) face."""
     facing_of_bodies = [_faced_by(outside, body, distance, angle, among) for body in np.unique(outside.body)]
-    return Facing(*(np.concatenate(parts) for parts in zip(*facing_of_bodies, strict=True)))
+    return Facing(*(np.concatenate(of_bodies) for of_bodies in zip(*facing_of_bodies, strict=True)))
 
 
 def _faced_by(
@@ -184,20 +184,22 @@ def _faced_by(
     rest = ~of_body & ((high >= low[of_body].min(axis=0) - reach) & (low <= high[of_body].max(axis=0) + reach)).all(
         axis=1
     )
-    ours = np.flatnonzero((of_body & among)[owner])
+    candidates = np.flatnonzero((of_body & among)[owner])
     if rest.any():
-        at = point[ours]
-        ours = ours[((at >= low[rest].min(axis=0) - reach) & (at <= high[rest].max(axis=0) + reach)).all(axis=1)]
-    if not rest.any() or not len(ours):
+        at = point[candidates]
+        candidates = candidates[
+            ((at >= low[rest].min(axis=0) - reach) & (at <= high[rest].max(axis=0) + reach)).all(axis=1)
+        ]
+    if not rest.any() or not len(candidates):
         return np.empty(0, np.intp), np.empty(0, np.intp), np.empty(0)
     kinds = [block[rest[first : first + len(block)]] for block, first in zip(outside.blocks.values(), outside.first)]
-    closest = closest_of_kinds(point[ours], [outside.mesh.points[block] for block in kinds if len(block)])
-    facet, other = owner[ours], np.flatnonzero(rest)[closest.facet]
-    apart = point[ours] - closest.position
-    gap = np.einsum("nd,nd->n", apart, closest.normal)
-    offset = np.linalg.norm(apart - gap[:, None] * closest.normal, axis=1)
+    closest = closest_of_kinds(point[candidates], [outside.mesh.points[block] for block in kinds if len(block)])
+    facet, other = owner[candidates], np.flatnonzero(rest)[closest.facet]
+    difference = point[candidates] - closest.position
+    gap = np.einsum("nd,nd->n", difference, closest.normal)
+    offset = np.linalg.norm(difference - gap[:, None] * closest.normal, axis=1)
     larger = np.maximum(size[facet], size[other])
-    opposed = np.einsum("nd,nd->n", normal[ours], closest.normal) <= -np.cos(np.radians(angle))
+    opposed = np.einsum("nd,nd->n", normal[candidates], closest.normal) <= -np.cos(np.radians(angle))
     near = closest.distance <= (larger if distance is None else distance) + LENGTH_ROUND_OFF * larger
     ahead = offset <= np.abs(gap) * np.tan(np.radians(angle)) + LENGTH_ROUND_OFF * larger
     kept = opposed & near & ahead

@@ -153,18 +153,18 @@ def _along(B: csr_array, rows: Mask, side: Surface, vectors: Array) -> tuple[csr
     (m, n_dofs), dim = B.shape, vectors.shape[1]
     entries = B.tocoo()
     row, point, component = entries.row, entries.col // dim, entries.col % dim
-    ours = np.isin(point, side.points)
+    on_secondary = np.isin(point, side.points)
     normal = np.zeros((m, dim))
-    np.add.at(normal, (row[ours], component[ours]), entries.data[ours])
+    np.add.at(normal, (row[on_secondary], component[on_secondary]), entries.data[on_secondary])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     normal = np.divide(normal, length, out=normal, where=length > 0.0)
-    kept = ours & rows[row]
+    kept = on_secondary & rows[row]
     weights = csr_array(
         (entries.data[kept] * normal[row[kept], component[kept]], (row[kept], point[kept])), shape=(m, n_dofs // dim)
     )
     covered = np.where(rows, -np.einsum("md,md->m", vectors, normal), 1.0)
-    theirs = csr_array((entries.data * covered[row] * ~kept, (row, entries.col)), shape=B.shape)
-    along = csr_array(theirs + rows_of(weights, -vectors))
+    on_primary = csr_array((entries.data * covered[row] * ~kept, (row, entries.col)), shape=B.shape)
+    along = csr_array(on_primary + rows_of(weights, -vectors))
     along.eliminate_zeros()
     return along, weights
 

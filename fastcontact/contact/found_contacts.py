@@ -199,10 +199,10 @@ def nothing_found(mesh: Mesh, distance: float | None, angle: float, groups: Sequ
             "nodes where they touch"
         )
     size = float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
-    apart = find_contacts(mesh, distance=size, angle=angle, groups=groups)
-    if not apart.pairs:
+    distant = find_contacts(mesh, distance=size, angle=angle, groups=groups)
+    if not distant.pairs:
         return f"no surfaces of different bodies look at each other within {angle:g} degrees: name both sides of each contact"
-    nearest = min((pair.gap for pair in apart), key=lambda gap: abs(gap[0]))[0]
+    nearest = min((pair.gap for pair in distant), key=lambda gap: abs(gap[0]))[0]
     within = "the size of their facets" if distance is None else f"{distance:.4g}"
     return (
         f"no bodies face each other within {within}: the nearest are {abs(nearest):.4g} apart; give distance = "
@@ -268,9 +268,9 @@ def _pairs(
         ends, numbers = (ends, pair) if second == 0 else (ends[:, ::-1], pair[::-1])
         face = outside.smooth_face[ends[:, 0]]
         for number, surface in enumerate(order := np.unique(face), start=1):
-            mine = face == surface
-            gap, spacing = search.gap[rows[mine]], _spacing(outside, ends[mine])
-            sides = np.unique(ends[mine, 0]), np.unique(ends[mine, 1])
+            of_surface = face == surface
+            gap, spacing = search.gap[rows[of_surface]], _spacing(outside, ends[of_surface])
+            sides = np.unique(ends[of_surface, 0]), np.unique(ends[of_surface, 1])
             both = names[numbers[0]], names[numbers[1]]
             title = " on ".join(both) + (f" {number}" if len(order) > 1 else "")
             yield FoundContact(

@@ -64,12 +64,12 @@ def _rows_of_single_nodes(relations: csr_array, dim: int) -> tuple[Indices, Arra
         return np.empty(0, np.intp), np.empty((0, dim))
     owner = (relations.indices // dim).astype(np.intp)
     first = relations.indptr[rows]
-    alone = np.minimum.reduceat(owner, first) == np.maximum.reduceat(owner, first)
+    single_node = np.minimum.reduceat(owner, first) == np.maximum.reduceat(owner, first)
     normals = np.zeros((relations.shape[0], dim))
     np.add.at(normals, (np.repeat(np.arange(len(counts)), counts), relations.indices % dim), relations.data)
     length = np.linalg.norm(normals[rows], axis=1)
-    alone &= length > 0.0
-    return owner[first[alone]], normals[rows[alone]] / length[alone, None]
+    single_node &= length > 0.0
+    return owner[first[single_node]], normals[rows[single_node]] / length[single_node, None]
 
 
 def spanned(tensors: Array, least: float) -> Array:

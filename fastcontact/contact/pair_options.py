@@ -170,7 +170,7 @@ def spread(side: Surface, excluded: Mask, givers: Indices) -> csr_array:
     m = len(side.points)
     if not excluded.any():
         return csr_array(eye_array(m, format="csr"))
-    gives = np.isin(np.arange(m), givers) & ~excluded
-    beside = diags_array(excluded.astype(float)) @ side.beside @ diags_array(gives.astype(float))
+    is_giver = np.isin(np.arange(m), givers) & ~excluded
+    beside = diags_array(excluded.astype(float)) @ side.beside @ diags_array(is_giver.astype(float))
     count = np.maximum(np.asarray(beside.sum(axis=1)).ravel(), 1.0)
     return csr_array(diags_array((~excluded).astype(float)) + diags_array(1.0 / count) @ beside)

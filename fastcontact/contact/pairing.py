@@ -201,10 +201,10 @@ def _straight_on(pairing: Pairing, candidates: Array, primary: Surface, coordina
         return pairing
     at = places(primary, pairing.facet[rows], pairing.xi[rows])
     corners = coordinates[at.nodes]
-    apart = candidates[rows] - np.einsum("nk,nkd->nd", at.shape, corners)
+    offset = candidates[rows] - np.einsum("nk,nkd->nd", at.shape, corners)
     axes = np.concatenate([np.einsum("nkj,nkd->ndj", at.gradient, corners), pairing.normal[rows][:, :, None]], axis=2)
     beyond = np.zeros_like(pairing.xi)
-    beyond[rows] = np.linalg.solve(axes, apart[:, :, None])[:, :-1, 0]
+    beyond[rows] = np.linalg.solve(axes, offset[:, :, None])[:, :-1, 0]
     return replace(pairing, beyond=beyond)
 
 
@@ -221,13 +221,16 @@ def _at_smooth_ends(primary: Surface, coordinates: Array, closest: Closest) -> M
     return np.asarray(out & smooth[closest.facet, (closest.xi[:, 0] > 0.0).astype(np.intp)])
 
 
-def filled_up(parts: Sequence[AnyArray]) -> AnyArray:
+def filled_up(arrays: Sequence[AnyArray]) -> AnyArray:
     """Return arrays (n_i, k_i) as one, as wide as the widest: integers are repeated, floating-point numbers zero."""
-    width = max(part.shape[1] for part in parts)
-    missing = [((0, 0), (0, width - part.shape[1])) for part in parts]
-    integer = np.issubdtype(parts[0].dtype, np.integer)
+    width = max(values.shape[1] for values in arrays)
+    missing = [((0, 0), (0, width - values.shape[1])) for values in arrays]
+    integer = np.issubdtype(arrays[0].dtype, np.integer)
     return np.concatenate(
-        [np.pad(part, pad, mode="edge" if integer else "constant") for part, pad in zip(parts, missing, strict=True)]
+        [
+            np.pad(values, pad, mode="edge" if integer else "constant")
+            for values, pad in zip(arrays, missing, strict=True)
+        ]
     )
 
 

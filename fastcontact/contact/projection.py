@@ -61,11 +61,11 @@ def places(side: Surface, facet: Indices, xi: Array) -> Places:
     )
     first = 0
     for block in side.blocks:
-        mine = np.flatnonzero((facet >= first) & (facet < first + len(block.facets)))
-        shape, k = _of_block(block, facet[mine] - first, xi[mine]), block.facets.shape[1]
+        in_block = np.flatnonzero((facet >= first) & (facet < first + len(block.facets)))
+        shape, k = _of_block(block, facet[in_block] - first, xi[in_block]), block.facets.shape[1]
         columns = np.minimum(np.arange(width), k - 1)
-        projected.nodes[mine], projected.local[mine] = shape.nodes[:, columns], shape.local[:, columns]
-        projected.shape[mine, :k], projected.gradient[mine, :k] = shape.shape, shape.gradient
+        projected.nodes[in_block], projected.local[in_block] = shape.nodes[:, columns], shape.local[:, columns]
+        projected.shape[in_block, :k], projected.gradient[in_block, :k] = shape.shape, shape.gradient
         first += len(block.facets)
     return projected
 
@@ -91,7 +91,7 @@ def _nodal_means(side: Surface, values: Sequence[Array], angles: Sequence[Array]
     n, dim = len(side.points), values[0].shape[2]
     at = np.concatenate([block.local.ravel() for block in side.blocks])
     weighted = [(angle[:, :, None] * normals).reshape(-1, dim) for normals, angle in zip(values, angles, strict=True)]
-    total: Array = np.column_stack([np.bincount(at, part, n) for part in np.concatenate(weighted).T])
+    total: Array = np.column_stack([np.bincount(at, component, n) for component in np.concatenate(weighted).T])
     side.add_across_ends(total)
     return total / np.linalg.norm(total, axis=1, keepdims=True)
 
@@ -124,17 +124,17 @@ def smooth_normals(side: Surface, coordinates: Array) -> list[Array]:
         joined[here] = total / np.linalg.norm(total, axis=1, keepdims=True)
     ends = np.cumsum([normals.shape[0] * normals.shape[1] for normals in facet_normals_of_blocks])[:-1]
     return [
-        part.reshape(like.shape) for part, like in zip(np.split(joined, ends), facet_normals_of_blocks, strict=True)
+        means.reshape(like.shape) for means, like in zip(np.split(joined, ends), facet_normals_of_blocks, strict=True)
     ]
 
 
-def at_nodes_of_facets(parts: Sequence[Array]) -> Array:
+def at_nodes_of_facets(of_blocks: Sequence[Array]) -> Array:
     """Return values at the nodes of facets (n_facets, k, ...) of all blocks as one array, as wide as the widest block.
 
     The last entry of facets with fewer nodes is repeated, as in `places`.
     """
-    width = max(part.shape[1] for part in parts)
-    return np.concatenate([part[:, np.minimum(np.arange(width), part.shape[1] - 1)] for part in parts])
+    width = max(values.shape[1] for values in of_blocks)
+    return np.concatenate([values[:, np.minimum(np.arange(width), values.shape[1] - 1)] for values in of_blocks])
 
 
 def facet_normals(block: FacetBlock, coordinates: Array) -> Array:
@@ -143,7 +143,7 @@ def facet_normals(block: FacetBlock, coordinates: Array) -> Array:
     slopes = element.gradient(element.nodes)
     if element.dim == 2:
         out = np.empty(nodes.shape)
-        shared(lambda part: projection_kernels.normals(nodes, slopes, *part, out), portions(*block.facets.shape))
+        shared(lambda portion: projection_kernels.normals(nodes, slopes, *portion, out), portions(*block.facets.shape))
         return out
     normal = area_vectors(nodes, slopes)
     return normal / np.linalg.norm(normal, axis=2, keepdims=True)
@@ -156,7 +156,9 @@ def facet_angles(element: elements.Element, nodes: Array) -> Array:
     angle, n = np.empty(nodes.shape[:2]), element.n_corners
     around = np.arange(n)  # edges run from each corner to the next
     beside = np.column_stack([(around + 1) % n, (around - 1) % n])
-    shared(lambda part: projection_kernels.angles(nodes, beside, *part, angle), portions(len(nodes), nodes.shape[1]))
+    shared(
+        lambda portion: projection_kernels.angles(nodes, beside, *portion, angle), portions(len(nodes), nodes.shape[1])
+    )
     return angle
 
 
@@ -206,8 +208,8 @@ def along_normals(
     ]
     terms, directions = _polynomials(kinds), _polynomials(at_nodes)
     shared(
-        lambda part: projection_kernels.along_normals(
-            *part, seen, heights, terms, directions, side.triangular, side.neighbours, facet
+        lambda portion: projection_kernels.along_normals(
+            *portion, seen, heights, terms, directions, side.triangular, side.neighbours, facet
         ),
         portions(len(points), EFFORT),
     )

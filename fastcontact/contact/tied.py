@@ -61,8 +61,8 @@ class TiedPair:
 
     def forces(self, multiplier: Array) -> tuple[Array, Array]:
         """Return normal (m,) and tangential (m, k) forces at the constraint points of the formulation."""
-        parts = [self.moments.T @ part for part in multiplier.reshape(len(self.rows), -1)]
-        return parts[0], np.column_stack(parts[1:])
+        components = [self.moments.T @ component for component in multiplier.reshape(len(self.rows), -1)]
+        return components[0], np.column_stack(components[1:])
 
 
 def tied(constraints: Constraints) -> TiedPair:
@@ -85,10 +85,10 @@ def moments_of(constraints: Constraints) -> tuple[csr_array, Array | None]:
     P, areas = constraints.compliance.P, constraints.compliance.areas
     weighted = csr_array(P.T @ diags_array(areas))
     scale = np.asarray(abs(weighted).sum(axis=1)).ravel()
-    alone = np.flatnonzero((areas == 0.0) & constraints.usable)  # at the axis
-    single = csr_array((np.ones(len(alone)), (np.arange(len(alone)), alone)), shape=(len(alone), len(areas)))
-    whole = np.concatenate([scale, np.zeros(len(alone))])
-    return csr_array(vstack([diags_array(1.0 / np.maximum(scale, TINY)) @ weighted, single])), whole
+    on_axis = np.flatnonzero((areas == 0.0) & constraints.usable)  # at the axis
+    single = csr_array((np.ones(len(on_axis)), (np.arange(len(on_axis)), on_axis)), shape=(len(on_axis), len(areas)))
+    scales = np.concatenate([scale, np.zeros(len(on_axis))])
+    return csr_array(vstack([diags_array(1.0 / np.maximum(scale, TINY)) @ weighted, single])), scales
 
 
 def _cleaned(rows: csr_array) -> csr_array:

@@ -197,8 +197,8 @@ def line_overlap(
         masses.append(mass)
         heights = np.zeros((n, k, 2))
         if smoothing is not None and axes is not None:
-            ours = number_of_first + points.facet, points.xi[:, None]
-            depth = area * smoothing.overlap(ours, (facing.facet, facing.xi), axes)
+            on_secondary = number_of_first + points.facet, points.xi[:, None]
+            depth = area * smoothing.overlap(on_secondary, (facing.facet, facing.xi), axes)
             np.add.at(heights, points.facet, points.shape[:, :, None] * (depth[:, None] * facing.normal)[:, None])
         closer.append(heights)
         number_of_first += n

@@ -62,20 +62,20 @@ class WholeFacets:
         degrees[~mass.any(axis=(1, 2))] = -1
         size = np.einsum("fkk->f", self.mass)
         partly = np.flatnonzero((degrees == 2) & (np.abs(mass - self.mass).max(axis=(1, 2)) > SINGLE_PRECISION * size))
-        whole, partial, T = self.mass[partly], mass[partly], self.to_corners
-        linear = _smallest(T @ whole @ T.T, T @ partial @ T.T) > DETERMINED
-        degrees[partly] = np.where(_smallest(whole, partial) > DETERMINED, 2, np.where(linear, 1, 0))
+        full, partial, T = self.mass[partly], mass[partly], self.to_corners
+        linear = _smallest(T @ full @ T.T, T @ partial @ T.T) > DETERMINED
+        degrees[partly] = np.where(_smallest(full, partial) > DETERMINED, 2, np.where(linear, 1, 0))
         return degrees
 
 
-def _smallest(whole: Array, mass: Array) -> Array:
+def _smallest(full: Array, mass: Array) -> Array:
     """Return the smallest generalised eigenvalues (n_facets,) of mass matrices relative to those of whole facets."""
-    inverse = np.linalg.inv(np.linalg.cholesky(whole))
+    inverse = np.linalg.inv(np.linalg.cholesky(full))
     return np.asarray(np.linalg.eigvalsh(inverse @ mass @ inverse.transpose(0, 2, 1))[:, 0])
 
 
 def determined(
-    side: Surface, whole: list[WholeFacets], masses: list[Array], excluded: Mask
+    side: Surface, fields: list[WholeFacets], masses: list[Array], excluded: Mask
 ) -> tuple[csr_array, Indices]:
     """Return the matrix (m, k) from the independent values of the field to all nodes, and the nodes (k,) of these values.
 
@@ -89,18 +89,18 @@ def determined(
     excluded : ndarray of bool (m,)
         Nodes without an independent value.
     """
-    degrees = [field.degrees(mass) for field, mass in zip(whole, masses, strict=True)]
+    degrees = [field.degrees(mass) for field, mass in zip(fields, masses, strict=True)]
     kept = np.zeros(len(side.points), bool)
-    for field, degree in zip(whole, degrees, strict=True):
+    for field, degree in zip(fields, degrees, strict=True):
         kept[field.block.local[degree == 2]] = True
         kept[field.block.local[degree == 1][:, : len(field.to_corners)]] = True
     kept &= ~excluded
-    for field, degree, mass in zip(whole, degrees, masses, strict=True):
+    for field, degree, mass in zip(fields, degrees, masses, strict=True):
         _give_each_a_value(kept, field.block.local[degree >= 0], mass[degree >= 0], excluded)
     independent = np.flatnonzero(kept)
     values = spread(side, excluded, independent) if excluded.any() else csr_array(diags_array(kept.astype(float)))
     if any((degree[degree >= 0] < 2).any() for degree in degrees):
-        values = _interpolated(csr_array(values), whole, degrees, kept, excluded)
+        values = _interpolated(csr_array(values), fields, degrees, kept, excluded)
     return csr_array(csr_array(values)[:, independent]), independent
 
 
@@ -113,7 +113,7 @@ def _give_each_a_value(kept: Mask, local: Indices, mass: Array, excluded: Mask) 
 
 
 def _interpolated(
-    values: csr_array, whole: list[WholeFacets], degrees: list[Indices], with_value: Mask, excluded: Mask
+    values: csr_array, fields: list[WholeFacets], degrees: list[Indices], with_value: Mask, excluded: Mask
 ) -> csr_array:
     """Return `values` (m, m), completed by rows of the nodes that are neither independent nor excluded.
 
@@ -121,7 +121,7 @@ def _interpolated(
     """
     m = len(with_value)
     pairs = []
-    for field, degree in zip(whole, degrees, strict=True):
+    for field, degree in zip(fields, degrees, strict=True):
         local = field.block.local[degree >= 0]
         corners = local[:, : len(field.to_corners)]
         row, column = np.repeat(corners, local.shape[1], axis=1).ravel(), np.tile(local, corners.shape[1]).ravel()
@@ -131,13 +131,13 @@ def _interpolated(
     count = np.bincount(row, minlength=m)
     values = csr_array(diags_array((with_value | excluded).astype(float)) @ values)
     values = csr_array(values + coo_array((1.0 / count[row], (row, column)), shape=(m, m)))
-    return csr_array(values + _between_corners(whole, degrees, with_value | excluded) @ values)
+    return csr_array(values + _between_corners(fields, degrees, with_value | excluded) @ values)
 
 
-def _between_corners(whole: list[WholeFacets], degrees: list[Indices], done: Mask) -> csr_array:
+def _between_corners(fields: list[WholeFacets], degrees: list[Indices], done: Mask) -> csr_array:
     """Return the rows (m, m) of nodes between corners that are not `done` (m,), interpolated linearly."""
     between = lil_array((len(done), len(done)))
-    for field, degree in zip(whole, degrees, strict=True):
+    for field, degree in zip(fields, degrees, strict=True):
         corners = len(field.to_corners)
         facet, k = np.nonzero(~done[field.block.local[:, corners:]] & (degree >= 0)[:, None])
         for nodes, node in zip(field.block.local[facet], k + corners, strict=True):

@@ -252,10 +252,10 @@ class Formulation(ABC):
         """Return unit means (n, dim) of the secondary facets' normals at candidates."""
         local = np.zeros(len(deformed), np.intp)
         local[self.secondary.points] = np.arange(len(self.secondary.points))
-        ours = np.einsum(
+        normal = np.einsum(
             "nk,nkd->nd", candidates.shape, nodal_normals(self.secondary, deformed)[local[candidates.nodes]]
         )
-        return np.asarray(ours / np.maximum(np.linalg.norm(ours, axis=1, keepdims=True), TINY))
+        return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), TINY))
 
     def assembled(
         self, candidates: Candidates, pairing: Pairing, compliance: Compliance | None, at: Configuration
@@ -330,8 +330,11 @@ class Formulation(ABC):
             return closer
         deformed = self.points + at.displacement
         axes = [frames(side, self.points, deformed) for side in (self.secondary, self.primary)]
-        ours, theirs = (candidates.facet[rows], candidates.xi[rows]), (pairing.facet[rows], pairing.xi[rows])
-        closer[rows] = self.smoothing.overlap(ours, theirs, axes)
+        on_secondary, on_primary = (
+            (candidates.facet[rows], candidates.xi[rows]),
+            (pairing.facet[rows], pairing.xi[rows]),
+        )
+        closer[rows] = self.smoothing.overlap(on_secondary, on_primary, axes)
         return closer
 
     def turning(self, candidates: Candidates, at: Configuration) -> Array | None:
@@ -360,14 +363,14 @@ class Formulation(ABC):
             moved = moved if turning is None else moved - turning
         else:
             rows = np.flatnonzero(pairing.paired)
-            facing, theirs = places(self.primary, pairing.facet[rows], pairing.xi[rows]), np.zeros_like(both)
+            facing, held_opposite = places(self.primary, pairing.facet[rows], pairing.xi[rows]), np.zeros_like(both)
             held, motion = self.held.at(facing.nodes), (at.displacement - at.start)[facing.nodes]
-            theirs[rows] = np.einsum("nk,nkde->nde", facing.shape, held)
+            held_opposite[rows] = np.einsum("nk,nkde->nde", facing.shape, held)
             mean = np.einsum("nk,nkd->nd", facing.shape, motion)
             # Where an inclined normal leads slightly past a held node, the motion of the other nodes there is ignored.
             beside = np.einsum("nk,nkde,nkd->ne", facing.shape, held, motion - mean[:, None])
-            moved[rows] -= mean + np.einsum("nde,ne->nd", np.linalg.pinv(theirs[rows], hermitian=True), beside)
-            both = spanned(both @ theirs @ both, 0.5)
+            moved[rows] -= mean + np.einsum("nde,ne->nd", np.linalg.pinv(held_opposite[rows], hermitian=True), beside)
+            both = spanned(both @ held_opposite @ both, 0.5)
         along = np.einsum("nde,ne->nd", both, pairing.normal)
         both = without(both, pairing.normal, np.sqrt(0.5))
         # Closing is no slip where the normal is held, too. Elsewhere it may be inclined, as at the edge of a plane of
@@ -407,14 +410,14 @@ class Formulation(ABC):
         rows = np.flatnonzero(pairing.paired)
         facing = places(self.primary, pairing.facet[rows], pairing.xi[rows])
         nodes, shape = candidates.nodes[rows], candidates.shape[rows]
-        theirs = at_nodes_of_facets(smooth_normals(self.primary, deformed))[pairing.facet[rows]]
-        theirs = interpolated(theirs, facing)
-        mean = theirs - self._secondary_normals(Candidates(nodes, shape), deformed)
+        primary_normals = at_nodes_of_facets(smooth_normals(self.primary, deformed))[pairing.facet[rows]]
+        primary_normals = interpolated(primary_normals, facing)
+        mean = primary_normals - self._secondary_normals(Candidates(nodes, shape), deformed)
         length = np.linalg.norm(mean, axis=1, keepdims=True)
         mean = np.divide(mean, length, out=np.zeros_like(mean), where=length > LENGTH_ROUND_OFF)
-        apart = np.einsum("nk,nkd->nd", shape, start[nodes])
-        apart -= np.einsum("nk,nkd->nd", facing.shape, start[facing.nodes])
-        opening = np.einsum("nd,nd->n", mean, apart)
+        offset = np.einsum("nk,nkd->nd", shape, start[nodes])
+        offset -= np.einsum("nk,nkd->nd", facing.shape, start[facing.nodes])
+        opening = np.einsum("nd,nd->n", mean, offset)
         for k, along in enumerate(directions):
             slip0[k, rows] = np.einsum("nd,nd->n", along[rows], mean) * opening
         return slip0
@@ -451,14 +454,14 @@ class Formulation(ABC):
 
 def _without_whole_facets(held: Array, side: Surface) -> Array:
     """Return projectors (n_nodes, dim, dim) without the directions in which all nodes of a facet of a side are held."""
-    whole = np.zeros_like(held)
+    span = np.zeros_like(held)
     for block in side.blocks:
         around = held[block.local]
         vectors = np.linalg.eigh(around.mean(axis=1))[1]
         least = np.einsum("fdk,fnde,fek->fnk", vectors, around, vectors).min(axis=1) >= TOGETHER**2
         vectors = np.where(least[:, None], vectors, 0.0)
-        np.add.at(whole, block.local, (vectors @ vectors.transpose(0, 2, 1))[:, None])
-    return spanned(held - held @ spanned(whole, 0.5) @ held, 0.5)
+        np.add.at(span, block.local, (vectors @ vectors.transpose(0, 2, 1))[:, None])
+    return spanned(held - held @ spanned(span, 0.5) @ held, 0.5)
 
 
 def _at_places(known: tuple[Array, AnyArray], positions: Array) -> AnyArray:

@@ -84,9 +84,9 @@ class PressureField(NodalField):
 
         `areas` are those of the points that take part, zero elsewhere, and of all points, both (m,) [area].
         """
-        (around, shape), (nodes, independent), (taking_part, whole) = points, field, areas
+        (around, shape), (nodes, independent), (taking_part, full_areas) = points, field, areas
         P = shapes_at(shape, around, nodes.shape[0])
-        covered, total = P.T @ taking_part, P.T @ whole
+        covered, total = P.T @ taking_part, P.T @ full_areas
         P = csr_array(P @ nodes)
         mass = splu((P.T @ diags_array(taking_part) @ P).tocsc()) if len(independent) else None
         projection = Projection(P, taking_part, rho, mass)
@@ -111,9 +111,9 @@ class PressureField(NodalField):
     @property
     def covered(self) -> Array:
         """Covered part of the nodal areas; one for nodes without area."""
-        whole = self.nodal_areas
-        with_area = np.abs(whole) > LENGTH_ROUND_OFF * np.abs(whole).max(initial=0.0)
-        return np.divide(self.covered_areas, whole, out=np.ones_like(whole), where=with_area)
+        areas = self.nodal_areas
+        with_area = np.abs(areas) > LENGTH_ROUND_OFF * np.abs(areas).max(initial=0.0)
+        return np.divide(self.covered_areas, areas, out=np.ones_like(areas), where=with_area)
 
     def shares(self, force: Array) -> Array:
         """Return the field times the areas that take part."""
@@ -150,8 +150,8 @@ class PressureField(NodalField):
         near |= touched & ~_nearest(self.around[seen], self.shape[seen], len(gap))
         near &= pressure > 0
         # Forces at one end of a facet, opposite an edge, may put the nearest node in tension: then the others of its facet.
-        alone = self.around[active][~near[self.around[active]].any(axis=1)]
-        near[alone[pressure[alone] > 0]] = True
+        isolated = self.around[active][~near[self.around[active]].any(axis=1)]
+        near[isolated[pressure[isolated] > 0]] = True
         return near
 
     def initially_active(self, gap: Array, pressure: Array) -> Mask | None:
@@ -232,8 +232,8 @@ class PressureFieldFormulation(Formulation):
             columns = np.flatnonzero(nodes[field.independent])
             if len(columns):
                 Z = field.projection.compliant(columns)
-                own = held if field.axes is None else np.einsum("nde,nd->ne", field.axes[1], held)
-                at_points = field.projection.P @ own[field.independent]
-                parts = [np.einsum("nd,nd->n", along, at_points) for along in (normals(directions), *directions)]
-                factors.append(np.stack([part[:, None] * Z for part in parts]))
+                in_axes = held if field.axes is None else np.einsum("nde,nd->ne", field.axes[1], held)
+                at_points = field.projection.P @ in_axes[field.independent]
+                components = [np.einsum("nd,nd->n", along, at_points) for along in (normals(directions), *directions)]
+                factors.append(np.stack([component[:, None] * Z for component in components]))
         return np.concatenate(factors, axis=2) if factors else None

@@ -145,8 +145,8 @@ class WeightedMortar(Formulation):
         closing = self._closing(constraints, normal, at)
         slip0 = self._slip0(mean, closing, rubbing, at)
         for along, still, more in beside:
-            ours = closing - np.where(still, np.einsum("md,md->m", closing, along), 0.0)[:, None] * along
-            falsely = np.einsum("md,md->m", more @ ours, along)
+            remaining = closing - np.where(still, np.einsum("md,md->m", closing, along), 0.0)[:, None] * along
+            falsely = np.einsum("md,md->m", more @ remaining, along)
             slip0 += np.stack([np.einsum("md,md->m", t, along) * falsely for t in rubbing])
         return replace(
             constraints,
@@ -198,8 +198,8 @@ class WeightedMortar(Formulation):
 
     def _fraction(self, number: int, covered: list[Array]) -> Array:
         """Return the fraction (n_facets, k) of the weights of a block's functions that faces the other side."""
-        whole = self._whole[number]
-        return np.where(whole > 0.0, covered[number] / np.where(whole > 0.0, whole, 1.0), 0.0)
+        full_area = self._whole[number]
+        return np.where(full_area > 0.0, covered[number] / np.where(full_area > 0.0, full_area, 1.0), 0.0)
 
     def _slip0(self, mean: csr_array, closing: Array, directions: tuple[Array, ...], at: Configuration) -> Array:
         """Return the slip (k, m) not due to displacements: that of a rigid obstacle, or minus that of `closing`."""
@@ -229,11 +229,11 @@ class WeightedMortar(Formulation):
     @cached_property
     def _areas(self) -> tuple[Array, Array]:
         """The integrals (m,) of the test functions and of the shape functions over the whole secondary side [area]."""
-        whole = nodal_areas(self.secondary, self.points, self.axisymmetric)
-        tested = np.zeros_like(whole)
+        full_area = nodal_areas(self.secondary, self.points, self.axisymmetric)
+        tested = np.zeros_like(full_area)
         for block, full in zip(self.secondary.blocks, self._whole, strict=True):
             np.add.at(tested, block.local, full)
-        return tested, whole
+        return tested, full_area
 
     def _closing(self, part: Constraints, normal: Array, at: Configuration) -> Array:
         """Return the gaps (m, dim) that the step closes, along the directions in which closing is no slip [length].
@@ -265,14 +265,14 @@ class WeightedMortar(Formulation):
         for along, nodes in without_slip:
             if not (nodes & kept).any():
                 continue
-            ours, across, _ = self._weighted(overlap, covered, kept & ~nodes)
-            other = csr_array(scaled(csr_array(ours - across), 1.0 / weight) - mean)
+            on_secondary, across, _ = self._weighted(overlap, covered, kept & ~nodes)
+            other = csr_array(scaled(csr_array(on_secondary - across), 1.0 / weight) - mean)
             other.eliminate_zeros()
             for k, direction in enumerate(directions):
                 slip = np.einsum("md,md->m", direction, along)
                 rows[k] = csr_array(rows[k] + rows_of(other, slip[:, None] * along))
             beside.append(
-                (along, nodes, csr_array(scaled(csr_array(ours - own), 1.0 / weight)[:, self.secondary.points]))
+                (along, nodes, csr_array(scaled(csr_array(on_secondary - own), 1.0 / weight)[:, self.secondary.points]))
             )
             held[nodes] += np.einsum("md,me->mde", along[nodes], along[nodes])
         free = [1.0 - np.einsum("md,mde,me->m", t, held, t) >= FREE for t in directions]
@@ -295,9 +295,9 @@ class WeightedMortar(Formulation):
             functions[block.element] = psi
             np.add.at(closer, block.local, psi @ overlap.closer[number])
         for coupling in overlap.couplings:
-            ours, theirs = coupling.pairs.T
-            values = functions[coupling.secondary.element][ours] @ coupling.integrals
-            across.add(coupling.secondary.local[ours], coupling.primary.facets[theirs], values)
+            secondary_facet, primary_facet = coupling.pairs.T
+            values = functions[coupling.secondary.element][secondary_facet] @ coupling.integrals
+            across.add(coupling.secondary.local[secondary_facet], coupling.primary.facets[primary_facet], values)
         return rows.matrix(size), across.matrix(size), closer
 
     def _functions(self, T: Array, mass: Array, kept: Mask, fraction: Array) -> tuple[Array, Array]:
@@ -311,17 +311,17 @@ class WeightedMortar(Formulation):
     def _taking_part(self, covered: list[Array]) -> Mask:
         """Return which nodes (m,) have gaps, given the weights (n_facets, k) of all functions."""
         m = len(self.secondary.points)
-        total, whole, rescued = np.zeros(m), np.zeros(m), np.zeros(m, bool)
+        total, complete, rescued = np.zeros(m), np.zeros(m), np.zeros(m, bool)
         for block, weights, full in zip(self.secondary.blocks, covered, self._whole, strict=True):
             np.add.at(total, block.local, weights)
-            np.add.at(whole, block.local, full)
-        enough = total > (COVERED if self.multipliers == "dual" else LEAST) * whole
+            np.add.at(complete, block.local, full)
+        enough = total > (COVERED if self.multipliers == "dual" else LEAST) * complete
         for block, weights, full in zip(self.secondary.blocks, covered, self._whole, strict=True):
             # The overlap of a facet is not lost: where no node has a sufficient part, the node with the largest takes it.
             lost = ~enough[block.local].any(axis=1) & (weights.sum(axis=1) > LEAST * full.sum(axis=1))
             most = np.argmax(total[block.local[lost]], axis=1)
             rescued[block.local[lost][np.arange(len(most)), most]] = True
-        return (enough | rescued) & (whole > 0.0)
+        return (enough | rescued) & (complete > 0.0)
 
     def _mean_normals(self, overlap: Overlap, deformed: Array, pose: Pose) -> Array:
         """Return unit means (m, dim) of the primary normals that the nodes face; the last axis where there are none.
@@ -342,9 +342,9 @@ class WeightedMortar(Formulation):
         }
         tests = dict(zip((block.element for block in self.secondary.blocks), self._test, strict=True))
         for coupling in overlap.couplings:
-            ours, theirs = coupling.pairs.T
-            faced = coupling.integrals @ normals_of[coupling.primary.element][theirs]
-            np.add.at(mean, coupling.secondary.local[ours], tests[coupling.secondary.element] @ faced)
+            secondary_facet, primary_facet = coupling.pairs.T
+            faced = coupling.integrals @ normals_of[coupling.primary.element][primary_facet]
+            np.add.at(mean, coupling.secondary.local[secondary_facet], tests[coupling.secondary.element] @ faced)
         self.secondary.add_across_ends(mean)
         length = np.linalg.norm(mean, axis=1, keepdims=True)
         return np.where(length > 0, mean / np.where(length > 0, length, 1.0), np.eye(mean.shape[1])[-1])

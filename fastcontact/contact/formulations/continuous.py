@@ -68,13 +68,13 @@ class Continuous(PressureFieldFormulation):
             shortest = min(shortest, size.min() ** (1 / xi.shape[1]))
         self._candidates = Candidates.inside(self.secondary, rules)
         rho = self.augmentation * self.modulus / shortest
-        whole = np.concatenate(areas)
-        areas_of_points = np.where(self.options.out(self._candidates), 0.0, whole)
+        all_areas = np.concatenate(areas)
+        areas_of_points = np.where(self.options.out(self._candidates), 0.0, all_areas)
         around = filled_up(local)
         P = shapes_at(self._candidates.shape, around, len(self.secondary.points))
         field = self.repeated(self._determined(P, areas_of_points))
         points = around, self._candidates.shape
-        self._field = PressureField.of_points(points, (areas_of_points, whole), float(rho), field, renewed=False)
+        self._field = PressureField.of_points(points, (areas_of_points, all_areas), float(rho), field, renewed=False)
 
     def _rule(self, element: str) -> quadrature.Rule:
         if self.integration not in RULES:

@@ -191,12 +191,14 @@ def _check_orientation(blocks: list[Block], group: str, one: Indices, other: Ind
     )
 
 
-def _smooth_normals(blocks: list[Block], own: list[tuple[Array, Array]], crease: float) -> tuple[list[Array], Array]:
+def _smooth_normals(
+    blocks: list[Block], by_block: list[tuple[Array, Array]], crease: float
+) -> tuple[list[Array], Array]:
     """Return the smooth normals of facets and those of points, from the normals and angles of single facets."""
-    dim = own[0][0].shape[2]
+    dim = by_block[0][0].shape[2]
     node = np.concatenate([block.nodes.ravel() for block in blocks])
-    normal = np.concatenate([normals.reshape(-1, dim) for normals, _ in own])
-    weight = np.concatenate([angle.ravel() for _, angle in own])
+    normal = np.concatenate([normals.reshape(-1, dim) for normals, _ in by_block])
+    weight = np.concatenate([angle.ravel() for _, angle in by_block])
     at_points = np.zeros((node.max() + 1, dim))
     np.add.at(at_points, node, weight[:, None] * normal)
     i, j = _pairs_at_nodes(node)
@@ -206,8 +208,8 @@ def _smooth_normals(blocks: list[Block], own: list[tuple[Array, Array]], crease:
     np.add.at(mean, i[alike], weight[j[alike], None] * normal[j[alike]])
     mean /= np.linalg.norm(mean, axis=1, keepdims=True)
     ends = np.cumsum([block.nodes.size for block in blocks])[:-1]
-    parts = np.split(mean, ends)
-    return [part.reshape(*block.nodes.shape, dim) for part, block in zip(parts, blocks, strict=True)], at_points
+    means = np.split(mean, ends)
+    return [values.reshape(*block.nodes.shape, dim) for values, block in zip(means, blocks, strict=True)], at_points
 
 
 def _pairs_at_nodes(node: Indices) -> tuple[Indices, Indices]:

@@ -97,20 +97,20 @@ class MeshedSurface:
             )
         closest = closest_of_kinds(points, [block.corners for block in self._facets.blocks])
         sense, smooth, on_ridge, on_border = self._frames(closest)
-        apart = points - closest.position
+        offset = points - closest.position
         extents = [np.linalg.norm(np.ptp(block.corners, axis=1), axis=1) for block in self._facets.blocks]
         size = np.concatenate(extents)[closest.facet]
         # There the direction to the closest point is dominated by round-off; the facet's normal replaces it.
         touching = closest.distance <= SINGLE_PRECISION * size
-        outside = np.einsum("nd,nd->n", apart, sense) >= 0
+        outside = np.einsum("nd,nd->n", offset, sense) >= 0
         distance = np.where(outside, closest.distance, -closest.distance)
         normal = smooth if self.crease else np.where(on_ridge[:, None], smooth, closest.normal)
         sense /= np.linalg.norm(sense, axis=1, keepdims=True)
         # Next to a sharp edge the direction to the closest point is the normal, not that of either facet.
         sharp = np.einsum("nd,nd->n", sense, smooth) < np.cos(np.radians(0.5 * self.crease)) - LENGTH_ROUND_OFF
         turned = on_ridge & sharp & ~touching
-        normal[turned] = apart[turned] / distance[turned, None]
-        height = np.abs(np.einsum("nd,nd->n", apart, sense))
+        normal[turned] = offset[turned] / distance[turned, None]
+        height = np.abs(np.einsum("nd,nd->n", offset, sense))
         aside = np.sqrt(np.maximum(closest.distance**2 - height**2, 0.0))
         nothing = on_border & (aside > BESIDE * size) & (aside > LEAN * height)
         return np.where(nothing, np.inf, distance), normal
@@ -125,18 +125,18 @@ class MeshedSurface:
         on_ridge, on_border = np.zeros(len(sense), bool), np.zeros(len(sense), bool)
         facets, first = self._facets, 0
         for block, normals in zip(facets.blocks, facets.smooth, strict=True):
-            mine = np.flatnonzero((closest.facet >= first) & (closest.facet < first + len(block.nodes)))
-            rows, xi = closest.facet[mine] - first, closest.xi[mine]
+            in_block = np.flatnonzero((closest.facet >= first) & (closest.facet < first + len(block.nodes)))
+            rows, xi = closest.facet[in_block] - first, closest.xi[in_block]
             mean = np.einsum("nk,nkd->nd", block.element.shape(xi), normals[rows])
-            smooth[mine] = mean / np.linalg.norm(mean, axis=1, keepdims=True)
+            smooth[in_block] = mean / np.linalg.norm(mean, axis=1, keepdims=True)
             corner, edge = _place(block, xi)
             at = np.flatnonzero(corner >= 0)
             node = block.nodes[rows[at], corner[at]]
-            sense[mine[at]], on_border[mine[at]] = facets.at_points[node], facets.on_border[node]
+            sense[in_block[at]], on_border[in_block[at]] = facets.at_points[node], facets.on_border[node]
             at = np.flatnonzero(edge >= 0)
-            sense[mine[at]] += self._across(block, first, rows[at], edge[at], xi[at])
-            on_border[mine[at]] = facets.beyond[first + rows[at], edge[at]] < 0
-            on_ridge[mine] = (corner >= 0) | (edge >= 0)
+            sense[in_block[at]] += self._across(block, first, rows[at], edge[at], xi[at])
+            on_border[in_block[at]] = facets.beyond[first + rows[at], edge[at]] < 0
+            on_ridge[in_block] = (corner >= 0) | (edge >= 0)
             first += len(block.nodes)
         return sense, smooth, on_ridge, on_border
 
@@ -149,12 +149,12 @@ class MeshedSurface:
         directions = np.zeros((len(rows), self.mesh.dim))
         start = 0
         for other, normals in zip(self._facets.blocks, self._facets.normals, strict=True):
-            mine = np.flatnonzero((beyond >= start) & (beyond < start + len(other.nodes)))
-            facet = beyond[mine] - start
+            in_block = np.flatnonzero((beyond >= start) & (beyond < start + len(other.nodes)))
+            facet = beyond[in_block] - start
             for weight, end in ((1.0 - along, ends[:, 0]), (along, ends[:, 1])):
-                node = block.nodes[rows[mine], end[mine]]
+                node = block.nodes[rows[in_block], end[in_block]]
                 local = np.argmax(other.nodes[facet] == node[:, None], axis=1)
-                directions[mine] += weight[mine, None] * normals[facet, local]
+                directions[in_block] += weight[in_block, None] * normals[facet, local]
             start += len(other.nodes)
         return directions
 

@@ -65,7 +65,7 @@ class RigidSide:
             raise ContactError(
                 f"the distance from a rigid obstacle {REFUSAL}; a gap that is infinite leaves a point out"
             )
-        if any(np.iscomplexobj(part) for part in distance_and_normal):
+        if any(np.iscomplexobj(values) for values in distance_and_normal):
             raise ContactError("the distance from a rigid obstacle must be real numbers, not complex ones")
         return distance_and_normal
 

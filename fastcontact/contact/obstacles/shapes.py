@@ -103,11 +103,11 @@ class Sphere:
 
     def distance(self, points: Array) -> tuple[Array, Array]:
         """See `Obstacle.distance`."""
-        apart = points - _vector("centre", self.centre, points.shape[1])
-        length = np.linalg.norm(apart, axis=1)
-        away = np.zeros_like(apart)
+        offset = points - _vector("centre", self.centre, points.shape[1])
+        length = np.linalg.norm(offset, axis=1)
+        away = np.zeros_like(offset)
         away[:, -1] = 1.0  # at the centre itself every direction is outward
-        np.divide(apart, length[:, None], out=away, where=length[:, None] > 0)
+        np.divide(offset, length[:, None], out=away, where=length[:, None] > 0)
         return (self.R - length, -away) if self.hollow else (length - self.R, away)
 
 
@@ -148,9 +148,9 @@ class Cylinder:
         if points.shape[1] != 3:
             raise ContactError("a rigid cylinder needs a three-dimensional model; in two dimensions use a sphere")
         axis = np.asarray(self.axis) / np.linalg.norm(self.axis)
-        apart = points - np.asarray(self.point)
-        apart -= np.outer(apart @ axis, axis)
-        return Sphere((0.0, 0.0, 0.0), self.R, self.hollow).distance(apart)
+        offset = points - np.asarray(self.point)
+        offset -= np.outer(offset @ axis, axis)
+        return Sphere((0.0, 0.0, 0.0), self.R, self.hollow).distance(offset)
 
 
 @typed(ContactError)

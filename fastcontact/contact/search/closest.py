@@ -77,7 +77,7 @@ def _on_lines(points: Array, corners: Array, closest: Closest) -> None:
         hull[:, 2] = 2.0 * corners[:, 2] - 0.5 * (corners[:, 0] + corners[:, 1])
     tree = build(hull.min(axis=1), hull.max(axis=1))
     shared(
-        lambda part: search_2d_kernels.closest_facets(points, order, *part, corners, numbers, tree, closest),
+        lambda portion: search_2d_kernels.closest_facets(points, order, *portion, corners, numbers, tree, closest),
         portions(len(points)),
     )
 
@@ -88,10 +88,14 @@ def _on_faces(points: Array, corners: Array, closest: Closest) -> None:
     midst = 0.5 * (corners.min(axis=0).min(axis=0) + corners.max(axis=0).max(axis=0))
     facets = Facets(corners[numbers], midst, np.empty(corners.shape), np.empty(n), np.empty(n))
     low, high = np.empty((n, 3)), np.empty((n, 3))
-    shared(lambda part: facets_3d_kernels.prepare(facets, *part, kind.to_terms, kind.weights, low, high), portions(n))
+    shared(
+        lambda portion: facets_3d_kernels.prepare(facets, *portion, kind.to_terms, kind.weights, low, high), portions(n)
+    )
     tree, domain = build(low, high), Domain(kind.nodes, flat_triangles(len(kind.nodes)), kind.sides)
     shared(
-        lambda part: search_3d_kernels.closest_facets(points, order, *part, facets, domain, numbers, tree, closest),
+        lambda portion: search_3d_kernels.closest_facets(
+            points, order, *portion, facets, domain, numbers, tree, closest
+        ),
         portions(len(points)),
     )
 
