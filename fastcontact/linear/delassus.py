@@ -97,13 +97,13 @@ class InverseColumns:
         rows = csr_array((R.data[used], column, starts), shape=(R.shape[0], len(self._dofs)))
         return symmetric(np.asarray(rows @ (rows @ self._values).T))
 
-    def put_back(self, asked: Sequence[Indices]) -> None:
-        """Restore exactly the columns `asked` for, in that order; solve only for missing ones."""
-        pairs = zip(self.asked, asked, strict=False)
-        same = next((i for i, (mine, other) in enumerate(pairs) if not np.array_equal(mine, other)), len(asked))
+    def put_back(self, requests: Sequence[Indices]) -> None:
+        """Restore exactly the columns of `requests`, in that order; solve only for missing ones."""
+        pairs = zip(self.asked, requests, strict=False)
+        same = next((i for i, (old, new) in enumerate(pairs) if not np.array_equal(old, new)), len(requests))
         self._forget(sum(len(dofs) for dofs in self.asked[same:]))
         del self.asked[same:]
-        for dofs in asked[len(self.asked) :]:
+        for dofs in requests[len(self.asked) :]:
             self._places(dofs)
 
     def _forget(self, count: int) -> None:

@@ -51,15 +51,15 @@ class FieldCompliance:
     bordered: bool = False
 
     @classmethod
-    def stacked(cls, parts: Sequence[FieldCompliance], dense: Callable[[], Array]) -> FieldCompliance:
+    def stacked(cls, compliances: Sequence[FieldCompliance], dense: Callable[[], Array]) -> FieldCompliance:
         """Return the block-diagonal combination of several compliances."""
         return cls(
-            csr_array(block_diag([part.P for part in parts], format="csr")),
-            np.concatenate([part.weights for part in parts]),
-            np.concatenate([part.stiffness for part in parts]),
-            csr_array(block_diag([part.others for part in parts], format="csr")),
+            csr_array(block_diag([compliance.P for compliance in compliances], format="csr")),
+            np.concatenate([compliance.weights for compliance in compliances]),
+            np.concatenate([compliance.stiffness for compliance in compliances]),
+            csr_array(block_diag([compliance.others for compliance in compliances], format="csr")),
             dense,
-            any(part.bordered for part in parts),
+            any(compliance.bordered for compliance in compliances),
         )
 
     @classmethod
@@ -98,9 +98,9 @@ class FieldCompliance:
         if across.nnz:
             beside = np.flatnonzero(np.diff(across.indptr))
             of_beside = csr_array(across[beside])
-            gives = of_beside @ splu(csc_array(self.others[rest][:, rest])).solve(of_beside.T.toarray())
+            correction = of_beside @ splu(csc_array(self.others[rest][:, rest])).solve(of_beside.T.toarray())
             selection = csr_array((np.ones(len(beside)), (beside, np.arange(len(beside)))), (len(given), len(beside)))
-            E = csr_array(E - selection @ csr_array(gives) @ selection.T)
+            E = csr_array(E - selection @ csr_array(correction) @ selection.T)
         in_units = diags_array(units)
         return csr_array(in_units @ E @ in_units)
 

@@ -29,6 +29,6 @@ def tighten(solver: LinearSolver, excess: float) -> bool:
 
 def put_back_tolerance(solver: LinearSolver, snapshot: Mapping[str, Any]) -> None:
     """Restore the tolerance of a snapshot, lowered or not."""
-    asked = solver.tolerance if solver.asked is None else solver.asked
-    solver.tolerance = snapshot.get("tolerance", asked)
-    solver.asked = None if solver.tolerance == asked else asked
+    requested = solver.tolerance if solver.asked is None else solver.asked
+    solver.tolerance = snapshot.get("tolerance", requested)
+    solver.asked = None if solver.tolerance == requested else requested

@@ -19,10 +19,10 @@ class Entries:
 
     def add(self, rows: NDArray[np.integer], columns: NDArray[np.integer], values: Array) -> None:
         """Add blocks (n, k, l) at rows (n, k) and columns (n, l); zeros are left out."""
-        kept = np.flatnonzero(values)
-        self._rows.append(np.broadcast_to(rows[:, :, None].astype(np.int32), values.shape).ravel()[kept])
-        self._columns.append(np.broadcast_to(columns[:, None, :].astype(np.int32), values.shape).ravel()[kept])
-        self._values.append(values.ravel()[kept])
+        nonzero = np.flatnonzero(values)
+        self._rows.append(np.broadcast_to(rows[:, :, None].astype(np.int32), values.shape).ravel()[nonzero])
+        self._columns.append(np.broadcast_to(columns[:, None, :].astype(np.int32), values.shape).ravel()[nonzero])
+        self._values.append(values.ravel()[nonzero])
 
     def matrix(self, size: tuple[int, int]) -> csr_array:
         """Return the sum of all entries."""
@@ -84,5 +84,5 @@ def taken(matrix: csr_array, rows: Indices) -> csr_array:
 
 def without_remnants(matrix: csr_array, origin: csr_array, least: float) -> csr_array:
     """Return the matrix (m, n) without rows whose entries are below `least` times the largest in the row of `origin`."""
-    kept = abs(matrix).max(axis=1).toarray() > least * abs(origin).max(axis=1).toarray()
-    return matrix if kept.all() else scaled(matrix, kept)
+    significant = abs(matrix).max(axis=1).toarray() > least * abs(origin).max(axis=1).toarray()
+    return matrix if significant.all() else scaled(matrix, significant)

@@ -64,8 +64,8 @@ class Springs:
         follows = column >= 0
         starts = np.concatenate([[0], np.cumsum(follows)])[R.indptr]
         followed = csr_array((R.data[follows], column[follows], starts), shape=(R.shape[0], W.shape[0]))
-        kept = csr_array((R.data[~follows], R.indices[~follows], R.indptr - starts), shape=R.shape)
-        return Springs(csr_array(kept + followed @ W), self.stiffness)
+        unchanged = csr_array((R.data[~follows], R.indices[~follows], R.indptr - starts), shape=R.shape)
+        return Springs(csr_array(unchanged + followed @ W), self.stiffness)
 
     def scaled(self, factor: float, kind: DTypeLike = float) -> Springs:
         """Return springs with `factor` times the stiffness, in a given precision."""
@@ -77,14 +77,14 @@ class Springs:
         return {"indptr": R.indptr, "indices": R.indices, "data": R.data, "stiffness": self.stiffness}
 
     @classmethod
-    def from_dict(cls, kept: Mapping[str, AnyArray], n: int) -> Springs:
+    def from_dict(cls, arrays: Mapping[str, AnyArray], n: int) -> Springs:
         """Return the springs saved by `to_dict`, for n unknowns."""
-        shape = (len(kept["stiffness"]), n)
-        return cls(csr_array((kept["data"], kept["indices"], kept["indptr"]), shape=shape), kept["stiffness"])
+        shape = (len(arrays["stiffness"]), n)
+        return cls(csr_array((arrays["data"], arrays["indices"], arrays["indptr"]), shape=shape), arrays["stiffness"])
 
     def alike(self, other: Springs | None) -> bool:
         """Return whether `other` springs act on the same unknowns with nearly the same stiffness."""
         if other is None or self.rows.shape != other.rows.shape:
             return False
-        mine, theirs = (scaled(one.rows, np.sqrt(one.stiffness)) for one in (self, other))
-        return bool(abs(mine - theirs).sum() <= ALIKE * abs(theirs).sum())
+        scaled_self, scaled_other = (scaled(one.rows, np.sqrt(one.stiffness)) for one in (self, other))
+        return bool(abs(scaled_self - scaled_other).sum() <= ALIKE * abs(scaled_other).sum())

@@ -36,17 +36,17 @@ def facets_with_nodes(
             inside = chosen[nodes].all(axis=1)
             candidates.setdefault(kind, []).append(nodes[inside])
             owned.setdefault(kind, []).append(np.ones(int(inside.sum()), bool) if own is None else own[name][inside])
-    kept, wanted = {}, 2 if between else 1
+    found, wanted = {}, 2 if between else 1
     for kind, blocks in candidates.items():
-        facets, ours = np.concatenate(blocks), np.concatenate(owned[kind])
+        facets, is_own = np.concatenate(blocks), np.concatenate(owned[kind])
         _, first, group, count = np.unique(
             np.sort(facets, axis=1), axis=0, return_index=True, return_inverse=True, return_counts=True
         )
-        mine = np.bincount(group.ravel(), ours, len(count))
-        rows = np.sort(first[(count == wanted) & (mine == wanted)])
+        count_own = np.bincount(group.ravel(), is_own, len(count))
+        rows = np.sort(first[(count == wanted) & (count_own == wanted)])
         if len(rows):
-            kept[kind] = facets[rows]
-    return kept
+            found[kind] = facets[rows]
+    return found
 
 
 def added(block: Numbers, facets: Numbers) -> tuple[Numbers, Indices]:

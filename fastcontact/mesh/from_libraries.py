@@ -156,13 +156,13 @@ def _tell_what_is_left_out(gmsh: Any, dim: int) -> None:
     """Warn of solid cells without a physical group, which Gmsh does not write if there are any groups."""
     if not gmsh.model.getPhysicalGroups():
         return
-    alone = [tag for _, tag in gmsh.model.getEntities(dim) if not len(gmsh.model.getPhysicalGroupsForEntity(dim, tag))]
-    count = sum(sum(map(len, gmsh.model.mesh.getElements(dim, tag)[1])) for tag in alone)
+    loose = [tag for _, tag in gmsh.model.getEntities(dim) if not len(gmsh.model.getPhysicalGroupsForEntity(dim, tag))]
+    count = sum(sum(map(len, gmsh.model.mesh.getElements(dim, tag)[1])) for tag in loose)
     if count:
         kind = "volumes" if dim == 3 else "surfaces"
         warn(
             f"{count} solid cells belong to no physical group and are left out (those of the {kind} "
-            f"{', '.join(map(str, alone[:6]))}): give every body a group"
+            f"{', '.join(map(str, loose[:6]))}): give every body a group"
         )
 
 

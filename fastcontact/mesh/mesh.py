@@ -230,8 +230,8 @@ class Mesh:
 
     def replace(self, **changes: Any) -> Mesh:
         """Return a mesh with some of `points`, `cells`, `cell_groups`, `point_groups` replaced."""
-        kept = {name: getattr(self, name) for name in ("points", "cells", "cell_groups", "point_groups")}
-        return Mesh(**{**kept, **changes})
+        fields = {name: getattr(self, name) for name in ("points", "cells", "cell_groups", "point_groups")}
+        return Mesh(**{**fields, **changes})
 
     def with_groups(
         self, cells: Mapping[str, ArrayLike] | None = None, points: Mapping[str, ArrayLike] | None = None
@@ -285,9 +285,9 @@ class Mesh:
             )
         facets = facets_with_nodes(self.solids, chosen, between, None if of is None else self._cells_inside(name, of))
         if not facets:
-            theirs = f" of '{of}'" if of else ""
+            inside = f" of '{of}'" if of else ""
             raise MeshError(
-                f"facet group '{name}' would be empty: its function chooses {int(chosen.sum())} points, but no facet{theirs} "
+                f"facet group '{name}' would be empty: its function chooses {int(chosen.sum())} points, but no facet{inside} "
                 f"{'between two cells' if between else 'on the outside'} has all its nodes among them; compare coordinates "
                 "with a tolerance, or make a group of points by with_groups"
             )
@@ -319,13 +319,13 @@ class Mesh:
         def numbers(of: Mapping[str, AnyArray]) -> AnyArray:
             return np.concatenate([starts[kind] + place for kind, place in of.items()] or [np.empty(0, np.intp)])
 
-        kept = {group: numbers(self.split(members)) for group, members in self.cell_groups.items()}
-        return self.replace(cells=cells, cell_groups={**kept, **{name: numbers(rows[name]) for name in rows}})
+        renewed = {group: numbers(self.split(members)) for group, members in self.cell_groups.items()}
+        return self.replace(cells=cells, cell_groups={**renewed, **{name: numbers(rows[name]) for name in rows}})
 
     def merged_groups(self, name: str, members: Iterable[str]) -> Mesh:
         """Return the mesh with a new cell group `name`, the union of the cell groups `members`."""
-        parts = []
+        cells = []
         for member in members:
             self.cells_of(member)
-            parts.append(self.cell_groups[member])
-        return self.with_groups(cells={name: np.concatenate(parts)})
+            cells.append(self.cell_groups[member])
+        return self.with_groups(cells={name: np.concatenate(cells)})

@@ -206,12 +206,12 @@ def product_rule(cell: str, n: int, straight: int | None = None) -> Rule:
     }[cell]()
 
 
-def subdivided(rule: Rule, parts: int) -> Rule:
-    """Return a rule on [-1, 1] applied to `parts` equal intervals, with coincident points merged."""
+def subdivided(rule: Rule, count: int) -> Rule:
+    """Return a rule on [-1, 1] applied to `count` equal intervals, with coincident points merged."""
     points, weights = rule
-    left = -1.0 + 2.0 * np.arange(parts) / parts
-    all_points = (left[:, None] + (points[:, 0] + 1.0) / parts).ravel()
-    return _merged(all_points[:, None], np.tile(weights / parts, parts))
+    left = -1.0 + 2.0 * np.arange(count) / count
+    all_points = (left[:, None] + (points[:, 0] + 1.0) / count).ravel()
+    return _merged(all_points[:, None], np.tile(weights / count, count))
 
 
 def collapsed_triangle(n: int) -> Rule:

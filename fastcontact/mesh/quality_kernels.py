@@ -47,9 +47,9 @@ def extremes(points, cells, dN, weights, edges, low, high, measure, longest):
         low[c], high[c], measure[c] = smallest, largest, total
         square = 0.0
         for e in range(edges.shape[0]):
-            own = 0.0
+            length = 0.0
             for i in range(dim):
                 along = x[i, edges[e, 1]] - x[i, edges[e, 0]]
-                own += along * along
-            square = max(square, own)
+                length += along * along
+            square = max(square, length)
         longest[c] = np.sqrt(square)

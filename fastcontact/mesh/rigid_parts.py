@@ -100,10 +100,10 @@ def _shared_nodes(mesh: Mesh, label: Indices) -> tuple[Indices, Indices, Indices
 def _meetings(node: Indices, part: Indices) -> tuple[Indices, Indices, Indices]:
     """Return pairs of parts (m,) and their common nodes, from ascending nodes with each of their parts."""
     meetings = [np.empty((3, 0), np.intp)]
-    apart = 1
-    while len(same := np.flatnonzero(node[apart:] == node[:-apart])):
-        meetings.append(np.stack([part[same], part[same + apart], node[same]]))
-        apart += 1
+    shift = 1
+    while len(same := np.flatnonzero(node[shift:] == node[:-shift])):
+        meetings.append(np.stack([part[same], part[same + shift], node[same]]))
+        shift += 1
     first, second, at = np.concatenate(meetings, axis=1)
     return first, second, at
 

@@ -169,18 +169,18 @@ def _facets(mesh: Mesh) -> tuple[Mapping[str, Numbers], Numbers, Mapping[str, Nu
         for facet, facet_element in zip(element.facets, element.facet_elements, strict=True):
             facets_of_kind.setdefault(facet_element, []).append(block[:, list(facet)])
             owners.setdefault(facet_element, []).append(numbers)
-    parent, kept, behind = np.arange(sum(map(len, mesh.cells.values())), dtype=np.int32), {}, {}
+    parent, outer, behind = np.arange(sum(map(len, mesh.cells.values())), dtype=np.int32), {}, {}
     for name, blocks in facets_of_kind.items():
         facets = np.ascontiguousarray(np.concatenate(blocks))
-        alone = np.empty(len(facets), bool)
+        single = np.empty(len(facets), bool)
         owner = np.concatenate(owners[name])
-        topology_kernels.alone(facets, owner, mesh.n_points, alone, parent)
-        if alone.any():
-            kept[name], behind[name] = np.ascontiguousarray(facets[alone]), owner[alone]
-            kept[name].setflags(write=False)
+        topology_kernels.alone(facets, owner, mesh.n_points, single, parent)
+        if single.any():
+            outer[name], behind[name] = np.ascontiguousarray(facets[single]), owner[single]
+            outer[name].setflags(write=False)
     while not (parent[parent] == parent).all():
         parent = parent[parent]
-    return MappingProxyType(kept), parent, MappingProxyType(behind)
+    return MappingProxyType(outer), parent, MappingProxyType(behind)
 
 
 def same_facets(among: Numbers, facets: Numbers) -> Indices:

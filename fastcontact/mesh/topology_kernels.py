@@ -40,8 +40,8 @@ def _root(parent, cell):
 
 
 @interpretable_kernel
-def alone(facets, owner, n_points, found, parent):
-    """Fill `found` (n_facets,) with whether no other of the facets (n_facets, n_nodes) has the same nodes.
+def alone(facets, owner, n_points, single, parent):
+    """Fill `single` (n_facets,) with whether no other of the facets (n_facets, n_nodes) has the same nodes.
 
     Cells, the `owner` (n_facets,) of each facet, that have facets with the same nodes are united in the forest `parent`
     (n_cells,), in place: the lower root becomes the root of both.
@@ -66,7 +66,7 @@ def alone(facets, owner, n_points, found, parent):
         order, other = other, order
     for k in range(n):
         beside = k > 0 and _same(keys, order[k], order[k - 1])
-        found[order[k]] = not (beside or (k + 1 < n and _same(keys, order[k], order[k + 1])))
+        single[order[k]] = not (beside or (k + 1 < n and _same(keys, order[k], order[k + 1])))
         if beside:
             one, two = _root(parent, owner[order[k]]), _root(parent, owner[order[k - 1]])
             parent[max(one, two)] = min(one, two)

@@ -89,11 +89,11 @@ def _supports(model: Any) -> Iterator[str]:
     for support in model.supports:
         value = "a function of position" if callable(support.value) else f"{support.value:g}"
         component = f"{'xyz'[support.component]} = {value}"
-        parts = by_place.setdefault((support.group, support.ramp), [])
-        parts.append(component)
+        texts = by_place.setdefault((support.group, support.ramp), [])
+        texts.append(component)
         if support.rotation is not None and support.component == model.mesh.dim - 1:
             turn = support.rotation
-            parts.append(f"turned by {turn.angle:g} radian about {turn.centre}{_history(support.rotation_ramp)}")
+            texts.append(f"turned by {turn.angle:g} radian about {turn.centre}{_history(support.rotation_ramp)}")
     for (group, ramp), components in by_place.items():
         count = len(model.mesh.points_of(group))
         yield f"Support: {', '.join(components)} on '{group}' ({count} points){_history(ramp)}."

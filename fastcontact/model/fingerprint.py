@@ -39,7 +39,7 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
     mesh = model.mesh
     elements = model.kinematics != "axisymmetric" and any(name in BENDING for name in mesh.solids)
     bends = [elements and material.incompatible_modes for material, _ in model.materials]
-    parts: dict[str, Any] = {
+    inputs: dict[str, Any] = {
         "the kinematics": model.kinematics,
         **({"the strain": model.strain} if model.strain != "small" else {}),
         "the materials": model.materials,
@@ -61,7 +61,7 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
         **{f"{SMOOTHING} '{pair.name}'": True for pair in model.contact if model.bind(pair).smoothing},
         **{f"the option {name}": value for name, value in (options or {}).items()},
     }
-    return {"the mesh": _digest_of_mesh(mesh), **{name: _digest(part, mesh) for name, part in parts.items()}}
+    return {"the mesh": _digest_of_mesh(mesh), **{name: _digest(entry, mesh) for name, entry in inputs.items()}}
 
 
 def different(one: Mapping[str, str], other: Mapping[str, str]) -> list[str]:

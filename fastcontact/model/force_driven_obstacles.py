@@ -100,12 +100,12 @@ class ForceDrivenObstacles:
     def _with(self, by_ramp: Mapping[Any, Array], values: Sequence[tuple[float, ...]]) -> dict[PartHistory, Array]:
         n, dim = self.shape
         wider: dict[PartHistory, Array] = {
-            ramp: np.vstack([part, np.zeros((len(self), dim))]) for ramp, part in by_ramp.items()
+            ramp: np.vstack([rows, np.zeros((len(self), dim))]) for ramp, rows in by_ramp.items()
         }
         for number, (pair, value) in enumerate(zip(self.pairs, values, strict=True)):
             if any(value):
-                part = wider.setdefault(pair.ramp, np.zeros((n + len(self), dim)))
-                part[n + number] = value
+                rows = wider.setdefault(pair.ramp, np.zeros((n + len(self), dim)))
+                rows[n + number] = value
         return wider
 
     def motions(self, motions: FreeMotions) -> FreeMotions:
@@ -122,8 +122,8 @@ class ForceDrivenObstacles:
             (f"obstacle '{self.pairs[dof // dim - n].name}'", f"translation along {'xyz'[dof % dim]}")
             for dof in free.tolist()
         ]
-        parts = np.asarray(block_diag(motions.parts, np.eye(len(free))), float)
-        return FreeMotions(displacement, parts, [*motions.labels, *labels], motions.hinges)
+        matrix = np.asarray(block_diag(motions.parts, np.eye(len(free))), float)
+        return FreeMotions(displacement, matrix, [*motions.labels, *labels], motions.hinges)
 
     def near_nullspace(self, modes: Array) -> Array:
         """Return the near null space (n_dofs, k): `modes`, translations first, extended to the obstacles."""

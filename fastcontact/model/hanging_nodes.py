@@ -54,17 +54,17 @@ def hanging_nodes_warning(model: Model) -> str:
     """Return a warning if nodes hang on facets of their own body without a contact or constraint between them."""
     mesh = model.mesh
     node, facet, outer = hanging_nodes(mesh)
-    kept = np.ones(len(node), bool)
+    relevant = np.ones(len(node), bool)
     held = np.zeros(mesh.n_points, bool)
     held[model.holding_rows().indices // mesh.dim] = True
-    kept &= ~held[node]
+    relevant &= ~held[node]
     for pair in model.contact if len(node) else ():
         if pair.primary:
-            kept &= ~_joined(mesh, pair.secondary, pair.primary, node, outer.corners[facet])
-            kept &= ~_joined(mesh, pair.primary, pair.secondary, node, outer.corners[facet])
-    if not kept.any():
+            relevant &= ~_joined(mesh, pair.secondary, pair.primary, node, outer.corners[facet])
+            relevant &= ~_joined(mesh, pair.primary, pair.secondary, node, outer.corners[facet])
+    if not relevant.any():
         return ""
-    node, facet = node[kept], facet[kept]
+    node, facet = node[relevant], facet[relevant]
     where = ", ".join(f"{x:.6g}" for x in outer.centre[facet[0]])
     return (
         f"{len(np.unique(node))} nodes lie on facets of their own body that they do not belong to (first: "
@@ -75,10 +75,10 @@ def hanging_nodes_warning(model: Model) -> str:
 
 def _joined(mesh: Mesh, nodes_of: str, facets_of: str, node: Indices, corners: Numbers) -> Mask:
     """Return whether nodes (m,) belong to one side of a contact, and facets (m, n_corners) to the other side."""
-    ours, theirs = np.zeros((2, mesh.n_points), bool)
-    ours[mesh.points_of(nodes_of)] = True
-    theirs[mesh.points_of(facets_of)] = True
-    return np.asarray(ours[node] & (theirs[corners] | (corners < 0)).all(axis=1))
+    on_side, on_opposite = np.zeros((2, mesh.n_points), bool)
+    on_side[mesh.points_of(nodes_of)] = True
+    on_opposite[mesh.points_of(facets_of)] = True
+    return np.asarray(on_side[node] & (on_opposite[corners] | (corners < 0)).all(axis=1))
 
 
 def hanging_nodes(mesh: Mesh) -> tuple[Indices, Indices, OuterFacets]:
@@ -104,8 +104,8 @@ def hanging_nodes(mesh: Mesh) -> tuple[Indices, Indices, OuterFacets]:
     row, column = np.nonzero(facets >= 0)
     node, facet = nodes[row], facets[row, column]
     _, body = bodies(mesh)
-    kept = body[node] == body[outer.corners[facet, 0]]
-    node, facet = node[kept], facet[kept]
+    same_body = body[node] == body[outer.corners[facet, 0]]
+    node, facet = node[same_body], facet[same_body]
     on = _within(mesh.points, node, outer, facet)
     node, facet = node[on], facet[on]
     height = np.abs(_heights(mesh, node, outer, facet)) / outer.size[facet]
@@ -142,14 +142,14 @@ def _across(mesh: Mesh, node: Indices, outer: OuterFacets, facet: Indices) -> Ma
     for one whose middle nodes belong to only one of them.
     """
     corners = outer.corners[facet]
-    asked = np.zeros(mesh.n_points, bool)
-    asked[node], asked[corners] = True, True
+    involved = np.zeros(mesh.n_points, bool)
+    involved[node], involved[corners] = True, True
     cells: dict[int, list[tuple[frozenset[int], str]]] = {}
     for name, block in mesh.solids.items() if len(node) else ():
-        for nodes in block[asked[block].any(axis=1)].tolist():
-            own = frozenset(nodes[: elements.get(name).n_corners]), name
+        for nodes in block[involved[block].any(axis=1)].tolist():
+            key = frozenset(nodes[: elements.get(name).n_corners]), name
             for number in nodes:
-                cells.setdefault(number, []).append(own)
+                cells.setdefault(number, []).append(key)
     across = np.zeros(len(node), bool)
     for k, (number, ends) in enumerate(zip(node.tolist(), corners.tolist(), strict=True)):
         kind = outer.elements[outer.kind[facet[k]]]
@@ -170,10 +170,10 @@ def _closed_at_corners(outer: OuterFacets, facet: Indices) -> Mask:
     closed = np.ones(len(kinds), bool)
     for corner in outer.corners[kinds].T:
         rows = at[corner]
-        asked = np.repeat(np.arange(len(kinds)), np.diff(rows.indptr))
-        along = np.einsum("kd,kd->k", outer.normal[kinds[asked]], outer.normal[rows.indices])
+        row = np.repeat(np.arange(len(kinds)), np.diff(rows.indptr))
+        along = np.einsum("kd,kd->k", outer.normal[kinds[row]], outer.normal[rows.indices])
         opposite = np.zeros(len(kinds), bool)
-        opposite[asked[along < -0.5]] = True
+        opposite[row[along < -0.5]] = True
         closed &= opposite
     return np.asarray(closed[which.ravel()])
 
@@ -220,8 +220,8 @@ def _middles(x: Array) -> Array:
 def _within(points: Array, node: Indices, outer: OuterFacets, facet: Indices) -> Mask:
     """Return whether nodes (m,) project on the inside or an edge of facets (m,), away from all of their nodes."""
     members, size = outer.nodes[facet], outer.size[facet]
-    apart = np.linalg.norm(points[members] - points[node][:, None], axis=2)
-    away = (np.where(members >= 0, apart, np.inf) > NEAR * size[:, None]).all(axis=1)
+    distance = np.linalg.norm(points[members] - points[node][:, None], axis=2)
+    away = (np.where(members >= 0, distance, np.inf) > NEAR * size[:, None]).all(axis=1)
     x, point = points[outer.corners[facet]], points[node]
     if points.shape[1] == 2:
         return np.asarray(away & _in_simplex(point, x))

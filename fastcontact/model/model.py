@@ -91,8 +91,8 @@ class Model(ModelSupports):
 
     def _repr_html_(self) -> str:
         """Return `describe` as a table for notebooks."""
-        head, *parts = sentences(self)
-        rows = [sentence.split(": ", 1) for sentence in parts if ": " in sentence]
+        head, *lines = sentences(self)
+        rows = [sentence.split(": ", 1) for sentence in lines if ": " in sentence]
         return html_table(rows, caption=head)
 
     def describe(self) -> str:
@@ -190,8 +190,8 @@ class Model(ModelSupports):
 
     def _changes(self) -> list[float]:
         """Return the instants at which temporary constraints, temperatures or films begin or end, and 0."""
-        temporary = [own for own in (*self.relations, *self.heat_loads) if isinstance(own, TEMPORARY)]
-        return sorted({0.0, *(t for own in temporary for t in (own.begins, own.ends) if 0.0 < t < np.inf)})
+        temporary = [item for item in (*self.relations, *self.heat_loads) if isinstance(item, TEMPORARY)]
+        return sorted({0.0, *(t for item in temporary for t in (item.begins, item.ends) if 0.0 < t < np.inf)})
 
     def _check_relations(self, fixed: Mask, prescribed: Mapping[PartHistory, Array], ramp: Ramp) -> None:
         relations = [relation for relation in self.relations if not isinstance(relation, TemporaryConstraint)]
@@ -209,8 +209,8 @@ class Model(ModelSupports):
         if not len(motions):
             return
         at_rest, still = Configuration.undeformed(self.mesh.points), np.zeros(self.mesh.dim)
-        parts = [driven.constraints(pair.name, self.bind(pair).constraints(at_rest), still) for pair in self.contact]
-        rows = [resisting(constraints)[0] @ motions.displacement for constraints in parts]
+        fixing = [driven.constraints(pair.name, self.bind(pair).constraints(at_rest), still) for pair in self.contact]
+        rows = [resisting(constraints)[0] @ motions.displacement for constraints in fixing]
         works = [generalised(motions, force.ravel()) for force in forces]
         k = len(motions)
         gaps, driven_by = np.vstack([*rows, np.empty((0, k))]), np.vstack([*works, np.empty((0, k))])

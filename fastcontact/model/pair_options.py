@@ -76,13 +76,13 @@ def _cohesion(name: str, options: Mapping[str, Any]) -> CohesiveLaw | None:
     if excess or options.get("kind", "unilateral") != "unilateral":
         other = (excess or ["kind"])[0]
         raise ContactError(f"contact '{name}' has {chosen[0]}, which knows no {other}: leave out one of both")
-    option, given = chosen[0], options[chosen[0]]
+    option, constants = chosen[0], options[chosen[0]]
     needed, allowed = LAWS[option]
-    if not isinstance(given, Mapping) or not set(needed) <= set(given):
+    if not isinstance(constants, Mapping) or not set(needed) <= set(constants):
         raise ContactError(
             f"the {option} of contact '{name}' must give its {' and its '.join(needed)}, each by its name"
         )
-    for key, value in given.items():
+    for key, value in constants.items():
         check_known(f"number of the {option} of contact '{name}'", key, needed + allowed, ContactError)
         if key in CHOICES:
             check_known(f"{key} in the {option} of contact '{name}'", value, CHOICES[key], ContactError)
@@ -91,9 +91,9 @@ def _cohesion(name: str, options: Mapping[str, Any]) -> CohesiveLaw | None:
         if not value > 0:
             raise ContactError(f"the {key} {value} in the {option} of contact '{name}' must be positive")
     law = cohesive_law(
-        *(float(given[key]) for key in needed),
+        *(float(constants[key]) for key in needed),
         reversible=option == "adhesion",
-        **{key: value if key in CHOICES else float(value) for key, value in given.items() if key in allowed},
+        **{key: value if key in CHOICES else float(value) for key, value in constants.items() if key in allowed},
     )
     shares = np.linspace(0.0, 1.0, 65)
     onset, end = law.limits(np.sqrt(1.0 - shares), np.sqrt(shares))

@@ -163,8 +163,8 @@ def _following(mesh: Mesh, dependent: str, facets: str, rotation: Rotation, sign
     weights = csr_array(
         (on.shape.ravel(), (np.repeat(np.arange(m), on.nodes.shape[1]), on.nodes.ravel())), shape=(m, n)
     )
-    own = csr_array((np.ones(m), (np.arange(m), nodes)), shape=(m, n))
-    return csr_array(kron(own, turn) - kron(weights, np.eye(dim)))
+    identity = csr_array((np.ones(m), (np.arange(m), nodes)), shape=(m, n))
+    return csr_array(kron(identity, turn) - kron(weights, np.eye(dim)))
 
 
 def _without_zeros(rows: csr_array) -> csr_array:
@@ -187,6 +187,6 @@ def _differences(interface: PeriodicInterface, directions: Array, mesh: Mesh) ->
     """Return rows (m, n_dofs): second nodes along the first column of `directions` (dim, 1 or 2), plus first nodes along the
     second; with one column, minus first nodes along it.
     """
-    theirs = directions[:, 1] if directions.shape[1] > 1 else -directions[:, 0]
+    direction = directions[:, 1] if directions.shape[1] > 1 else -directions[:, 0]
     nodes = np.column_stack([interface.second, interface.first])
-    return nodal_rows(nodes, np.tile([directions[:, 0], theirs], (len(nodes), 1, 1)), mesh.points.size)
+    return nodal_rows(nodes, np.tile([directions[:, 0], direction], (len(nodes), 1, 1)), mesh.points.size)

@@ -32,19 +32,19 @@ def check_repeated(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
             "already: leave out one of the two"
         )
     else:
-        for ours, theirs in ((other.secondary, other.primary), (other.primary, other.secondary)):
-            _check_sides(mesh, pair, other, ours, theirs)
+        for facing, opposite in ((other.secondary, other.primary), (other.primary, other.secondary)):
+            _check_sides(mesh, pair, other, facing, opposite)
 
 
-def _check_sides(mesh: Mesh, pair: ContactPair, other: ContactPair, ours: str, theirs: str) -> None:
-    """Compare the secondary side of `pair` with the side `ours` of `other`, the primary one with `theirs`."""
-    secondary = shared_facets(mesh, pair.secondary, ours)
-    if len(secondary) and len(shared_facets(mesh, pair.primary, theirs)):
+def _check_sides(mesh: Mesh, pair: ContactPair, other: ContactPair, facing: str, opposite: str) -> None:
+    """Compare the secondary side of `pair` with the side `facing` of `other`, the primary one with `opposite`."""
+    secondary = shared_facets(mesh, pair.secondary, facing)
+    if len(secondary) and len(shared_facets(mesh, pair.primary, opposite)):
         raise ContactError(
             f"contact '{pair.name}' joins facets of '{pair.secondary}' and '{pair.primary}' that contact '{other.name}' "
-            f"joins already: '{pair.secondary}' and '{ours}' share facets with {len(secondary)} nodes (first: point "
-            f"{secondary[0]}), '{pair.primary}' and '{theirs}' share facets, too. Leave out one of the two contacts, or make "
-            "their groups apart"
+            f"joins already: '{pair.secondary}' and '{facing}' share facets with {len(secondary)} nodes (first: point "
+            f"{secondary[0]}), '{pair.primary}' and '{opposite}' share facets, too. Leave out one of the two contacts, or "
+            "make their groups apart"
         )
 
 
@@ -87,15 +87,15 @@ def split_side_warnings(pairs: Sequence[tuple[ContactPair, Formulation]]) -> lis
     pairs have the same primary side; if that is divided, too, each pair faces a part of it only.
     """
     texts = []
-    for (one, ours), (other, theirs) in combinations(pairs, 2):
-        if not isinstance(ours.primary, Surface) or not isinstance(theirs.primary, Surface):
+    for (one, first), (other, second) in combinations(pairs, 2):
+        if not isinstance(first.primary, Surface) or not isinstance(second.primary, Surface):
             continue
         if {one.formulation, other.formulation} == {"node_to_segment"} and one.primary == other.primary:
             continue
-        roles = ((theirs.secondary, theirs.primary), (theirs.primary, theirs.secondary))
+        roles = ((second.secondary, second.primary), (second.primary, second.secondary))
         for secondary, primary in roles:
-            nodes = _common(ours.points, ours.secondary, secondary)
-            if len(nodes) and len(_common(ours.points, ours.primary, primary)):
+            nodes = _common(first.points, first.secondary, secondary)
+            if len(nodes) and len(_common(first.points, first.primary, primary)):
                 texts.append(
                     f"contacts '{one.name}' and '{other.name}' go on in each other at {len(nodes)} common nodes of their "
                     f"sides (first: point {nodes[0]}): the pressure near these is not unique; make one contact of both, "

@@ -103,14 +103,14 @@ def free_motions(mesh: Mesh, kinematics: str, fixed: Mask, relations: csr_array 
     """
     dofs = mesh.n_points * mesh.dim
     motions = _of_bodies(mesh, kinematics, fixed)
-    columns, parts, labels = [motions.displacement], [motions.parts], list(motions.labels)
+    columns, matrices, labels = [motions.displacement], [motions.parts], list(motions.labels)
     if relations is not None:
-        lone = bodies(mesh)[1][relations.indices // mesh.dim] < 0
-        for dof in np.unique(relations.indices[lone & ~fixed.ravel()[relations.indices]]):
+        reference = bodies(mesh)[1][relations.indices // mesh.dim] < 0
+        for dof in np.unique(relations.indices[reference & ~fixed.ravel()[relations.indices]]):
             columns.append(np.eye(dofs, 1, -int(dof)))
-            parts.append(np.ones((1, 1)))
+            matrices.append(np.ones((1, 1)))
             labels.append((f"point {dof // mesh.dim}", f"translation along {'xyz'[dof % mesh.dim]}"))
-    motions = FreeMotions(np.hstack(columns), np.asarray(block_diag(*parts), float), labels, motions.hinges)
+    motions = FreeMotions(np.hstack(columns), np.asarray(block_diag(*matrices), float), labels, motions.hinges)
     if relations is None or not relations.shape[0] or not len(motions):
         return motions
     return motions.combined(_null_space(relations @ motions.displacement))
@@ -120,7 +120,7 @@ def _of_bodies(mesh: Mesh, kinematics: str, fixed: Mask) -> FreeMotions:
     """Return the motions of bodies, and of their parts at hinges, that the supports `fixed` (n_points, dim) leave free."""
     rigid = _parts_of(mesh, kinematics)
     moving: list[tuple[Indices, Array]] = []  # nodes (m,) of a part, and its motions (m, dim, k) there
-    parts, labels = [np.empty((0, 0))], []
+    matrices, labels = [np.empty((0, 0))], []
     for number in range(rigid.count):
         members = rigid.nodes_of(number)
         modes = rigid_modes(mesh.points[members], kinematics)
@@ -128,7 +128,7 @@ def _of_bodies(mesh: Mesh, kinematics: str, fixed: Mask) -> FreeMotions:
         free = _null_space(modes[fixed[members].ravel()])  # combinations of the part's modes without support
         moving.append((members, (modes @ free).reshape(len(members), mesh.dim, -1)))
         if free.shape[1]:
-            parts.append(free)
+            matrices.append(free)
             labels += [(_part_name(mesh, rigid, number), name) for name in MODE_NAMES[kinematics]]
     kept = _turning_about(mesh, rigid, moving)
     spans = np.split(kept, np.cumsum([motion.shape[2] for _, motion in moving]))
@@ -137,7 +137,7 @@ def _of_bodies(mesh: Mesh, kinematics: str, fixed: Mask) -> FreeMotions:
         members_of_body = rigid.part[members] == number
         displacement[members[members_of_body]] = motion[members_of_body] @ span
     return FreeMotions(
-        displacement.reshape(mesh.points.size, kept.shape[1]), np.asarray(block_diag(*parts), float) @ kept, labels,
+        displacement.reshape(mesh.points.size, kept.shape[1]), np.asarray(block_diag(*matrices), float) @ kept, labels,
         np.unique(rigid.hinge_node),
     )  # fmt: skip
 
@@ -182,8 +182,8 @@ def _part_name(mesh: Mesh, rigid: RigidParts, number: int) -> str:
     name = f"body {body_name(mesh, body, int(body[members[0]]))}"
     if not len(hinges):
         return name
-    part = _group_of(mesh, members) or f"around {mesh.points[members].mean(axis=0)}"
-    return f"{name}, the part {part} that hangs at {node_at(mesh, hinges[0])}"
+    place = _group_of(mesh, members) or f"around {mesh.points[members].mean(axis=0)}"
+    return f"{name}, the part {place} that hangs at {node_at(mesh, hinges[0])}"
 
 
 def _null_space(A: Array) -> Array:

@@ -33,7 +33,7 @@ def read_temperatures(
     files = [file] if isinstance(file, (str, os.PathLike)) else list(file)
     if not files:
         raise ModelError("no file is given for the temperature")
-    parts, times = [], []
+    fields, times = [], []
     for path in files:
         field_of_file = read_file_field(path, field, "points")
         values = at_points_of(field_of_file, mesh, wanted, f"field '{field}' of '{path}'")
@@ -41,9 +41,9 @@ def read_temperatures(
             raise ModelError(
                 f"'{path}' has {len(values)} instants: one of several files has one, or give one file alone"
             )
-        parts.append(values)
+        fields.append(values)
         times.append(field_of_file.times)
-    values, time = np.concatenate(parts), times[0] if len(files) == 1 else None
+    values, time = np.concatenate(fields), times[0] if len(files) == 1 else None
     if instant is None:
         return values, time
     if time is None:

@@ -18,7 +18,7 @@ KNOWN: dict[str, dict[str, float]] = {
 EXAMPLE = "units of length, force and pressure in this order, such as 'mm, N, MPa'"
 
 
-def named_units(given: str | Mapping[str, str]) -> dict[str, str]:
+def named_units(units: str | Mapping[str, str]) -> dict[str, str]:
     """Return the names of units by quantity, given as a text in the order of `KNOWN` or as a mapping.
 
     Raises ModelError for anything else, and for a unit in the place of another kind.
@@ -28,17 +28,17 @@ def named_units(given: str | Mapping[str, str]) -> dict[str, str]:
     >>> named_units("mm, N, MPa")
     {'length': 'mm', 'force': 'N', 'pressure': 'MPa'}
     """
-    if isinstance(given, str):
-        names = [name.strip() for name in given.split(",")]
+    if isinstance(units, str):
+        names = [name.strip() for name in units.split(",")]
         if len(names) != len(KNOWN) or not all(names):
-            raise ModelError(f"units = '{given}' must be the {EXAMPLE}")
-        given = dict(zip(KNOWN, names, strict=True))
-    for kind, name in given.items():
+            raise ModelError(f"units = '{units}' must be the {EXAMPLE}")
+        units = dict(zip(KNOWN, names, strict=True))
+    for kind, name in units.items():
         check_known("kind of unit", kind, KNOWN, ModelError)
         for other, names_of in KNOWN.items():
             if name in names_of and other != kind:
                 raise ModelError(f"'{name}' is a unit of {other}, not of {kind}: give the {EXAMPLE}")
-    return dict(given)
+    return dict(units)
 
 
 def in_si(units: Mapping[str, str], kind: str) -> float | None:

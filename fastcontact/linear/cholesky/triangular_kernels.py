@@ -81,9 +81,9 @@ def backward(
             gathered[k] = x[rows[begin[s] + k]]
         # Two columns at a time, which share the loads of the vector; the last one may be single.
         while j >= low:
-            alone = j == low
+            single = j == low
             one = start[j] + 1
-            other = one if alone else start[j - 1] + 2
+            other = one if single else start[j - 1] + 2
             first_sum, second_sum = 0.0, 0.0
             # Slices, because they tell the compiler that entries are contiguous.
             n = high - 1 - j
@@ -96,6 +96,6 @@ def backward(
                 first_sum += a[k] * gathered[k]
                 second_sum += b[k] * gathered[k]
             x[j] -= first_sum
-            if not alone:
+            if not single:
                 x[j - 1] -= second_sum + values[other - 1] * x[j]
             j -= 2

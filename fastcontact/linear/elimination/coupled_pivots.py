@@ -93,8 +93,8 @@ class CoupledPivots:
 
     def __init__(self, P: csr_array, pivots: Indices, size: int) -> None:
         L = lumped(P, pivots, size)
-        kept = np.asarray(abs(L).sum(axis=1)) / np.asarray(abs(P).sum(axis=1))
-        if not kept.min() >= LUMPED:
+        ratio = np.asarray(abs(L).sum(axis=1)) / np.asarray(abs(P).sum(axis=1))
+        if not ratio.min() >= LUMPED:
             raise CoupledError()
         self.sparse = SparseInverse(block_inverse(L))
         try:
@@ -127,8 +127,8 @@ def lumped(P: csr_array, pivots: Indices, size: int) -> csr_array:
     column[pivots] = np.arange(len(pivots))
     entries = coo_array(P)
     columns = column[node[entries.row] * size + direction[entries.col]]
-    kept = columns >= 0
-    return csr_array((entries.data[kept], (entries.row[kept], columns[kept])), shape=P.shape)
+    valid = columns >= 0
+    return csr_array((entries.data[valid], (entries.row[valid], columns[valid])), shape=P.shape)
 
 
 def block_inverse(A: csr_array) -> csr_array:
@@ -151,10 +151,10 @@ def block_inverse(A: csr_array) -> csr_array:
         alike = np.flatnonzero(size == k)
         number = np.full(len(size), -1, np.intp)
         number[alike] = np.arange(len(alike))
-        mine = number[label[entries.row]] >= 0
-        row, col = entries.row[mine], entries.col[mine]
+        selected = number[label[entries.row]] >= 0
+        row, col = entries.row[selected], entries.col[selected]
         blocks = np.zeros((len(alike), k, k))
-        np.add.at(blocks, (number[label[row]], position[row], position[col]), entries.data[mine])
+        np.add.at(blocks, (number[label[row]], position[row], position[col]), entries.data[selected])
         members = order[first[alike][:, None] + np.arange(k)]
         rows.append(np.repeat(members, k, axis=1).ravel())
         cols.append(np.tile(members, k).ravel())

@@ -100,8 +100,8 @@ def _triangular_inverse(P: csr_array, largest: int, layers: int) -> SparseInvers
         return None
     inside = np.repeat(label, np.diff(P.indptr)) == label[P.indices]
     diagonal, beyond = (
-        csr_array((np.where(part, P.data, 0.0), P.indices, P.indptr), shape=P.shape, copy=True)
-        for part in (inside, ~inside)
+        csr_array((np.where(mask, P.data, 0.0), P.indices, P.indptr), shape=P.shape, copy=True)
+        for mask in (inside, ~inside)
     )
     diagonal.eliminate_zeros()
     beyond.eliminate_zeros()
@@ -192,7 +192,7 @@ def _pivots_in_groups(B: csr_array, group: Indices, is_own: Mask) -> Indices:
         i, pivot = equation[left, r], table[left, r, c]
         good = (np.abs(pivot) >= SMALLEST * largest[i]) & (pivot != 0.0)
         failed[left[~good]] = True
-        left, r, c, i, pivot = (part[good] for part in (left, r, c, i, pivot))
+        left, r, c, i, pivot = (array[good] for array in (left, r, c, i, pivot))
         pivots[i] = unknown[left, c]
         # The row of the pivot is eliminated, too, so that it is not selected again.
         factor = table[left, :, c] / pivot[:, None]

@@ -87,8 +87,8 @@ class FactorSolver(LinearSolver):
 
     def snapshot(self) -> dict[str, Any]:
         """See `LinearSolver.snapshot`: columns of ``K^-1`` computed so far, and stored right-hand sides."""
-        kept = {"asked": list(self.columns.asked), "loads": self.known_loads.snapshot()}
-        return {**kept, "refines": True} if self.refines else kept
+        state = {"asked": list(self.columns.asked), "loads": self.known_loads.snapshot()}
+        return {**state, "refines": True} if self.refines else state
 
     def put_back(self, snapshot: Mapping[str, Any]) -> None:
         """See `LinearSolver.put_back`."""

@@ -56,8 +56,8 @@ class KnownLoads:
         """Restore the right-hand sides of a `snapshot`, for the same matrix (n, n); solve only for missing ones."""
         now = list(zip(self._loads, self._solutions, strict=True))
         self._loads, self._solutions = [], []
-        for kept in snapshot:
+        for entry in snapshot:
             f = np.zeros(n)
-            f[kept["places"]] = kept["values"]
+            f[entry["places"]] = entry["values"]
             known = [u for load, u in now if np.array_equal(load, f)]
             self._keep(f, known[0] if known else solve(f))

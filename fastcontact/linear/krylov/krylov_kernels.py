@@ -13,13 +13,13 @@ CHUNK = 4096
 def stretch_dot(a, b, low, high):
     """Return the dot product of a stretch, in four sums that the processor can add side by side."""
     s0 = s1 = s2 = s3 = 0.0
-    whole = low + (high - low) // 4 * 4
-    for i in range(low, whole, 4):
+    unrolled_end = low + (high - low) // 4 * 4
+    for i in range(low, unrolled_end, 4):
         s0 += a[i] * b[i]
         s1 += a[i + 1] * b[i + 1]
         s2 += a[i + 2] * b[i + 2]
         s3 += a[i + 3] * b[i + 3]
-    for i in range(whole, high):
+    for i in range(unrolled_end, high):
         s0 += a[i] * b[i]
     return (s0 + s1) + (s2 + s3)
 

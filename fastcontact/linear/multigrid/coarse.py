@@ -54,9 +54,9 @@ class Coarse:
             return
         diagonal = A.diagonal()
         self._idle = np.flatnonzero(diagonal <= ROUND_OFF * diagonal.max())
-        kept = np.ones(self.n)
-        kept[self._idle] = 0.0
-        K = diags_array(kept) @ A @ diags_array(kept) + diags_array(1.0 - kept)
+        active = np.ones(self.n)
+        active[self._idle] = 0.0
+        K = diags_array(active) @ A @ diags_array(active) + diags_array(1.0 - active)
         self._lu = splu(csc_array(K), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
 
     def solve(self, b: AnyArray, x: AnyArray) -> None:

@@ -117,7 +117,7 @@ class ConstrainedHierarchy:
         """Return the nodes without pivots that equations stiffen strongly, and set `stiffening`."""
         size = change.size
         of_all = self.hierarchy.levels[0].diagonal.reshape(-1, size * size)[change.nodes]
-        trace, more = (np.einsum("kii->k", part.reshape(-1, size, size)) for part in (of_all, change.diagonal()))
+        trace, more = (np.einsum("kii->k", blocks.reshape(-1, size, size)) for blocks in (of_all, change.diagonal()))
         by = np.divide(more, trace, out=np.zeros(len(more)), where=trace > 0.0)
         self.stiffening = float(by.max(initial=0.0))
         return change.nodes[(by > MUCH) & ~np.isin(change.nodes, elimination.pivots // size)]

@@ -110,14 +110,14 @@ def _smooth_row(
     start,
     columns,
     out,
-    found,
+    aggregates,
     sums,
     rows,
     cols,
 ):
     part = part_of(storage, i)
     m, n = len(rows), len(cols)
-    count = _aggregates_of(i, indptr, indices, aggregate, found)
+    count = _aggregates_of(i, indptr, indices, aggregate, aggregates)
     for e in range(count * m * n):
         sums[e] = 0.0
     for k in range(indptr[i], indptr[i + 1]):
@@ -125,7 +125,7 @@ def _smooth_row(
         if aggregate[j] < 0:
             continue
         at = 0
-        while found[at] != aggregate[j]:
+        while aggregates[at] != aggregate[j]:
             at += 1
         slot, turned = place_of(storage, part, i, j, k)
         if turned:
@@ -134,13 +134,13 @@ def _smooth_row(
             add_product(sums, at * m * n, data, slot * m * m, tentative, j * m * n, (rows, rows, cols))
     for at in range(count):
         base = (start[i] + at) * m * n
-        columns[start[i] + at] = found[at]
+        columns[start[i] + at] = aggregates[at]
         for r in range(m):
             for c in range(n):
                 s = 0.0
                 for t in range(m):
                     s += inverse[(i * m + r) * m + t] * sums[(at * m + t) * n + c]
-                first = tentative[(i * m + r) * n + c] if found[at] == aggregate[i] else 0.0
+                first = tentative[(i * m + r) * n + c] if aggregates[at] == aggregate[i] else 0.0
                 out[base + r * n + c] = first - omega * s
 
 

@@ -88,5 +88,5 @@ def block_rows(A: BlockMatrix, nodes: Indices, n: int) -> bsr_array:
     count = np.diff(A.indptr)[nodes]
     indptr = np.concatenate([[0], np.cumsum(count)])
     blocks = np.repeat(A.indptr[nodes] - indptr[:-1], count) + np.arange(indptr[-1])
-    data = sum(part.reshape(-1, rows, cols)[blocks].astype(float) for part in A.exact)
+    data = sum(values.reshape(-1, rows, cols)[blocks].astype(float) for values in A.exact)
     return bsr_array((data, A.indices[blocks], indptr), shape=(len(nodes) * rows, n))

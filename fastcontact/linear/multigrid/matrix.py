@@ -87,15 +87,15 @@ class BlockMatrix:
     def diagonal_blocks(self) -> Array:
         """Return the diagonal blocks (n_rows, size, size) of a square matrix, in double precision."""
         size = len(self.rows)
-        parts = [self.diagonal_part(part).astype(float, copy=False) for part in self.exact]
-        return np.asarray(sum(parts[1:], parts[0])).reshape(-1, size, size)
+        blocks = [self.diagonal_part(part).astype(float, copy=False) for part in self.exact]
+        return np.asarray(sum(blocks[1:], blocks[0])).reshape(-1, size, size)
 
-    def diagonal_part(self, part: AnyArray) -> AnyArray:
+    def diagonal_part(self, data: AnyArray) -> AnyArray:
         """Return the diagonal blocks (n_rows * size * size,) of a square matrix, from the high or the low part."""
         size = len(self.rows)
         if self.storage is ALL:
-            return diagonal_blocks(self.indptr, self.indices, part, size)
-        return part.reshape(-1, size * size)[self.storage[1] - 1].ravel()
+            return diagonal_blocks(self.indptr, self.indices, data, size)
+        return data.reshape(-1, size * size)[self.storage[1] - 1].ravel()
 
     def row_sums(self, u: Array) -> Array:
         """Return ``|A| |u|``, shape (n,), of a square matrix, from its high part."""
@@ -214,7 +214,7 @@ class ScaledMatrix:
 
 def _split(K: bsr_array, unit: float, release: bool) -> BlockMatrix:
     """Return ``unit K``, split into high and low parts; see `ScaledMatrix` for `release`."""
-    indptr, indices = (part.astype(np.int32, copy=False) for part in (K.indptr, K.indices))
+    indptr, indices = (array.astype(np.int32, copy=False) for array in (K.indptr, K.indices))
     size, numbers = K.blocksize[0], K.data if K.data.base is None else K.data.base
     if release and numbers.size == K.data.size and numbers.flags.owndata and numbers.flags.c_contiguous:
         # Every number is read before it is overwritten. K's numbers are invalid then, and are removed.

@@ -115,12 +115,12 @@ class _Excess:
 
     def __init__(self, diagonal: Array, elimination: Elimination, compliance: Array) -> None:
         self._elimination, self._pivots = elimination, elimination.pivots
-        gives, self._compliance = compliance > 0.0, compliance
-        self._stiffness = np.divide(1.0, compliance, out=np.zeros(len(compliance)), where=gives)
+        compliant, self._compliance = compliance > 0.0, compliance
+        self._stiffness = np.divide(1.0, compliance, out=np.zeros(len(compliance)), where=compliant)
         # Stiffness of the excess plus that of the pivot; exact equations are unchanged.
         of_pivots = elimination.own.sparse.matrix.power(2).T @ diagonal[self._pivots]
-        self._inverse = np.where(gives, 1.0 / (self._stiffness + of_pivots), 0.0)
-        self._gives = gives
+        self._inverse = np.where(compliant, 1.0 / (self._stiffness + of_pivots), 0.0)
+        self._compliant = compliant
         self._u = np.empty(len(diagonal))
 
     def begin(self, x: Array, multiplier: Array | None) -> None:
@@ -137,7 +137,7 @@ class _Excess:
     def reduce(self, x: Array, r: Array, sign: float) -> None:
         multiplier = self._elimination.multiplier(r[self._pivots]) + sign * self._stiffness * x[self._pivots]
         self._elimination.move_forces(r)
-        r[self._pivots] = np.where(self._gives, multiplier, 0.0)
+        r[self._pivots] = np.where(self._compliant, multiplier, 0.0)
 
     def precondition(self, r: Array, norm: float, z: Array, cycle: Callable[[Array, float, Array], None]) -> None:
         residual = r[self._pivots]

@@ -51,12 +51,12 @@ def multiply_transposed(indptr, indices, data, ends, first, last, begin, x, work
 
     Part p adds into the blocks of `work` from ``begin[p]`` on, for the columns ``first[p]`` to ``last[p] - 1``, see `reach`.
     """
-    parts, n = ends.shape[0] - 1, y.shape[0] // len(cols)
-    if parts == 1:
+    n_parts, n = ends.shape[0] - 1, y.shape[0] // len(cols)
+    if n_parts == 1:
         _add_part(FIRST, indptr, indices, data, ends, first, last, begin, x, work, rows, cols)
         _gather(FIRST, n, first, last, begin, work, y, cols)
         return
-    for p in prange(parts):
+    for p in prange(n_parts):
         _add_part(np.int64(p), indptr, indices, data, ends, first, last, begin, x, work, rows, cols)
     for c in prange((n + CHUNK - 1) // CHUNK):
         _gather(c * CHUNK, min(n, (c + 1) * CHUNK), first, last, begin, work, y, cols)

@@ -151,8 +151,8 @@ class Multigrid:
             if not (alike and _alike(sparse, self._hierarchy_equations)):
                 self._change_hierarchy(sparse, springs)
                 self._worked(CHANGE)
-            gives = elimination is not None and elimination.compliance is not None
-            self._reduced = Reduced(self.K, elimination, springs, self.diagonal() if gives else None)
+            compliant = elimination is not None and elimination.compliance is not None
+            self._reduced = Reduced(self.K, elimination, springs, self.diagonal() if compliant else None)
 
     def _change_hierarchy(self, sparse: Elimination | None, springs: Springs | None) -> None:
         """Change the hierarchy to that under equations with sparse weights and springs."""

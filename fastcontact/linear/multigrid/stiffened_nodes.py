@@ -106,7 +106,7 @@ def composed(elimination: Elimination, following: Elimination) -> tuple[Indices,
     """Return the unknowns that T S changes, and the weights (m + q, n) of their new values; see `followers`."""
     T, S = elimination.weights, following.weights
     through = csr_array(T[:, following.pivots])
-    kept = np.ones(T.shape[1])
-    kept[following.pivots] = 0.0
+    free = np.ones(T.shape[1])
+    free[following.pivots] = 0.0
     pivots = np.concatenate([elimination.pivots, following.pivots])
-    return pivots, csr_array(vstack([T @ diags_array(kept) + through @ S, S], format="csr"))
+    return pivots, csr_array(vstack([T @ diags_array(free) + through @ S, S], format="csr"))

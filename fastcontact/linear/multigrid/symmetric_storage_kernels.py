@@ -115,8 +115,8 @@ def arrange(indptr, indices, start, upper, columns, length):
 
 
 @parallel_kernel
-def missing(indptr, indices, storage, found):
-    """Fill `found` (n_rows,) with the number of blocks of each row that are not stored."""
+def missing(indptr, indices, storage, counts):
+    """Fill `counts` (n_rows,) with the number of blocks of each row that are not stored."""
     n = indptr.shape[0] - 1
     for c in prange((n + CHUNK - 1) // CHUNK):
         for i in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
@@ -124,7 +124,7 @@ def missing(indptr, indices, storage, found):
             for k in range(indptr[i], indptr[i + 1]):
                 if place_of(storage, part, i, indices[k], k)[0] < 0:
                     count += 1
-            found[i] = count
+            counts[i] = count
 
 
 @kernel

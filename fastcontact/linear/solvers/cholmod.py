@@ -32,7 +32,7 @@ class Cholmod(FactorSolver):
         # CHOLMOD may reorder independent branches of the elimination tree, which does not change dependences.
         position = np.empty(self.n, np.intp)
         position[_in_order(factor, self.n)] = np.arange(self.n)
-        start, rows, values = (np.asarray(part).ravel() for part in cholmod.getfactor(factor).CCS)
+        start, rows, values = (np.asarray(array).ravel() for array in cholmod.getfactor(factor).CCS)
         diagonal = values[start[:-1]]
         values /= np.repeat(diagonal, np.diff(start))
         return SymmetricFactors(by_supernodes(start, rows, values), diagonal**2, position, last)

@@ -70,12 +70,12 @@ class Pyamg(LinearSolver):
         n = self.K.shape[0]
         self._elimination, self._T, A, modes = elimination, eye_array(n, format="csr"), self.K, self._modes
         if elimination is not None:
-            pivots, kept = elimination.pivots, np.ones(n)
-            kept[pivots] = 0.0
+            pivots, free = elimination.pivots, np.ones(n)
+            free[pivots] = 0.0
             spread = csr_array((np.ones(len(pivots)), (pivots, np.arange(len(pivots)))), shape=(n, len(pivots)))
-            self._T = csr_array(diags_array(kept) + spread @ elimination.full_weights())
-            A = self._T.T @ self.K @ self._T + diags_array((1.0 - kept) * self.K.diagonal())
-            modes = kept[:, None] * modes
+            self._T = csr_array(diags_array(free) + spread @ elimination.full_weights())
+            A = self._T.T @ self.K @ self._T + diags_array((1.0 - free) * self.K.diagonal())
+            modes = free[:, None] * modes
         self._A = bsr_matrix(A.tobsr(self.K.blocksize))
         self._hierarchy = smoothed_aggregation_solver(self._A, B=modes, **OPTIONS)
         self.counters.setups += 1

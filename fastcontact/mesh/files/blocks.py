@@ -82,10 +82,10 @@ def without_duplicates(block: Block) -> Block:
     _, first, inverse = np.unique(np.sort(block.nodes, axis=1), axis=0, return_index=True, return_inverse=True)
     if len(first) == len(block.nodes):
         return block
-    kept = np.sort(first)
-    position = np.searchsorted(kept, first)[inverse.reshape(-1)]
+    unique = np.sort(first)
+    position = np.searchsorted(unique, first)[inverse.reshape(-1)]
     groups = {name: np.unique(position[rows]) for name, rows in block.groups.items()}
-    return Block(block.kind, block.nodes[kept], groups)
+    return Block(block.kind, block.nodes[unique], groups)
 
 
 def _numbered(blocks: list[Block]) -> Groups:

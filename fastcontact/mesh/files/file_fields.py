@@ -82,8 +82,8 @@ def _vtkhdf(path: Path, name: str, at_points: bool) -> tuple[Array | None, AnyAr
         check_size(f"field '{name}' of '{path}'", (n_steps, n_points), file)
         if len(first) and (first.min() < 0 or first.max() + n_points > len(field)):
             raise FileError(f"field '{name}' of '{path}' has fewer numbers than its steps need: write it anew")
-        parts = np.array([field[start : start + n_points] for start in first])
-        return times, parts.reshape(len(first), n_points, *field.shape[1:]), points
+        steps = np.array([field[start : start + n_points] for start in first])
+        return times, steps.reshape(len(first), n_points, *field.shape[1:]), points
 
 
 def _middles(path: Path, name: str, grid: Any, n_values: int, points: Array) -> Array:

@@ -329,8 +329,8 @@ def read_point_field(path: PathLike, field: str) -> tuple[Array, Array, Array | 
         profiles = [profile for entry in instants for profile in entry["NOE"].values()]
         n_points = max(values(profile, "CO").size // count for profile in profiles) if points is None else len(points)
         check_size(f"field '{field}' of '{path}'", (len(instants), n_points, count), file)
-        parts = [_read_instant(file, entry["NOE"], n_points, count) for entry in instants]
-        return np.array([attribute(entry, "PDT") for entry in instants], np.float64), np.stack(parts), points
+        fields = [_read_instant(file, entry["NOE"], n_points, count) for entry in instants]
+        return np.array([attribute(entry, "PDT") for entry in instants], np.float64), np.stack(fields), points
 
 
 def _field_and_mesh(file: Any, path: PathLike, field: str) -> tuple[Any, str, Any]:
@@ -359,7 +359,7 @@ def read_cell_field(path: PathLike, field: str) -> tuple[Array, Array, Array]:
         codes = sorted({code for entry in instants for code in _cell_supports(entry)})
         if not instants:
             raise FileError(f"field '{field}' of '{path}' has no values at cells in the layout of MED 3 or 4")
-        middles, parts, count = [], [], int(attribute(group, "NCO"))
+        middles, values, count = [], [], int(attribute(group, "NCO"))
         for code in codes:
             if code not in elements.BY_MED or code not in step.get("MAI", {}):
                 raise FileError(f"field '{field}' of '{path}' is on {code} cells, which its mesh does not have")
@@ -368,9 +368,9 @@ def read_cell_field(path: PathLike, field: str) -> tuple[Array, Array, Array]:
                 raise FileError(f"a cell of '{path}' names a point that is not there: write the file anew")
             middles.append(points[nodes].mean(axis=1))
             check_size(f"field '{field}' of '{path}'", (len(instants), len(nodes), count), file)
-            parts.append(np.stack([_of_cells(file, entry, code, len(nodes), count, path) for entry in instants]))
+            values.append(np.stack([_of_cells(file, entry, code, len(nodes), count, path) for entry in instants]))
         times = np.array([attribute(entry, "PDT") for entry in instants], np.float64)
-        return times, np.concatenate(parts, axis=1), np.concatenate(middles)
+        return times, np.concatenate(values, axis=1), np.concatenate(middles)
 
 
 def _cell_supports(entry: Any) -> list[str]:

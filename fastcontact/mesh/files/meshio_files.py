@@ -210,11 +210,11 @@ def write(path: Path, temporary: Path, mesh: Mesh) -> None:
     file_format = _format(path, writing=True)
     if file_format in ("tetgen", "svg"):
         raise FileError(f"'{path}': {file_format} is no mesh format of one file; {OTHER_FORMATS}")
-    parts = _parts(mesh, file_format)
+    content = _parts(mesh, file_format)
     # By default XDMF writes the numbers to a second file, which cannot be replaced together with the first.
     options = {"data_format": "XML"} if file_format == "xdmf" else {}
     with _contained("write", path):
-        meshio.write(temporary, meshio.Mesh(**parts), file_format=file_format, **options)
+        meshio.write(temporary, meshio.Mesh(**content), file_format=file_format, **options)
     if file_format == "abaqus":
         abaqus.append_cell_sets(temporary, mesh)
     if file_format not in COMPLETE_FORMATS:
@@ -225,17 +225,17 @@ def _parts(mesh: Mesh, file_format: str) -> dict[str, Any]:
     """Return the arguments of meshio's Mesh, with groups in the form that the format supports."""
     width = mesh.dim if file_format in FLAT_FORMATS else 3
     points = np.pad(mesh.points, [(0, 0), (0, width - mesh.dim)])
-    parts: dict[str, Any] = {"points": points, "cells": _meshio_cells(mesh, NODE_ORDER.get(file_format, {}))}
+    content: dict[str, Any] = {"points": points, "cells": _meshio_cells(mesh, NODE_ORDER.get(file_format, {}))}
     if file_format in ARRAY_FORMATS:
-        return _with_arrays(parts, mesh)
+        return _with_arrays(content, mesh)
     if file_format == "gmsh22":
-        return _with_tags(parts, mesh)
+        return _with_tags(content, mesh)
     if file_format == "abaqus":
-        return {**parts, "point_sets": dict(mesh.point_groups)}
+        return {**content, "point_sets": dict(mesh.point_groups)}
     lost = len(mesh.cell_groups) + len(mesh.point_groups)
     if lost:
         warn(f"{file_format} files have no named groups: {lost} groups are left out; {KEEPS_ALL}")
-    return parts
+    return content
 
 
 def _meshio_cells(mesh: Mesh, order: Orders) -> list[tuple[str, AnyArray]]:
@@ -245,14 +245,14 @@ def _meshio_cells(mesh: Mesh, order: Orders) -> list[tuple[str, AnyArray]]:
     ]
 
 
-def _with_arrays(parts: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
+def _with_arrays(content: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
     """Return the parts with an array of 0 and 1 for each group."""
     cell_data = {}
     for name, members in mesh.cell_groups.items():
         flags = _flags(members, mesh.n_cells)
         cell_data[CELL_PREFIX + quote(name)] = np.split(flags, list(mesh.offsets.values())[1:])
     point_data = {POINT_PREFIX + quote(name): _flags(m, mesh.n_points) for name, m in mesh.point_groups.items()}
-    return {**parts, "cell_data": cell_data, "point_data": point_data}
+    return {**content, "cell_data": cell_data, "point_data": point_data}
 
 
 def _flags(members: AnyArray, count: int) -> Numbers:
@@ -261,7 +261,7 @@ def _flags(members: AnyArray, count: int) -> Numbers:
     return flags
 
 
-def _with_tags(parts: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
+def _with_tags(content: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
     """Return the parts with a physical tag for each cell, and a vertex cell for each point in a group."""
     dims = np.concatenate([np.full(len(block), elements.get(name).dim) for name, block in mesh.cells.items()])
     tags = np.zeros(mesh.n_cells, np.int32)
@@ -272,17 +272,17 @@ def _with_tags(parts: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
             dim, tag = int(dims[members].max()), len(field_data) + 1
             tags[members[dims[members] == dim]] = tag
             field_data[name] = np.array([tag, dim])
-    kept = {name: int((tags[mesh.cell_groups[name]] == tag).sum()) for name, (tag, _) in field_data.items()}
-    cut = {name: len(rows) - kept[name] for name, rows in mesh.cell_groups.items() if len(rows) > kept.get(name, 0)}
+    n_kept = {name: int((tags[mesh.cell_groups[name]] == tag).sum()) for name, (tag, _) in field_data.items()}
+    cut = {name: len(rows) - n_kept[name] for name, rows in mesh.cell_groups.items() if len(rows) > n_kept.get(name, 0)}
     if cut:
         warn(
             f"Gmsh files of version 2.2 hold one group a cell: {sum(cut.values())} memberships of the groups "
             f"{', '.join(cut)} are left out; {KEEPS_ALL}"
         )
     blocks = np.split(tags, list(mesh.offsets.values())[1:])
-    cells, blocks = _with_vertices(parts["cells"], blocks, mesh.point_groups, field_data)
+    cells, blocks = _with_vertices(content["cells"], blocks, mesh.point_groups, field_data)
     data = {"gmsh:physical": blocks, "gmsh:geometrical": [np.maximum(block, 1) for block in blocks]}
-    return {**parts, "cells": cells, "cell_data": data, "field_data": field_data}
+    return {**content, "cells": cells, "cell_data": data, "field_data": field_data}
 
 
 def _with_vertices(

@@ -105,12 +105,12 @@ def plain_content(path: Path, file_format: str, field: str = "") -> dict[str, An
 
 def _fields(content: Any, field: str) -> dict[str, Any]:
     """Return the fields of a ``meshio.Mesh`` in the format of `plain_content`."""
-    parts = content.cell_data.get(field)
+    blocks = content.cell_data.get(field)
     return {
         "fields": list(content.point_data),
         "field": _numbers(content.point_data.get(field)),
         "cell_fields": list(content.cell_data),
-        "cell_field": None if parts is None else [_numbers(part) for part in parts],
+        "cell_field": None if blocks is None else [_numbers(values) for values in blocks],
     }
 
 
@@ -121,10 +121,10 @@ def plain_parts(content: Any) -> dict[str, Any]:
     return {
         "points": _numbers(content.points),
         "cells": [[block.type, len(block.data), _numbers(block.data)] for block in content.cells],
-        "cell_data": {key: [_numbers(part) for part in parts] for key, parts in cell_data.items()},
+        "cell_data": {key: [_numbers(values) for values in parts] for key, parts in cell_data.items()},
         "point_data": {key: _numbers(data) for key, data in point_data.items()},
-        "cell_sets": {name: [_numbers(part) for part in parts] for name, parts in content.cell_sets.items()},
-        "point_sets": {name: _numbers(part) for name, part in content.point_sets.items()},
+        "cell_sets": {name: [_numbers(values) for values in parts] for name, parts in content.cell_sets.items()},
+        "point_sets": {name: _numbers(values) for name, values in content.point_sets.items()},
         "field_data": {name: _numbers(entry) for name, entry in content.field_data.items()},
     }
 

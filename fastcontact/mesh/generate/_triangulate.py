@@ -129,11 +129,11 @@ def inner_seeds(outline: Array, spacing: Spacing, density: float) -> Array:
 
 def _apart(seeds: Array, outline: Array, spacing: Spacing, density: float) -> Array:
     """Return the seeds (m, 2) far enough from the outline and from earlier seeds, where a body is narrow."""
-    kept: list[Array] = []
+    accepted: list[Array] = []
     for seed, depth, size in zip(seeds, _depth(outline, seeds), density * spacing(seeds), strict=True):
-        if depth > 0.4 * size and all(np.hypot(*(seed - other)) > 0.7 * size for other in kept):
-            kept.append(seed)
-    return np.array(kept).reshape(-1, 2)
+        if depth > 0.4 * size and all(np.hypot(*(seed - other)) > 0.7 * size for other in accepted):
+            accepted.append(seed)
+    return np.array(accepted).reshape(-1, 2)
 
 
 def _depth(outline: Array, points: Array) -> Array:

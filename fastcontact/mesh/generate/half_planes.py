@@ -133,14 +133,14 @@ def punched_block(
     """
     one_of("element", element, QUADRANGLES)
     radius = positive("punch_radius", punch_radius)
-    whole, rate = positive("extent", extent), growth_of("growth", growth)
-    if whole < 2 * radius:
-        raise MeshError(f"extent = {whole:g} is out of range: it must be at least 2 punch_radius = {2 * radius:g}")
+    width, rate = positive("extent", extent), growth_of("growth", growth)
+    if width < 2 * radius:
+        raise MeshError(f"extent = {width:g} is out of range: it must be at least 2 punch_radius = {2 * radius:g}")
     size = radius / 200 if edge_size is None else positive("edge_size", edge_size, radius, "punch_radius")
-    inward, outward = growing(radius, size, rate), growing(whole - radius, size, rate)
+    inward, outward = growing(radius, size, rate), growing(width - radius, size, rate)
     x = np.concatenate([radius - inward[::-1], radius + outward[1:]])
-    x[0], x[-1] = 0.0, whole
-    mesh = on_lines(element, [x, -growing(whole, size, rate)[::-1]])
+    x[0], x[-1] = 0.0, width
+    mesh = on_lines(element, [x, -growing(width, size, rate)[::-1]])
     mesh = renamed(mesh, dict.fromkeys(_CORNERS) | _NAMES_2D)
     mesh = with_cells_inside(mesh, "PUNCHED", "TOP", lambda points: points[:, 0] <= radius)
     return with_points_at(mesh, {"POLE": (0.0, 0.0), "EDGE": (radius, 0.0)})
@@ -186,15 +186,15 @@ def crowned_blocks(
     False
     """
     one_of("element", element, QUADRANGLES)
-    R, whole, rate = positive("R", R), positive("extent", extent), growth_of("growth", growth)
-    if whole > R:
-        raise MeshError(f"extent = {whole:g} is out of range: it must be at most R = {R:g}")
-    fine = positive("contact_radius", contact_radius, whole / 2, "extent/2")
+    R, width, rate = positive("R", R), positive("extent", extent), growth_of("growth", growth)
+    if width > R:
+        raise MeshError(f"extent = {width:g} is out of range: it must be at most R = {R:g}")
+    fine = positive("contact_radius", contact_radius, width / 2, "extent/2")
     size = positive("contact_size", contact_size, fine, "contact_radius")
-    right, down = _lines(size, fine, whole, rate), _lines(size, size, whole, rate)
+    right, down = _lines(size, fine, width, rate), _lines(size, size, width, rate)
     lattice = on_lines(element, [np.concatenate([-right[:0:-1], right]), -down[::-1]], "LOWER")
     across, up = lattice.points.T
-    crown = across**2 / (2 * R) * (1 + up / whole)  # decays downward
+    crown = across**2 / (2 * R) * (1 + up / width)  # decays downward
     lower = renamed(lattice.replace(points=np.column_stack([across, up - crown])), _NAMES_CROWNED.get)
     lower = with_cells_inside(lower, "CONT_LOWER", "CONT_LOWER", lambda points: np.abs(points[:, 0]) <= 1.2 * fine)
     lower = with_points_at(lower, {"POLE_LOWER": (0.0, 0.0)})

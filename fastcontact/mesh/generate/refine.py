@@ -179,8 +179,8 @@ def _cell_groups(mesh: Mesh) -> dict[str, AnyArray]:
     groups: dict[str, AnyArray] = {}
     for group, members in mesh.cell_groups.items():
         rows = mesh.split(members)
-        parts = [pieces[n][1] + (r[:, None] * pieces[n][2] + np.arange(pieces[n][2])).ravel() for n, r in rows.items()]
-        groups[group] = np.concatenate(parts) if parts else np.empty(0, np.int64)
+        cells = [pieces[n][1] + (r[:, None] * pieces[n][2] + np.arange(pieces[n][2])).ravel() for n, r in rows.items()]
+        groups[group] = np.concatenate(cells) if cells else np.empty(0, np.int64)
     return groups
 
 
@@ -220,9 +220,9 @@ def linearised(mesh: Mesh) -> Mesh:
     merged: dict[str, AnyArray] = {}
     order: list[Indices] = []
     for linear in dict.fromkeys(elements.get(name).linear for name in cells):
-        parts = [name for name in cells if elements.get(name).linear == linear]
-        merged[linear] = number[np.concatenate([cells[name] for name in parts])]
-        order += [mesh.offsets[name] + np.arange(len(cells[name])) for name in parts]
+        names = [name for name in cells if elements.get(name).linear == linear]
+        merged[linear] = number[np.concatenate([cells[name] for name in names])]
+        order += [mesh.offsets[name] + np.arange(len(cells[name])) for name in names]
     order_of_cells = np.argsort(np.concatenate(order)) if order else np.empty(0, np.int64)
     return Mesh(
         mesh.points[used],

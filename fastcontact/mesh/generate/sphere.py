@@ -138,17 +138,17 @@ def sphere_octant(
 
     names = {"SPHERE": "SPHERE", "XMIN": "SYMMETRY_X", "YMIN": "SYMMETRY_Z", "ZMIN": "SPHERE_TOP"}
     grids = {-1: {}, 0: {"XMAX": "SPHERE_SIDE"}, 1: {"YMAX": "SPHERE_SIDE"}, 2: {"ZMAX": "CONT_SPHERE"}}
-    parts = []
+    cubes = []
     for outside, outer in grids.items():
         grid = [around, around, upward]
         kept = dict(names)
         if outside >= 0:
             grid[outside] = outward
             del kept[("XMIN", "YMIN", "ZMIN")[outside]]
-        parts.append(_mapped(element, (grid[0], grid[1], grid[2]), ball(outside), "SPHERE", kept | outer))
-    whole = merge_points(union(*parts), 1e-6 * R * float(np.diff(around).min()))
-    check_cells(whole)
-    return with_points_at(whole, {"POLE_SPHERE": (0.0, 0.0, 0.0), "CENTRE": (0.0, R, 0.0)})
+        cubes.append(_mapped(element, (grid[0], grid[1], grid[2]), ball(outside), "SPHERE", kept | outer))
+    mesh = merge_points(union(*cubes), 1e-6 * R * float(np.diff(around).min()))
+    check_cells(mesh)
+    return with_points_at(mesh, {"POLE_SPHERE": (0.0, 0.0, 0.0), "CENTRE": (0.0, R, 0.0)})
 
 
 def _ball(cube: Array) -> Array:
@@ -183,9 +183,9 @@ def _mapped(element: str, grid: Sequence[Array], place: Map, solid: str, names: 
 def _without_unnamed_facets(mesh: Mesh, names: Mapping[str, str]) -> Mesh:
     """Return the mesh with the groups in `names` only, and without facets that belong to none of them."""
     groups = {name: mesh.cell_groups[name] for name in names}
-    kept = np.unique(np.concatenate(list(groups.values())))
-    rows = mesh.split(kept)
+    named = np.unique(np.concatenate(list(groups.values())))
+    rows = mesh.split(named)
     cells = {name: mesh.cells[name][rows[name]] for name in mesh.cells if name in rows}
     number = np.full(mesh.n_cells, -1)
-    number[kept] = np.arange(len(kept))
+    number[named] = np.arange(len(named))
     return mesh.replace(cells=cells, cell_groups={name: number[members] for name, members in groups.items()})

@@ -154,10 +154,10 @@ def union(*meshes: Mesh) -> Mesh:
     )
 
 
-def _joined(parts: Iterable[Groups]) -> Groups:
+def _joined(groups_of_meshes: Iterable[Groups]) -> Groups:
     """Return the concatenated arrays of the same name."""
     groups_of_all: dict[str, list[AnyArray]] = {}
-    for groups_of_mesh in parts:
+    for groups_of_mesh in groups_of_meshes:
         for name, values in groups_of_mesh.items():
             groups_of_all.setdefault(name, []).append(values)
     return {name: np.concatenate(arrays) for name, arrays in groups_of_all.items()}
@@ -202,8 +202,8 @@ def merge_points(mesh: Mesh, tolerance: float) -> Mesh:
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(mesh.n_points,) * 2)
     _, cluster = connected_components(links, directed=False)
     _, first = np.unique(cluster, return_index=True)
-    kept = np.sort(first)
-    target = np.searchsorted(kept, first)[cluster]
+    unique = np.sort(first)
+    target = np.searchsorted(unique, first)[cluster]
     cells = {name: target[block] for name, block in mesh.cells.items()}
     for name, block in cells.items():
         in_order = np.sort(block, axis=1)
@@ -214,7 +214,7 @@ def merge_points(mesh: Mesh, tolerance: float) -> Mesh:
                 "it must be smaller than the shortest edge"
             )
     point_groups = {name: target[members] for name, members in mesh.point_groups.items()}
-    return mesh.replace(points=mesh.points[kept], cells=cells, point_groups=point_groups)
+    return mesh.replace(points=mesh.points[unique], cells=cells, point_groups=point_groups)
 
 
 def with_points_at(mesh: Mesh, places: Mapping[str, Sequence[float]]) -> Mesh:
@@ -230,5 +230,5 @@ def with_cells_inside(mesh: Mesh, name: str, group: str, inside: Callable[[Array
     """
     near = inside(mesh.points)
     rows = mesh.split(mesh.cell_groups[group])
-    parts = [mesh.offsets[kind] + chosen[near[mesh.cells[kind][chosen]].all(axis=1)] for kind, chosen in rows.items()]
-    return mesh.with_groups(cells={name: np.concatenate(parts)})
+    members = [mesh.offsets[kind] + chosen[near[mesh.cells[kind][chosen]].all(axis=1)] for kind, chosen in rows.items()]
+    return mesh.with_groups(cells={name: np.concatenate(members)})

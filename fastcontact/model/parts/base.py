@@ -54,13 +54,13 @@ class Support:
 
     def by_history(self, points: Array) -> dict[PartHistory, Array]:
         """Return the displacements (n,) of `points` (n, dim) at multiplier 1, by history [length]."""
-        parts: dict[PartHistory, Array] = {self.ramp: evaluated(self.value, points, self.name)}
+        values: dict[PartHistory, Array] = {self.ramp: evaluated(self.value, points, self.name)}
         if self.rotation is not None:
             arms, angle = points - np.array(self.rotation.centre), self.rotation.angle
             ramp = self.ramp if self.rotation_ramp is None else self.rotation_ramp
             for versine, generator in enumerate(self.rotation.generators):
-                parts[Harmonic(ramp, angle, bool(versine))] = arms @ generator[self.component]
-        return parts
+                values[Harmonic(ramp, angle, bool(versine))] = arms @ generator[self.component]
+        return values
 
 
 def group_names(groups: Sequence[str] | str | None) -> tuple[str, ...] | None:

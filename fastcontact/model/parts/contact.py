@@ -120,11 +120,11 @@ class ModelContact(ModelConnections):
         >>> model.contact[0].formulation
         'mortar'
         """
-        given: dict[str, Any] = {option: value for option, value in options.items() if value is not None}
+        chosen: dict[str, Any] = {option: value for option, value in options.items() if value is not None}
         if formulation is None:
-            formulation, given, reason = default_formulation(self.mesh.dim, given)
-            log.info("contact '%s': %s, since %s", name, method(formulation, given), reason)
-        self._add_pair(ContactPair(name, secondary, primary, formulation, given))
+            formulation, chosen, reason = default_formulation(self.mesh.dim, chosen)
+            log.info("contact '%s': %s, since %s", name, method(formulation, chosen), reason)
+        self._add_pair(ContactPair(name, secondary, primary, formulation, chosen))
 
     def add_contacts(
         self,
@@ -289,13 +289,13 @@ class ModelContact(ModelConnections):
             obstacle.check_apart(self.mesh)
         obstacle.distance(self.mesh.points[:1])  # raises an error for a wrong dimension
         history = table_of(ramp, f"the ramp of the motion of obstacle '{name}'")
-        given: dict[str, Any] = {option: value for option, value in options.items() if value is not None}
+        chosen: dict[str, Any] = {option: value for option, value in options.items() if value is not None}
         if formulation is None:
             kinds = self._facet_kinds(secondary)
-            formulation, given, reason = against_obstacle(self.mesh.dim, *kinds, given)
-            log.info("contact '%s': %s, since %s", name, method(formulation, given), reason)
+            formulation, chosen, reason = against_obstacle(self.mesh.dim, *kinds, chosen)
+            log.info("contact '%s': %s, since %s", name, method(formulation, chosen), reason)
         if formulation == "mortar":
-            given.setdefault("multipliers", "dual")
+            chosen.setdefault("multipliers", "dual")
         driving = self._driving(name, moves, force)
         turned = (
             (None, None)
@@ -303,7 +303,7 @@ class ModelContact(ModelConnections):
             else rotation_of(f"the rotation of obstacle '{name}'", rotation, self.kinematics)
         )
         self._add_pair(
-            ContactPair(name, secondary, "", formulation, given, obstacle, displacement, history, driving, *turned)
+            ContactPair(name, secondary, "", formulation, chosen, obstacle, displacement, history, driving, *turned)
         )
 
     def _source(self, pair: ContactPair, side: Surface, options: PairOptions) -> Mask | None:
@@ -330,8 +330,8 @@ class ModelContact(ModelConnections):
         if not facets:  # reported by `check`
             return [], False
         simplices = [block for name, block in self.mesh.solids.items() if name in ("tri3", "tet4")]
-        theirs = any(np.isin(self.mesh.points_of(group), block).all() for block in simplices)
-        return list(facets), theirs
+        of_simplices = any(np.isin(self.mesh.points_of(group), block).all() for block in simplices)
+        return list(facets), of_simplices
 
     def _driving(self, name: str, moves: Mapping[int, Value], force: Mapping[str, float] | None) -> Driving:
         """Return the force on obstacle `name` by component, None for prescribed ones; empty without any."""
@@ -374,8 +374,8 @@ class ModelContact(ModelConnections):
         """
         check_known("contact formulation", pair.formulation, FORMULATIONS, ContactError)
         kind = FORMULATIONS[pair.formulation].variant(self.mesh.dim, pair.options)
-        given = ("secondary", "primary", "points", "axisymmetric", "modulus", "options", "held")
-        known = [*SHARED_OPTIONS, *(f.name for f in dataclasses.fields(kind) if f.init and f.name not in given)]
+        set_here = ("secondary", "primary", "points", "axisymmetric", "modulus", "options", "held")
+        known = [*SHARED_OPTIONS, *(f.name for f in dataclasses.fields(kind) if f.init and f.name not in set_here)]
         for option in pair.options:
             check_known(f"option of {pair.formulation}", option, known, ContactError)
         specific = {key: value for key, value in pair.options.items() if key not in SHARED_OPTIONS}

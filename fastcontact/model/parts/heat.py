@@ -176,7 +176,7 @@ class ModelHeat(ModelMaterials):
         Nodes with the same temperature are represented by the first one, see `same_temperature`. ModelError if two
         prescribed temperatures differ at a node.
         """
-        fixed, given = np.zeros(self.mesh.n_points, bool), np.zeros(self.mesh.n_points)
+        fixed, values = np.zeros(self.mesh.n_points, bool), np.zeros(self.mesh.n_points)
         by_ramp: dict[Table | None, Array] = {}
         owner = np.full(self.mesh.n_points, -1)
         supports = [load for load in self.heat_loads if isinstance(load, FixedTemperature)]
@@ -186,7 +186,7 @@ class ModelHeat(ModelMaterials):
             rise = evaluated(support.value, self.mesh.points[nodes], support.name) - self.reference_temperature
             nodes = same[nodes]
             again = np.flatnonzero(fixed[nodes])
-            for row in again[(given[nodes[again]] != rise[again])][:1]:
+            for row in again[(values[nodes[again]] != rise[again])][:1]:
                 other = supports[owner[nodes[row]]]
                 raise ModelError(
                     f"'{support.group}' and '{other.group}' prescribe different temperatures at point {nodes[row]}"
@@ -195,7 +195,7 @@ class ModelHeat(ModelMaterials):
             by_ramp.setdefault(ramp, np.zeros(self.mesh.n_points))[new] = rise[~fixed[nodes]]
             if support.reached is not None and leaving:
                 by_ramp.setdefault(leaving, np.zeros(self.mesh.n_points))[new] = support.reached[new]
-            fixed[nodes], given[nodes], owner[new] = True, rise, number
+            fixed[nodes], values[nodes], owner[new] = True, rise, number
         return fixed, by_ramp
 
     def check_heat(self) -> None:
@@ -234,17 +234,17 @@ class ModelHeat(ModelMaterials):
             elif pair.options.get("conductance") is not None:
                 ends = np.concatenate([self.mesh.points_of(pair.secondary), self.mesh.points_of(pair.primary)])
                 joined.append(np.stack([np.full(len(ends), ends[0]), ends], axis=1))
-        alone = not_reached(body, held, np.concatenate(joined))
-        if len(alone):
+        unreached = not_reached(body, held, np.concatenate(joined))
+        if len(unreached):
             raise ModelError(
-                f"nothing determines the temperature of body {body_name(self.mesh, body, alone[0])}: fix a temperature, "
+                f"nothing determines the temperature of body {body_name(self.mesh, body, unreached[0])}: fix a temperature, "
                 "add a film, or give a contact with another body a conductance"
             )
 
     def conductances(self) -> dict[str, Conductance]:
         """Return the conductances by contact pair."""
-        given = {pair.name: pair.options.get("conductance") for pair in self.contact}
-        return {name: Conductance(name, value) for name, value in given.items() if value is not None}
+        by_pair = {pair.name: pair.options.get("conductance") for pair in self.contact}
+        return {name: Conductance(name, value) for name, value in by_pair.items() if value is not None}
 
 
 def _span(begins: float | None, ends: float | None) -> tuple[float, float]:

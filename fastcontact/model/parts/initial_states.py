@@ -174,8 +174,8 @@ class ModelInitialStates(ModelLoads):
         >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
         >>> model.add_initial_stress(xx=lambda points: 100.0 * (1.0 - 2.0 * points[:, 1]))
         """
-        given = {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "yz": yz, "xz": xz}
-        self._add_initial("stress", groups, given, axes, ramp)
+        components = {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "yz": yz, "xz": xz}
+        self._add_initial("stress", groups, components, axes, ramp)
 
     def add_initial_strain(
         self,
@@ -208,16 +208,16 @@ class ModelInitialStates(ModelLoads):
         >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
         >>> model.add_initial_strain("BLOCK", xx=-0.002, yy=-0.002, zz=-0.002)  # shrinkage
         """
-        given = {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "yz": yz, "xz": xz}
-        self._add_initial("strain", groups, given, axes, ramp)
+        components = {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "yz": yz, "xz": xz}
+        self._add_initial("strain", groups, components, axes, ramp)
 
     def _add_initial(
-        self, kind: str, groups: Sequence[str] | str | None, given: Mapping[str, Any], axes: Axes, ramp: History
+        self, kind: str, groups: Sequence[str] | str | None, components: Mapping[str, Any], axes: Axes, ramp: History
     ) -> None:
         names = self._solid_groups(groups, f": it has no initial {kind}")
         table = table_of(ramp, f"the ramp of the initial {kind}")
         self.initial_states.append(
-            initial_state(kind, names, self._cells_of(names), given, axes, self.kinematics, table)
+            initial_state(kind, names, self._cells_of(names), components, axes, self.kinematics, table)
         )
 
     def temperature_rise(self, factors: Sequence[float]) -> Array | None:

@@ -321,10 +321,10 @@ class ModelLoads(ModelHeat):
         >>> model.add_moment("TOP", z=20.0)
         """
         name = f"the moment on '{group}'"
-        given = {"x": x, "y": y, "z": z}
+        components = {"x": x, "y": y, "z": z}
         if self.mesh.dim == 2 and (x is not None or y is not None):
             raise ModelError(f"{name}: in the plane moments are about z")
-        axes = axes_of(name, given, 3)
+        axes = axes_of(name, components, 3)
         self._add(Moment(group, axes, table_of(ramp, f"the ramp of {name}")))
 
     def _add(self, load: Load) -> None:

@@ -99,14 +99,14 @@ class ModelMaterials(ModelBase):
         """Return which moduli (n_moduli,) have a mean dilatation; none in plane stress, which does not lock."""
         return self.material_field().averaged
 
-    def _check_material(self, index: int, group: str | None, given: Numbers) -> None:
+    def _check_material(self, index: int, group: str | None, numbers: Numbers) -> None:
         """Refuse a material for cells that already have another one, unless that was assigned to all cells."""
         new = self.materials[index][0]
-        for number in np.unique(given[given >= 0]):
+        for number in np.unique(numbers[numbers >= 0]):
             old, groups = self.materials[number]
             if old != new and (groups is not None or group is None):
                 raise ModelError(
-                    f"{int((given == number).sum())} cells of {'the mesh' if group is None else repr(group)} have two "
+                    f"{int((numbers == number).sum())} cells of {'the mesh' if group is None else repr(group)} have two "
                     f"materials, {old.described} and {new.described}: give each group one; "
                     "one for all other cells comes first, without groups"
                 )

@@ -175,10 +175,10 @@ class ModelSupports(ModelContact):
         by_ramp: dict[PartHistory, Array] = {}
         for number, support in enumerate(self.supports):
             nodes, k = self.mesh.points_of(support.group), support.component
-            parts, new = support.by_history(self.mesh.points[nodes]), ~fixed[nodes, k]
-            for history in {**by_ramp, **parts}:
+            histories, new = support.by_history(self.mesh.points[nodes]), ~fixed[nodes, k]
+            for history in {**by_ramp, **histories}:
                 total = by_ramp.setdefault(history, np.zeros(self.mesh.points.shape))
-                values = parts.get(history, np.zeros(len(nodes)))
+                values = histories.get(history, np.zeros(len(nodes)))
                 other = np.flatnonzero((total[nodes, k] != values) & ~new)
                 if len(other):
                     self._refuse(number, int(nodes[other[0]]))
