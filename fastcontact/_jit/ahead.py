@@ -65,17 +65,17 @@ def kernels_of(runs: Sequence[str]) -> list[int]:
     return list(dict.fromkeys([*compiled_of(runs), *others]))
 
 
-def numba_type(given: Any) -> Any:
+def numba_type(entry: Any) -> Any:
     """Return the Numba type of an entry of the table.
 
     A string is a scalar in NumPy's notation of kind and bytes. A list ``[scalar, dimensions]`` is a contiguous array; it is
     read-only with a third item "r". ``{"class": [type, ...]}`` is a named tuple, or a plain tuple if the class is empty.
     """
-    if isinstance(given, str):
-        return from_dtype(dtype(given))
-    if isinstance(given, list):
-        return types.Array(numba_type(given[0]), given[1], "C", readonly=len(given) > 2)
-    ((name, members),) = given.items()
+    if isinstance(entry, str):
+        return from_dtype(dtype(entry))
+    if isinstance(entry, list):
+        return types.Array(numba_type(entry[0]), entry[1], "C", readonly=len(entry) > 2)
+    ((name, members),) = entry.items()
     inside = [numba_type(member) for member in members]
     if not name:
         return types.Tuple(inside)
@@ -87,15 +87,15 @@ def numba_type(given: Any) -> Any:
 
 def compile_kernel(number: int) -> None:
     """Compile a kernel of the table, or load it from disk."""
-    module, name, given = table()["kernels"][number]
-    getattr(importlib.import_module(module), name).compile(tuple(map(numba_type, given)))
+    module, name, signature = table()["kernels"][number]
+    getattr(importlib.import_module(module), name).compile(tuple(map(numba_type, signature)))
 
 
 def _is_kept(number: int) -> bool:
     """Return whether a compiled version of a kernel of the table is on disk, for any types."""
     module, name, _ = table()["kernels"][number]
-    found = kernel_files.files.get(getattr(importlib.import_module(module), name).py_func)
-    return found is not None and found.exist()
+    files = kernel_files.files.get(getattr(importlib.import_module(module), name).py_func)
+    return files is not None and files.exist()
 
 
 def _file_name(number: int) -> str:
@@ -231,12 +231,12 @@ def main(arguments: Sequence[str]) -> int:
     Return the number of kernels that failed to compile.
     """
     n, first, *runs = arguments
-    taken: set[int] = set()
+    compiled_elsewhere: set[int] = set()
     failed = 0
-    threading.Thread(target=lambda: taken.update(map(int, sys.stdin)), daemon=True).start()
+    threading.Thread(target=lambda: compiled_elsewhere.update(map(int, sys.stdin)), daemon=True).start()
     for number in kernels_of(runs)[int(first) :: int(n)]:
         print(number, flush=True)
-        if number not in taken:
+        if number not in compiled_elsewhere:
             try:
                 compile_kernel(number)
             except Exception as error:  # the run reports it if it needs the kernel

@@ -106,8 +106,8 @@ class KernelFiles:
     def version(self) -> str:
         """The name, and a digest of the dependencies of the machine code except signature and processor."""
         environment = {name: getattr(numba.config, name, None) for name in OPTIONS}
-        parts = [__version__, numba.__version__, llvmlite.__version__, sys.version, self._options, repr(environment)]
-        depends = "\n".join([*parts, *sorted(set(_sources(self._function, set())))])
+        settings = [__version__, numba.__version__, llvmlite.__version__, sys.version, self._options, repr(environment)]
+        depends = "\n".join([*settings, *sorted(set(_sources(self._function, set())))])
         return f"{self._name}.{_digest(depends.encode())[:24]}"
 
 

@@ -41,18 +41,18 @@ class _Compilations(event.Listener):  # type: ignore[misc]
     depth = 0  # nesting: a kernel compiles those that it calls
     collects = True
 
-    def on_start(self, found: Any) -> None:
+    def on_start(self, raised_event: Any) -> None:
         """Notify listeners and suspend garbage collection."""
-        if getattr(found.data["dispatcher"], "__module__", "").startswith("fastcontact."):
+        if getattr(raised_event.data["dispatcher"], "__module__", "").startswith("fastcontact."):
             compiling.notify()
             if self.depth == 0:
                 self.collects = gc.isenabled()
                 gc.disable()
             self.depth += 1
 
-    def on_end(self, found: Any) -> None:
+    def on_end(self, raised_event: Any) -> None:
         """Resume garbage collection."""
-        if getattr(found.data["dispatcher"], "__module__", "").startswith("fastcontact."):
+        if getattr(raised_event.data["dispatcher"], "__module__", "").startswith("fastcontact."):
             self.depth -= 1
             if self.depth == 0 and self.collects:
                 gc.enable()

@@ -126,12 +126,12 @@ def interpret(kernel: Any, arguments: tuple[Any, ...]) -> Any:
         return _plain(as_python(kernel)(*map(_number, arguments)))
 
 
-def entries(given: Any) -> float:
+def entries(argument: Any) -> float:
     """Return the number of entries of an array, a scalar or a tuple of these; infinite for a type that is not `EXACT`."""
-    if isinstance(given, tuple):
-        return float(sum(map(entries, given)))
-    exact = isinstance(given, bool | int | float) or getattr(given, "dtype", "") in EXACT
-    return float(np.size(given)) if exact else np.inf
+    if isinstance(argument, tuple):
+        return float(sum(map(entries, argument)))
+    exact = isinstance(argument, bool | int | float) or getattr(argument, "dtype", "") in EXACT
+    return float(np.size(argument)) if exact else np.inf
 
 
 @functools.cache
@@ -139,13 +139,13 @@ def as_python(kernel: Any) -> Callable[..., Any]:
     """Return the Python function of a kernel; the kernels that it calls are Python functions, too."""
     function = getattr(kernel, "py_func", kernel)
     known, code = function.__globals__, function.__code__
-    parts = {name: as_python(known[name]) for name in code.co_names if hasattr(known.get(name), "py_func")}
-    return FunctionType(code, {**known, **parts}, function.__name__, function.__defaults__, function.__closure__)
+    called = {name: as_python(known[name]) for name in code.co_names if hasattr(known.get(name), "py_func")}
+    return FunctionType(code, {**known, **called}, function.__name__, function.__defaults__, function.__closure__)
 
 
-def _number(given: Any) -> Any:
+def _number(argument: Any) -> Any:
     """Return an argument in a type whose division by zero gives the same result as in compiled code."""
-    return np.float64(given) if isinstance(given, float) else given
+    return np.float64(argument) if isinstance(argument, float) else argument
 
 
 def _plain(result: Any) -> Any:

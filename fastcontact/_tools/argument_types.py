@@ -56,10 +56,10 @@ def _checked(call: Callable[..., Any], name: str, error: type[FastcontactError])
     @functools.wraps(call)
     def checking(*args: Any, **kwargs: Any) -> Any:
         try:
-            given, annotations = signature.bind(*args, **kwargs).arguments, types_of(call)
+            values, annotations = signature.bind(*args, **kwargs).arguments, types_of(call)
         except TypeError:  # Python's message on missing and unknown arguments is the best
             return call(*args, **kwargs)
-        for key, value in given.items():
+        for key, value in values.items():
             parameter = signature.parameters[key]
             annotation = annotations.get(key, Any)
             if parameter.kind is parameter.VAR_KEYWORD:
@@ -215,8 +215,8 @@ def _test(annotation: Any, kind: Any, members: tuple[Any, ...]) -> Callable[[Any
     if kind is abc.Callable:
         return callable
     if getattr(kind, "_is_protocol", False):
-        asked = [name for name in (*vars(kind), *inspect.get_annotations(kind)) if not name.startswith("_")]
-        return lambda value: all(hasattr(value, name) for name in asked) and not isinstance(value, type)
+        members_needed = [name for name in (*vars(kind), *inspect.get_annotations(kind)) if not name.startswith("_")]
+        return lambda value: all(hasattr(value, name) for name in members_needed) and not isinstance(value, type)
     if annotation in (Any, inspect.Parameter.empty) or not isinstance(kind, type):
         return lambda value: True
     return lambda value: isinstance(value, kind)
@@ -291,8 +291,8 @@ def _plural(phrase: str) -> str:
     if phrase.startswith("a sequence of"):
         return phrase.removeprefix("a ").replace("sequence", "sequences", 1)
     return " or ".join(
-        part.removeprefix("a ").removeprefix("an ") + "s" * part.startswith(("a ", "an "))
-        for part in phrase.split(" or ")
+        words_of_one.removeprefix("a ").removeprefix("an ") + "s" * words_of_one.startswith(("a ", "an "))
+        for words_of_one in phrase.split(" or ")
     )
 
 

@@ -35,11 +35,11 @@ def opened(path: PathLike) -> Iterator[Any]:
     """Open an HDF5 file for reading in a block; damage detected inside the block raises FileError."""
     import h5py
 
-    found = existing_file(path)
+    existing = existing_file(path)
     try:
-        if not h5py.is_hdf5(found):
+        if not h5py.is_hdf5(existing):
             raise FileError(f"'{path}' is not an HDF5 file: check that it is complete and has the right suffix")
-        with h5py.File(found, "r") as file:
+        with h5py.File(existing, "r") as file:
             check_contents(file, path)
             yield file
     except (FastcontactError, Warning):
@@ -103,11 +103,11 @@ def _check_dataset(dataset: Any, where: str, limit: int, file_size: int) -> int:
         raise FileError(f"{where} declares {count} texts or references, which its file cannot hold: write it anew")
     if layout == h5d.CHUNKED:
         chunk = int(np.prod([int(n) for n in settings.get_chunk()], dtype=object)) * item
-        own = (h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32, h5z.FILTER_SZIP,
+        built_in = (h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32, h5z.FILTER_SZIP,
                h5z.FILTER_NBIT, h5z.FILTER_SCALEOFFSET)  # fmt: skip
         filters = [settings.get_filter(number)[0] for number in range(settings.get_nfilters())]
         # HDF5 would search for an unknown filter among the shared libraries of the system.
-        if not set(filters) <= set(own):
+        if not set(filters) <= set(built_in):
             raise FileError(f"{where} is packed by the filter {filters[0]}, which not every HDF5 knows: use gzip")
         if dataset.get_storage_size() > 2 * (size + chunk) + PLAUSIBLE_BYTES:
             raise FileError(f"{where} takes more room packed than it can hold: the file is damaged, write it anew")

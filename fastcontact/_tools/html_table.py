@@ -30,8 +30,8 @@ def html_table(
 
 def fields_table(result: Any) -> str:
     """Return the fields and numeric properties of a dataclass as an HTML table; long arrays are shown by their range."""
-    named = [own.name for own in fields(result) if own.repr]
-    properties = [name for name, own in vars(type(result)).items() if isinstance(own, property)]
+    named = [member.name for member in fields(result) if member.repr]
+    properties = [name for name, member in vars(type(result)).items() if isinstance(member, property)]
     rows = [(name.replace("_", " "), _text(getattr(result, name))) for name in [*named, *properties]]
     return html_table(rows, caption=type(result).__name__)
 

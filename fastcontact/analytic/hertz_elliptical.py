@@ -145,7 +145,7 @@ def hertz_elliptical(
     >>> hertz.radius_x == hertz.radius_y
     True
     """
-    given = exactly_one(force=force, approach=approach, pressure_max=pressure_max)
+    load = exactly_one(force=force, approach=approach, pressure_max=pressure_max)
     R_x = effective_radius(R1x, R2x, ("R1x", "R2x"))
     R_y = effective_radius(R1y, R2y, ("R1y", "R2y"))
-    return _solve(Bodies(E1, nu1, E2, nu2), R_x, R_y, *given)
+    return _solve(Bodies(E1, nu1, E2, nu2), R_x, R_y, *load)

@@ -157,5 +157,5 @@ def hertz_line(
     >>> round(roller.half_width, 4), round(roller.pressure_max, 2)
     (6.2146, 3585.36)
     """
-    given = exactly_one(force=force, radius=radius, pressure_max=pressure_max)
-    return _solve(Bodies(E1, nu1, E2, nu2), plane_kinematics(kinematics), effective_radius(R1, R2), *given)
+    load = exactly_one(force=force, radius=radius, pressure_max=pressure_max)
+    return _solve(Bodies(E1, nu1, E2, nu2), plane_kinematics(kinematics), effective_radius(R1, R2), *load)

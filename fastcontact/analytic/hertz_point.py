@@ -153,5 +153,5 @@ def hertz_point(
     >>> round(hertz.pressure_max, 4), hertz.radius
     (2798.3287, 10.0)
     """
-    given = exactly_one(force=force, approach=approach, radius=radius, pressure_max=pressure_max)
-    return _solve(Bodies(E1, nu1, E2, nu2), effective_radius(R1, R2), *given)
+    load = exactly_one(force=force, approach=approach, radius=radius, pressure_max=pressure_max)
+    return _solve(Bodies(E1, nu1, E2, nu2), effective_radius(R1, R2), *load)

@@ -224,8 +224,8 @@ def power_law_punch(
     >>> from fastcontact import analytic
     >>> punch = analytic.power_law_punch(E=1000.0, nu=0.3, coefficient=0.01, exponent=4.0, approach=0.1)
     """
-    given = exactly_one(force=force, approach=approach, radius=radius)
-    return _solve(_modulus(E, nu), positive("coefficient", coefficient), positive("exponent", exponent), *given)
+    load = exactly_one(force=force, approach=approach, radius=radius)
+    return _solve(_modulus(E, nu), positive("coefficient", coefficient), positive("exponent", exponent), *load)
 
 
 def cone_punch(
@@ -258,9 +258,9 @@ def cone_punch(
     name, value = exactly_one(slope_angle=slope_angle, slope=slope)
     if name == "slope_angle" and not 0.0 < value < 90.0:
         raise ModelError(f"slope_angle is {value:g}: it must lie between 0 and 90 degrees")
-    given = exactly_one(force=force, approach=approach, radius=radius)
+    load = exactly_one(force=force, approach=approach, radius=radius)
     rise = math.tan(math.radians(value)) if name == "slope_angle" else value
-    return _solve(_modulus(E, nu), rise, 1.0, *given)
+    return _solve(_modulus(E, nu), rise, 1.0, *load)
 
 
 def paraboloid_punch(
@@ -290,8 +290,8 @@ def paraboloid_punch(
     >>> round(ball.radius, 9)  # sqrt(R * approach)
     1.0
     """
-    given = exactly_one(force=force, approach=approach, radius=radius)
-    return _solve(_modulus(E, nu), 0.5 / positive("R", R), 2.0, *given)
+    load = exactly_one(force=force, approach=approach, radius=radius)
+    return _solve(_modulus(E, nu), 0.5 / positive("R", R), 2.0, *load)
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ def entry_point() -> None:
         for stopped in STOPPED:  # later signals do not change the exit code
             with contextlib.suppress(ValueError):  # the system lacks this signal
                 signal.signal(stopped - 128, signal.SIG_IGN)
-        sys.unraisablehook = lambda found: None  # from finalisers of partly made objects
+        sys.unraisablehook = lambda ignored: None  # from finalisers of partly made objects
     else:
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # all output is done: Ctrl-C ends at once
     sys.exit(code)

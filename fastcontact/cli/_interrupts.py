@@ -39,8 +39,8 @@ def interruptible(raised: list[int] | None = None) -> Iterator[None]:
     """
     heard: list[float] = []  # times at which signals interrupted the block, unless the exception was lost
     raised = [] if raised is None else raised
-    ours = threading.current_thread() is threading.main_thread()
-    numbers = [number for number, usual in HANDLERS.items() if ours and signal.getsignal(number) == usual]
+    in_main_thread = threading.current_thread() is threading.main_thread()
+    numbers = [number for number, usual in HANDLERS.items() if in_main_thread and signal.getsignal(number) == usual]
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         if heard and time.monotonic() - heard[-1] < REPEATED:
@@ -96,7 +96,7 @@ def _lost_ones_come_again(raised: list[int], heard: list[float]) -> Iterator[Non
 
 def forget(error: BaseException | None) -> None:
     """Release the objects under construction when a command was interrupted: their finalisers may fail and print."""
-    before, sys.unraisablehook = sys.unraisablehook, lambda found: None
+    before, sys.unraisablehook = sys.unraisablehook, lambda ignored: None
     try:
         while error is not None:
             traceback.clear_frames(error.__traceback__)

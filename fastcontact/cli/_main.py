@@ -102,11 +102,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _told(sys.argv[1:] if argv is None else list(argv), raised)
 
 
-def _told(given: list[str], raised: list[int]) -> int:
+def _told(words: list[str], raised: list[int]) -> int:
     """Run a command; print an error and return its exit code. `raised` are the signals received."""
     try:
         with meant(raised):
-            return _run(given)
+            return _run(words)
     except ConvergenceError as error:
         say("\n".join([f"no convergence: {error}", *history_lines(error.history), *_notes(error)]), error=True)
         return 2
@@ -123,8 +123,8 @@ def _told(given: list[str], raised: list[int]) -> int:
         return CODES[number]
 
 
-def _run(given: list[str]) -> int:
-    arguments = parser(given[0] if given else None).parse_args(given or ["--help"])
+def _run(words: list[str]) -> int:
+    arguments = parser(words[0] if words else None).parse_args(words or ["--help"])
     handler = _Printable()
     log.handlers[:] = [handler]
     log.setLevel(logging.INFO if arguments.verbose else logging.WARNING)

@@ -111,8 +111,8 @@ def profile_picture(case: Any, step: StepResult, path: str) -> None:
     if not step.contact:
         raise FastcontactError("there is no contact pair whose pressure could be plotted")
     name, contact = next(iter(step.contact.items()))
-    given = {"approach": case.approach.get(name), "load": load_multiplier(case.ramp.table, step)}
-    curves = pressure_curves(case.theories.get(name, {}), contact, **given)
+    options = {"approach": case.approach.get(name), "load": load_multiplier(case.ramp.table, step)}
+    curves = pressure_curves(case.theories.get(name, {}), contact, **options)
     draw_profile(contact, step, curves, path, case.title)
 
 

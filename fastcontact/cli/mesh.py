@@ -59,8 +59,8 @@ def run(options: argparse.Namespace) -> int:
     check_outputs((), [options.output])
     make = GENERATORS[options.generator]
     names = inspect.signature(make).parameters
-    given = {name: value for name, value in vars(options).items() if name in names}
-    mesh = make(**{name: tuple(value) if isinstance(value, list) else value for name, value in given.items()})
+    arguments = {name: value for name, value in vars(options).items() if name in names}
+    mesh = make(**{name: tuple(value) if isinstance(value, list) else value for name, value in arguments.items()})
     write_mesh(options.output, mesh)
     if not options.quiet:
         say(quality(mesh))

@@ -124,8 +124,8 @@ def _of_contact(options: argparse.Namespace, results: Any, step: Any, case: dict
     if options.zones:
         return plot.contact_zones(list(results), name, **labels)
     if options.history:
-        given = {"approach": case["approach"].get(name), "share": theories.get("share", 1.0)}
-        return plot.history(list(results), name, law=_results.law(theories), **given, **labels)[0]
+        options_of_theory = {"approach": case["approach"].get(name), "share": theories.get("share", 1.0)}
+        return plot.history(list(results), name, law=_results.law(theories), **options_of_theory, **labels)[0]
     labels["title"] = f"{case['title']}\nstresses on the axis, load factor {step.load_factor:g}".strip()
     return plot.axis_stress(results.mesh, step, name, _axis_curves(theories, step, name, case), **labels)
 

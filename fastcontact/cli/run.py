@@ -107,13 +107,13 @@ def _checked_study(case: Case) -> list[str]:
 
 def _modes(options: argparse.Namespace, case: Case, last: StepResult) -> Any:
     """Return the modes requested by the case or the command, after writing them to their file; None for none."""
-    asked = {**(case.modes or {}), **_diameters(options.nodal_diameters)}
-    if case.modes is None and not options.modes and not asked:
+    arguments = {**(case.modes or {}), **_diameters(options.nodal_diameters)}
+    if case.modes is None and not options.modes and not arguments:
         return None
     from fastcontact.analysis.modes import modes
     from fastcontact.results.writer import ResultWriter
 
-    computed = modes(case.model, last, **{"linear_solver": options.linear or case.linear_solver, **asked})
+    computed = modes(case.model, last, **{"linear_solver": options.linear or case.linear_solver, **arguments})
     if options.modes:
         shapes, of = (computed, case.model) if computed.twins is None else (computed.whole_ring(),) * 2
         with ResultWriter(options.modes, of, case_text=case.text) as writer:

@@ -145,8 +145,8 @@ class Orthotropic(Material):
 
     def compliances(self, constants: Any) -> Array:
         """Return compliances (n, 6, 6) [1 / pressure] in the material's axes, of constants that may be arrays (n,)."""
-        given = np.broadcast_arrays(*map(np.atleast_1d, (*constants.E, *constants.nu, *constants.G)))
-        E1, E2, E3, nu12, nu13, nu23, G12, G13, G23 = given
+        values = np.broadcast_arrays(*map(np.atleast_1d, (*constants.E, *constants.nu, *constants.G)))
+        E1, E2, E3, nu12, nu13, nu23, G12, G13, G23 = values
         S = np.zeros((len(E1), 6, 6))
         for row, modulus in enumerate((E1, E2, E3, G12, G23, G13)):
             S[:, row, row] = 1 / modulus

@@ -268,8 +268,8 @@ def _cauchy(F, P, finite, out):
 
 
 @kernel
-def _assemble(local, slots, mine, data):
-    """Add the stiffness of a cell to `data` (n_blocks, dim, dim), in the rows of nodes that are `mine`.
+def _assemble(local, slots, inside, data):
+    """Add the stiffness of a cell to `data` (n_blocks, dim, dim), in the rows of nodes that are `inside`.
 
     The block of a node pair is the transpose of the opposite one, and a diagonal block is symmetric, up to round-off.
     """
@@ -280,9 +280,9 @@ def _assemble(local, slots, mine, data):
             for i in range(dim):
                 for k in range(dim):
                     value = local[b, k, i, a] if a != b or i <= k else local[b, i, k, a]
-                    if mine[a]:
+                    if inside[a]:
                         data[upper, i, k] += value
-                    if a != b and mine[b]:
+                    if a != b and inside[b]:
                         data[lower, k, i] += value
 
 
@@ -310,9 +310,9 @@ def linearise(
     F, G, thicker, pressure = np.empty((n_q, 3, 3)), np.empty((3, 3)), np.ones(n_q), np.empty(n_q)
     P, A, product, history = np.empty((3, 3)), np.empty((9, 9)), np.empty(9), np.empty(9)
     local, forces = np.empty((n_nodes, dim, dim, n_nodes)), np.empty((dim, n_nodes))
-    mass, projected, mine = np.empty((m, m)), np.empty((m, n_nodes * dim + 1)), np.empty(n_nodes, np.bool_)
+    mass, projected, inside = np.empty((m, m)), np.empty((m, n_nodes * dim + 1)), np.empty(n_nodes, np.bool_)
     for c in range(n_cells):
-        if not owned(cells, c, owner, part, mine):
+        if not owned(cells, c, owner, part, inside):
             continue
         at_nodes(points, cells, c, x)
         at_nodes(displacement, cells, c, u)
@@ -345,15 +345,15 @@ def linearise(
             _forces(gradient[q], hoop[q], volume[q], P, forces)
             if tangent:
                 _add_tangent(gradient[q], hoop[q], volume[q], A, product, local)
-            if mine[0]:
+            if inside[0]:
                 new[c, q] = history
                 _cauchy(F[q], P, finite, stress[c, q])
-        if mine[0]:
+        if inside[0]:
             energy[c, 0], energy[c, 1] = stored, dissipated
         for b in range(n_nodes):
-            if mine[b]:
+            if inside[b]:
                 for i in range(dim):
                     force[cells[c, b], i] += forces[i, b]
         if tangent:
-            _assemble(local, slots[c], mine, data)
+            _assemble(local, slots[c], inside, data)
     return 0, -1

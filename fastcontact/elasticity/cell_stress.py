@@ -138,9 +138,9 @@ class CellStress:
         loops.stress(self._mesh.points, cells, N, dN, unit, first, *shared, strain)
         weights = beside(name, xi)
         for rows in range(0, len(cells), VARYING):
-            part = slice(rows, rows + VARYING)
-            local = np.einsum("nq,cqij->cnij", weights, moduli[material[part]], optimize=True)
-            out[part] = np.einsum("cnij,cnj->cni", local, strain[part])
+            portion = slice(rows, rows + VARYING)
+            local = np.einsum("nq,cqij->cnij", weights, moduli[material[portion]], optimize=True)
+            out[portion] = np.einsum("cnij,cnj->cni", local, strain[portion])
 
     def _add_modes(
         self, at: tuple[str, Array, Array], cells: Numbers, material: Numbers, out: Array,
@@ -196,8 +196,8 @@ class CellStress:
         at_points = offset.initial("strain", name, rows[of_bulk], elements.get(name).tables[0])
         assert at_points is not None
         dilatations = at_points[:, :, :3].sum(axis=2)
-        parts = dilatation.projected(name, self._mesh.points[cells[of_bulk]], dilatations, xi, self._axisymmetric)
-        out[of_bulk, :, :3] -= (bulk[of_bulk][:, :, None] * parts).sum(axis=1)[:, :, None]
+        projections = dilatation.projected(name, self._mesh.points[cells[of_bulk]], dilatations, xi, self._axisymmetric)
+        out[of_bulk, :, :3] -= (bulk[of_bulk][:, :, None] * projections).sum(axis=1)[:, :, None]
 
     def _subtract_thermal(
         self,
@@ -221,6 +221,6 @@ class CellStress:
         if split is not None and projected.any():
             members, numbers = cells[projected], material[projected]
             heat = thermal.rise[members] @ element.tables[0].T
-            parts = dilatation.projected(name, self._mesh.points[members], heat, xi, self._axisymmetric)
-            pressure = (split.bulk[numbers] * 3.0 * thermal.expansion[numbers, None])[:, :, None] * parts
+            projections = dilatation.projected(name, self._mesh.points[members], heat, xi, self._axisymmetric)
+            pressure = (split.bulk[numbers] * 3.0 * thermal.expansion[numbers, None])[:, :, None] * projections
             out[projected, :, :3] -= pressure.sum(axis=1)[:, :, None]

@@ -295,9 +295,9 @@ def _ogden(constants, F, P, A):
             normal = (gamma[a, b] - (2.0 * beta[a] if a == b else 0.0)) / (squared[a] * squared[b])
             shear = 0.0
             if a != b:
-                apart = squared[b] - squared[a]
-                if abs(apart) > EQUAL * squared[b]:
-                    shear = (beta[b] / squared[b] - beta[a] / squared[a]) / apart
+                difference = squared[b] - squared[a]
+                if abs(difference) > EQUAL * squared[b]:
+                    shear = (beta[b] / squared[b] - beta[a] / squared[a]) / difference
                 else:
                     shear = 0.5 * (gamma[b, b] - 2.0 * beta[b] - gamma[a, b]) / (squared[b] * squared[b])
             for row in range(9):

@@ -39,13 +39,13 @@ class Stiffness:
 
     def __matmul__(self, u: Array) -> Array:
         total = np.asarray(self.parts[0] @ u)
-        for part in self.parts[1:]:
-            total += part @ u
+        for matrix in self.parts[1:]:
+            total += matrix @ u
         return total
 
     def row_sums(self, u: Array) -> Array:
         """Return ``|K| |u|``, shape (n,), summed over the parts, which bounds the round-off of ``K u`` [force]."""
-        return np.sum([_row_sums(part, u) for part in self.parts], axis=0)
+        return np.sum([_row_sums(matrix, u) for matrix in self.parts], axis=0)
 
 
 def _row_sums(K: Any, u: Array) -> Array:
@@ -95,13 +95,13 @@ class System:
         related[R.indices] = True
         if without_stiffness is None:
             without_stiffness = np.zeros(K.shape[0], bool)
-        given = diagonal_of(K)
-        self.fixed: Mask = supported | ((given == 0.0) & ~related & ~without_stiffness)
+        diagonal = diagonal_of(K)
+        self.fixed: Mask = supported | ((diagonal == 0.0) & ~related & ~without_stiffness)
         self._reacting: Mask = self.fixed | related  # supports and constraints may exert forces here
         self._constraints = ConstrainedMotion(self.fixed, relations)
         self.T = self._constraints.T if relations else None
         self._without_stiffness = without_stiffness
-        self._take(K, given)
+        self._take(K, diagonal)
 
     def renewed(self, K: bsr_array) -> System:
         """Return the system with another stiffness K (n, n), which is modified in the same way."""
@@ -232,9 +232,9 @@ class ConstrainedMotion:
         known: Array = np.where(self.fixed, prescribed, 0.0)
         if not self.relations:
             return known
-        given = np.concatenate([known, values])
-        off = np.abs(self._elimination.conditions @ given)
-        scale = np.abs(self._elimination.conditions) @ np.abs(given)
+        values_of_dofs = np.concatenate([known, values])
+        off = np.abs(self._elimination.conditions @ values_of_dofs)
+        scale = np.abs(self._elimination.conditions) @ np.abs(values_of_dofs)
         wrong = np.flatnonzero(off > CONFLICT * scale)
         if len(wrong):
             raise ModelError(
@@ -264,17 +264,17 @@ def supports_apart(K: bsr_array, fixed: Mask, diagonal: Array | None = None) -> 
     K = _with_diagonal(K)
     if diagonal is None:
         diagonal = diagonal_of(K)
-    kept = np.where(diagonal > 0, diagonal, diagonal.max(initial=1.0))
+    pivots = np.where(diagonal > 0, diagonal, diagonal.max(initial=1.0))
     supported = fixed.reshape(-1, K.blocksize[0])
-    given = K.indptr, K.indices, K.data, supported, supported.any(axis=1), kept
+    arguments = K.indptr, K.indices, K.data, supported, supported.any(axis=1), pivots
     parts, start = parallel.portions(len(supported)), np.zeros(K.shape[0] + 1, np.int32)
-    columns, taken = np.empty(0, np.int32), np.empty(0)
-    parallel.shared(lambda part: system_kernels.take_out(*given, *part, start, columns, taken, False), parts)
+    columns, removed = np.empty(0, np.int32), np.empty(0)
+    parallel.shared(lambda part: system_kernels.take_out(*arguments, *part, start, columns, removed, False), parts)
     np.cumsum(start, out=start)
-    columns, taken = np.empty(start[-1], np.int32), np.empty(start[-1])
-    if len(taken):
-        parallel.shared(lambda part: system_kernels.take_out(*given, *part, start, columns, taken, True), parts)
-    return K, csr_array((taken, columns, start), shape=K.shape)
+    columns, removed = np.empty(start[-1], np.int32), np.empty(start[-1])
+    if len(removed):
+        parallel.shared(lambda part: system_kernels.take_out(*arguments, *part, start, columns, removed, True), parts)
+    return K, csr_array((removed, columns, start), shape=K.shape)
 
 
 def diagonal_of(K: bsr_array) -> Array:

@@ -64,8 +64,8 @@ def split(name: str, moduli: Array, averaged: Mask | None) -> Split | None:
     bulk = np.where(averaged, moduli[:, :3, :3].sum(axis=(1, 2)) / 9.0, 0.0)
     deviatoric = moduli.copy()
     deviatoric[:, :3, :3] -= bulk[:, None, None]
-    whole = elements.get(name).dilatation == elements.get(name).order - 1
-    rest = bulk if whole else np.minimum(bulk, REMAINDER * moduli[:, 3, 3])
+    complete = elements.get(name).dilatation == elements.get(name).order - 1
+    rest = bulk if complete else np.minimum(bulk, REMAINDER * moduli[:, 3, 3])
     return Split(deviatoric, np.column_stack([bulk, rest]))
 
 

@@ -79,14 +79,14 @@ def back_substitute(L, y):
 
 
 @kernel
-def add_products(factors, g, slots, c, mine, row, data):
-    """Add ``g^T diag(factors) g`` of a cell, `g` (m, n_nodes * dim), to the rows of the nodes that are `mine` in `data`.
+def add_products(factors, g, slots, c, inside, row, data):
+    """Add ``g^T diag(factors) g`` of a cell, `g` (m, n_nodes * dim), to the rows of the nodes that are `inside` in `data`.
 
     `row` (n_nodes * dim,) is overwritten.
     """
-    n_nodes, dim = len(mine), data.shape[1]
+    n_nodes, dim = len(inside), data.shape[1]
     for a in range(n_nodes):
-        if not mine[a]:
+        if not inside[a]:
             continue
         for i in range(dim):
             row[:] = 0.0
@@ -109,15 +109,15 @@ def add_stiffness(points, cells, N, dN, weights, basis, bulk, material, axisymme
     x, gradient = np.empty((n_nodes, dim)), np.empty((n_nodes, dim))
     J, inverse = np.empty((dim, dim)), np.empty((dim, dim))
     mass, g, factors = np.empty((size, size)), np.empty((size, n_nodes * dim)), np.empty(size)
-    row, mine = np.empty(n_nodes * dim), np.empty(n_nodes, np.bool_)
+    row, inside = np.empty(n_nodes * dim), np.empty(n_nodes, np.bool_)
     for c in range(n_cells):
         factors[:], factors[0] = bulk[material[c], 1], bulk[material[c], 0]
-        if factors[0] == 0.0 or not owned(cells, c, owner, part, mine):
+        if factors[0] == 0.0 or not owned(cells, c, owner, part, inside):
             continue
         at_nodes(points, cells, c, x)
         _integrate(x, N, dN, weights, basis, axisymmetric, J, inverse, gradient, mass, g)
         reduce(mass, g)
-        add_products(factors, g, slots, c, mine, row, data)
+        add_products(factors, g, slots, c, inside, row, data)
 
 
 @kernel

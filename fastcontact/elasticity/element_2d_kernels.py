@@ -34,12 +34,12 @@ def _map(points, cell, N, dN, q, gradient):
 
 
 @kernel
-def owned(cells, c, owner, part, mine):
-    """Fill `mine` (n_nodes,) with whether the nodes of a cell have the owner `part`; return whether any has."""
+def owned(cells, c, owner, part, inside):
+    """Fill `inside` (n_nodes,) with whether the nodes of a cell have the owner `part`; return whether any has."""
     is_owned = False
     for a in range(cells.shape[1]):
-        mine[a] = owner[cells[c, a]] == part
-        is_owned = is_owned or mine[a]
+        inside[a] = owner[cells[c, a]] == part
+        is_owned = is_owned or inside[a]
     return is_owned
 
 
@@ -82,9 +82,9 @@ def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, ax
     n_cells, n_nodes = cells.shape
     gradient = np.empty((n_nodes, 2))
     local = np.empty((n_nodes, n_nodes, 2, 2))
-    mine = np.empty(n_nodes, np.bool_)
+    inside = np.empty(n_nodes, np.bool_)
     for c in range(n_cells):
-        if not owned(cells, c, owner, part, mine):
+        if not owned(cells, c, owner, part, inside):
             continue
         local[:] = 0.0
         if not _cell(points, cells[c], N, dN, weights, moduli[material[c]], axisymmetric, gradient, local):
@@ -93,11 +93,11 @@ def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, ax
             local[b, b, 1, 0] = local[b, b, 0, 1]  # equal up to round-off; keeps K bitwise symmetric
             for a in range(b + 1):
                 upper, lower = slots[c, a, b], slots[c, b, a]
-                if mine[a]:
+                if inside[a]:
                     for i in range(2):
                         for j in range(2):
                             data[upper, i, j] += local[a, b, i, j]
-                if a != b and mine[b]:
+                if a != b and inside[b]:
                     for i in range(2):
                         for j in range(2):
                             data[lower, j, i] += local[a, b, i, j]

@@ -103,7 +103,7 @@ def _add_isotropic_block(flat, pair, at_upper, at_lower, upper, lower, coupling,
 
 
 @kernel
-def _add_isotropic(g, coupling, shear, slots, c, mine, flat):
+def _add_isotropic(g, coupling, shear, slots, c, inside, flat):
     """Add the blocks of a cell for Lame's constants, given the integrals of `_integrate_products`."""
     for b in range(g.shape[1]):
         for a in range(b + 1):
@@ -111,12 +111,12 @@ def _add_isotropic(g, coupling, shear, slots, c, mine, flat):
                 g[0, a, b], g[3, a, b], g[5, a, b], g[1, a, b], g[2, a, b], g[4, a, b], g[1, b, a], g[2, b, a], g[4, b, a],
             )  # fmt: skip
             _add_isotropic_block(
-                flat, a != b, mine[a], mine[b], slots[c, a, b], slots[c, b, a], coupling, shear, products
+                flat, a != b, inside[a], inside[b], slots[c, a, b], slots[c, b, a], coupling, shear, products
             )
 
 
 @kernel
-def _add_general(g, tensor, products, block, slots, c, mine, flat):
+def _add_general(g, tensor, products, block, slots, c, inside, flat):
     """Add the blocks of a cell for any moduli: K_ij = D_ikjl g_kl; `products` and `block` (9,) are overwritten."""
     for b in range(g.shape[1]):
         for a in range(b + 1):
@@ -130,11 +130,11 @@ def _add_general(g, tensor, products, block, slots, c, mine, flat):
                 block[row] = total
             if a == b:  # equal up to round-off; keeps K bitwise symmetric
                 block[3], block[6], block[7] = block[1], block[2], block[5]
-            _add_block(flat, mine[a], mine[b], slots[c, a, b], slots[c, b, a], block)
+            _add_block(flat, inside[a], inside[b], slots[c, a, b], slots[c, b, a], block)
 
 
 @kernel
-def _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, mine, gradient, flat):
+def _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, inside, gradient, flat):
     """Add the blocks of a linear tetrahedron for Lame's constants: its gradients (4, 3) are constant.
 
     `volume` is that of the reference cell. Returns whether the Jacobian is positive. Loops over exactly four nodes
@@ -161,7 +161,7 @@ def _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, mine, gra
             x, y, z = gradient[a, 0], gradient[a, 1], gradient[a, 2]
             products = x * gx, y * gy, z * gz, x * gy, x * gz, y * gz, y * gx, z * gx, z * gy
             _add_isotropic_block(
-                flat, a != b, mine[a], mine[b], slots[c, a, b], slots[c, b, a], coupling, shear, products
+                flat, a != b, inside[a], inside[b], slots[c, a, b], slots[c, b, a], coupling, shear, products
             )
     return True
 
@@ -177,28 +177,28 @@ def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, ax
     """
     n_cells, n_nodes = cells.shape
     slopes, x, gradient = transposed(dN), np.empty((3, n_nodes)), np.empty((3, n_nodes))
-    g, mine, corners = np.empty((6, n_nodes, n_nodes)), np.empty(n_nodes, np.bool_), np.empty((4, 3))
+    g, inside, corners = np.empty((6, n_nodes, n_nodes)), np.empty(n_nodes, np.bool_), np.empty((4, 3))
     tensor, products, block = np.empty((9, 9)), np.empty(9), np.empty(9)
     volume = 0.0
     for weight in weights:
         volume += weight
     flat = data.reshape(-1)
     for c in range(n_cells):
-        if not owned(cells, c, owner, part, mine):
+        if not owned(cells, c, owner, part, inside):
             continue
         coupling, shear = moduli[material[c], 0, 1], moduli[material[c], 3, 3]
         if n_nodes == 4 and isotropic[material[c]]:
-            if not _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, mine, corners, flat):
+            if not _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, inside, corners, flat):
                 return c
             continue
         _gather(points, cells, c, x)
         if not _integrate_products(x, slopes, weights, gradient, g):
             return c
         if isotropic[material[c]]:
-            _add_isotropic(g, coupling, shear, slots, c, mine, flat)
+            _add_isotropic(g, coupling, shear, slots, c, inside, flat)
         else:
             _tensor(moduli[material[c]], tensor)
-            _add_general(g, tensor, products, block, slots, c, mine, flat)
+            _add_general(g, tensor, products, block, slots, c, inside, flat)
     return -1
 
 

@@ -39,18 +39,18 @@ def _modes(xi, q, inverse, ratio, pairs, M):
 
 
 @kernel
-def _integrate(x, dN, xi, weights, middle, pairs, moduli, numbers, own, mixed):
-    """Fill `own` (n_modes, n_modes) and `mixed` (n_modes, n_nodes * dim) of the cell with the nodes `x` (n_nodes, dim)."""
-    dim, n_modes = x.shape[1], own.shape[0]
+def _integrate(x, dN, xi, weights, middle, pairs, moduli, numbers, modal, mixed):
+    """Fill `modal` (n_modes, n_modes) and `mixed` (n_modes, n_nodes * dim) of the cell with the nodes `x` (n_nodes, dim)."""
+    dim, n_modes = x.shape[1], modal.shape[0]
     J, inverse, at_middle = np.empty((dim, dim)), np.empty((dim, dim)), np.empty((dim, dim))
     M, S = np.empty((moduli.shape[1], n_modes)), np.empty((moduli.shape[1], n_modes))
     gradient = np.empty(x.shape)
-    whole = inverse_jacobian(x, middle, 0, J, at_middle)
-    own[:] = 0.0
+    middle_det = inverse_jacobian(x, middle, 0, J, at_middle)
+    modal[:] = 0.0
     mixed[:] = 0.0
     for q in range(weights.shape[0]):
         det = inverse_jacobian(x, dN, q, J, inverse)
-        _modes(xi, q, at_middle, whole / det, pairs, M)
+        _modes(xi, q, at_middle, middle_det / det, pairs, M)
         D = moduli[numbers[q % numbers.shape[0]]]
         for c in range(M.shape[0]):
             for m in range(n_modes):
@@ -64,7 +64,7 @@ def _integrate(x, dN, xi, weights, middle, pairs, moduli, numbers, own, mixed):
             for m in range(n_modes):
                 if M[c, m] != 0.0:
                     for n in range(m + 1):
-                        own[m, n] += M[c, m] * S[c, n]
+                        modal[m, n] += M[c, m] * S[c, n]
         gradients(dN, q, inverse, gradient)
         for a in range(x.shape[0]):
             for i in range(dim):
@@ -84,15 +84,15 @@ def subtract_stiffness(
     n_cells, n_nodes = cells.shape
     dim = points.shape[1]
     n_modes = 4 if dim == 2 else 13
-    x, row, mine = np.empty((n_nodes, dim)), np.empty(n_nodes * dim), np.empty(n_nodes, np.bool_)
-    own, mixed, factors = np.empty((n_modes, n_modes)), np.empty((n_modes, n_nodes * dim)), np.full(n_modes, -1.0)
+    x, row, inside = np.empty((n_nodes, dim)), np.empty(n_nodes * dim), np.empty(n_nodes, np.bool_)
+    modal, mixed, factors = np.empty((n_modes, n_modes)), np.empty((n_modes, n_nodes * dim)), np.full(n_modes, -1.0)
     for c in range(n_cells):
-        if not bends[material[c, 0]] or not owned(cells, c, owner, part, mine):
+        if not bends[material[c, 0]] or not owned(cells, c, owner, part, inside):
             continue
         at_nodes(points, cells, c, x)
-        _integrate(x, dN, xi, weights, middle, pairs, moduli, material[c], own, mixed)
-        reduce(own, mixed)
-        add_products(factors, mixed, slots, c, mine, row, data)
+        _integrate(x, dN, xi, weights, middle, pairs, moduli, material[c], modal, mixed)
+        reduce(modal, mixed)
+        add_products(factors, mixed, slots, c, inside, row, data)
 
 
 @kernel
@@ -109,7 +109,7 @@ def add_stress(
     dim, size = points.shape[1], moduli.shape[1]
     n_modes = 4 if dim == 2 else 13
     x, u = np.empty((n_nodes, dim)), np.empty((n_nodes, dim))
-    own, mixed, force = np.empty((n_modes, n_modes)), np.empty((n_modes, n_nodes * dim)), np.empty((n_modes, 1))
+    modal, mixed, force = np.empty((n_modes, n_modes)), np.empty((n_modes, n_nodes * dim)), np.empty((n_modes, 1))
     J, inverse, at_middle = np.empty((dim, dim)), np.empty((dim, dim)), np.empty((dim, dim))
     M, strain = np.empty((size, n_modes)), np.empty(size)
     for c in range(n_cells):
@@ -117,8 +117,8 @@ def add_stress(
             continue
         at_nodes(points, cells, c, x)
         at_nodes(displacement, cells, c, u)
-        _integrate(x, dN, xi, weights, middle, pairs, moduli, material[c], own, mixed)
-        whole = inverse_jacobian(x, middle, 0, J, at_middle)
+        _integrate(x, dN, xi, weights, middle, pairs, moduli, material[c], modal, mixed)
+        middle_det = inverse_jacobian(x, middle, 0, J, at_middle)
         for m in range(n_modes):
             force[m, 0] = 0.0
             for k in range(n_nodes * dim):
@@ -126,15 +126,15 @@ def add_stress(
         if lost.shape[0]:
             for q in range(weights.shape[0]):
                 det = inverse_jacobian(x, dN, q, J, inverse)
-                _modes(xi, q, at_middle, whole / det, pairs, M)
+                _modes(xi, q, at_middle, middle_det / det, pairs, M)
                 for e in range(size):
                     for m in range(n_modes):
                         force[m, 0] += det * weights[q] * M[e, m] * lost[c, q, e]
-        reduce(own, force)
-        back_substitute(own, force[:, 0])
+        reduce(modal, force)
+        back_substitute(modal, force[:, 0])
         for k in range(at.shape[0]):
             det = inverse_jacobian(x, slopes, k, J, inverse)
-            _modes(at, k, at_middle, whole / det, pairs, M)
+            _modes(at, k, at_middle, middle_det / det, pairs, M)
             for e in range(size):
                 strain[e] = 0.0
                 for m in range(n_modes):

@@ -348,12 +348,12 @@ def axes_of(caption: str, components: Mapping[str, Any], dim: int) -> dict[int, 
 
     Raises ModelError if there is none, or there is no such axis.
     """
-    given = {name: value for name, value in components.items() if value is not None}
-    if not given:
+    chosen = {name: value for name, value in components.items() if value is not None}
+    if not chosen:
         raise ModelError(f"{caption} has no component: give for example y=-1.0")
-    for name in given:
+    for name in chosen:
         check_known("component", name, "xyz"[:dim], ModelError, f"{caption}: ")
-    return {"xyz".index(name): value for name, value in given.items()}
+    return {"xyz".index(name): value for name, value in chosen.items()}
 
 
 def _places(mesh: Mesh, element: str, cells: Numbers) -> tuple[Array, Array, Array, Array]:

@@ -217,8 +217,8 @@ class Material:
         size = 6 if kinematics == "3d" else 4
         if self.expansion is None:
             return np.full((len(points), size), np.nan)
-        given = (self if constants is None else constants).expansion
-        along, tensor = self._along_axes(given, points, kinematics, constants)
+        expansion = (self if constants is None else constants).expansion
+        along, tensor = self._along_axes(expansion, points, kinematics, constants)
         strain = np.stack([tensor[:, i, j] * (1.0 if i == j else 2.0) for i, j in PAIRS], axis=1)
         if np.abs(strain[:, size:]).max(initial=0.0) > ROUND_OFF * np.abs(along).max(initial=0.0):
             raise ModelError(
@@ -232,10 +232,10 @@ class Material:
 
         `constants` are those of `constants_at` there. ModelError if inclined axes conduct heat out of the plane.
         """
-        given, dim = constants.conductivity, points.shape[1]
-        if not isinstance(given, tuple):
-            return np.broadcast_to(given, len(points))[:, None, None] * np.eye(dim)
-        along, tensor = self._along_axes(given, points, kinematics, constants)
+        conductivity, dim = constants.conductivity, points.shape[1]
+        if not isinstance(conductivity, tuple):
+            return np.broadcast_to(conductivity, len(points))[:, None, None] * np.eye(dim)
+        along, tensor = self._along_axes(conductivity, points, kinematics, constants)
         if np.abs(tensor[:, :dim, dim:]).max(initial=0.0) > ROUND_OFF * along.max(initial=0.0):
             raise ModelError(
                 f"the conductivity of the material with {self.described} turns heat out of the plane: turn one axis along z, "
@@ -243,11 +243,11 @@ class Material:
             )
         return np.asarray(tensor[:, :dim, :dim])
 
-    def _along_axes(self, given: Any, points: Array, kinematics: str, constants: Any) -> tuple[Array, Array]:
-        """Return values (n, 3) along the material's axes, from one or three `given`, and the tensors (n, 3, 3)."""
+    def _along_axes(self, values: Any, points: Array, kinematics: str, constants: Any) -> tuple[Array, Array]:
+        """Return constants (n, 3) along the material's axes, from one or three `values`, and the tensors (n, 3, 3)."""
         along, axes = np.empty((len(points), 3)), self._frames(points, kinematics, constants)
         for axis in range(3):
-            along[:, axis] = given[axis] if isinstance(given, tuple) else given
+            along[:, axis] = values[axis] if isinstance(values, tuple) else values
         return along, np.einsum("nai,na,naj->nij", axes, along, axes)
 
     def _frames(self, points: Array, kinematics: str, constants: Any) -> Array:
@@ -455,8 +455,8 @@ class LinearElastic(Material):
 
     def moduli_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
         """Return the moduli (n, 4, 4), in 3D (n, 6, 6) [pressure] at `points` (n, dim) [length]; see `Material.moduli_at`."""
-        given = self if constants is None else constants
-        E, nu = (np.broadcast_to(np.asarray(value, float), len(points)) for value in (given.E, given.nu))
+        source = self if constants is None else constants
+        E, nu = (np.broadcast_to(np.asarray(value, float), len(points)) for value in (source.E, source.nu))
         return isotropic_moduli(E, nu, kinematics)
 
 

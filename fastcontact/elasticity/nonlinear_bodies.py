@@ -108,10 +108,10 @@ class NonlinearBodies:
         bulk[:, 1] = self._constants[:, 2]
         of_hooke = np.isin(self._constants[:, 0], (LINEAR, SAINT_VENANT))
         projected = self._averaged & (element.dilatation is not None) & (self._constants[:, 0] != SAINT_VENANT)
-        whole = moduli[:, :3, :3].sum(axis=(1, 2)) / 9.0
-        taken = np.where(projected & of_hooke, whole, 0.0)
-        moduli[:, :3, :3] -= taken[:, None, None]
-        bulk[:, 1] += taken
+        bulk_moduli = moduli[:, :3, :3].sum(axis=(1, 2)) / 9.0
+        removed = np.where(projected & of_hooke, bulk_moduli, 0.0)
+        moduli[:, :3, :3] -= removed[:, None, None]
+        bulk[:, 1] += removed
         shear = np.where(of_hooke, moduli[:, 3, 3], self._constants[:, 1])
         rest = 0.0 if element.dilatation == element.order - 1 else np.minimum(bulk[:, 1], REMAINDER * shear)
         bulk[projected] = np.column_stack([bulk[:, 1] - rest, np.broadcast_to(rest, len(bulk))])[projected]
@@ -145,13 +145,13 @@ class NonlinearBodies:
             polynomials = np.ascontiguousarray(dilatation.basis(name, elements.get(name).quadrature[0]))
             if (bulk[:, 1] > 0.0).any():  # the remainder is not a linear function
                 polynomials = polynomials[:, :1].copy() if elements.get(name).dilatation == 0 else polynomials
-            owner, parts = pattern.owners(mesh, name)
+            owner, row_ranges = pattern.owners(mesh, name)
             new, cauchy = np.empty_like(before[name]), np.empty((*before[name].shape[:2], 6 if dim == 3 else 4))
             energies, numbers = np.zeros((len(cells), 2)), self._cells[name]
             slots, old = pattern.slots[name], before[name]
 
             def part(number: int) -> tuple[int, int]:
-                rows = slice(*parts[number])  # noqa: B023
+                rows = slice(*row_ranges[number])  # noqa: B023
                 status, cell = body_kernels.linearise(
                     mesh.points, cells[rows], N, dN, weights, polynomials, *flags, displacement, self._constants, moduli,  # noqa: B023
                     bulk, self._expansion, degrees, numbers[rows], old[rows], slots[rows], owner, number, data, force,  # noqa: B023
@@ -159,7 +159,7 @@ class NonlinearBodies:
                 )  # fmt: skip
                 return status, int(cell) + rows.start
 
-            for status, cell in parallel.shared(part, range(len(parts))):
+            for status, cell in parallel.shared(part, range(len(row_ranges))):
                 if status:
                     raise ConvergenceError(self._failure(status, name, cell, displacement))
             history[name], stress[name] = new, cauchy
@@ -271,13 +271,13 @@ def _six_by_six(moduli: Array) -> Array:
     """Return moduli (n, 6, 6), extended from plane-strain moduli (n, 4, 4) if necessary."""
     if moduli.shape[1] == 6:
         return np.ascontiguousarray(moduli)
-    whole = np.zeros((len(moduli), 6, 6))
-    whole[:, :4, :4] = moduli
-    return whole
+    full = np.zeros((len(moduli), 6, 6))
+    full[:, :4, :4] = moduli
+    return full
 
 
 def _at_points(numbers: Numbers, name: str) -> Numbers:
     """Return the moduli numbers of every quadrature point (n_cells, n_q) from those of cells or points."""
     n_q = len(elements.get(name).quadrature[1])
-    whole = numbers[:, None] if numbers.ndim == 1 else numbers
-    return np.ascontiguousarray(np.broadcast_to(whole, (len(whole), n_q)))
+    columns = numbers[:, None] if numbers.ndim == 1 else numbers
+    return np.ascontiguousarray(np.broadcast_to(columns, (len(columns), n_q)))

@@ -106,10 +106,10 @@ class NodalAverage:
 
         The matrix `extrapolation` (n_nodes, n_q) [-] maps values at the points to values at the nodes.
         """
-        given = parallel.read_only(cells), extrapolation, values
+        arguments = parallel.read_only(cells), extrapolation, values
         into = self._total, self._count
         # For any dimension and number of components.
-        parallel.shared(lambda part: element_2d_kernels.add_nodal(*given, *part, *into), self._parts(cells))
+        parallel.shared(lambda portion: element_2d_kernels.add_nodal(*arguments, *portion, *into), self._parts(cells))
 
     def _parts(self, cells: Numbers) -> list[tuple[int, int]]:
         """Return ranges of nodes with about equal numbers of cells: each thread adds at its own nodes."""

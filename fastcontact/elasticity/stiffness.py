@@ -67,12 +67,12 @@ def sparsity(mesh: Mesh) -> Sparsity:
     start = np.cumsum(sizes, dtype=np.int64)
     nodes = np.concatenate([np.empty(0, np.int32), *(b.ravel() for b in blocks.values())])
     first, cells = pattern_kernels.cells_at_nodes(start, nodes, mesh.n_points)
-    given, parts = (start, nodes, first, cells), parallel.portions(mesh.n_points)
+    arguments, portions = (start, nodes, first, cells), parallel.portions(mesh.n_points)
     count = np.empty(mesh.n_points, np.int32)
-    parallel.shared(lambda part: pattern_kernels.count_neighbours(*given, *part, count), parts)
+    parallel.shared(lambda portion: pattern_kernels.count_neighbours(*arguments, *portion, count), portions)
     indptr = np.concatenate([[0], np.cumsum(count)]).astype(np.int32)
     indices = np.empty(indptr[-1], np.int32)
-    parallel.shared(lambda part: pattern_kernels.neighbours(*given, *part, indptr, indices), parts)
+    parallel.shared(lambda portion: pattern_kernels.neighbours(*arguments, *portion, indptr, indices), portions)
     return Sparsity(indptr, indices, {name: _slots(block, indptr, indices) for name, block in blocks.items()})
 
 
@@ -80,8 +80,8 @@ def _slots(cells: Numbers, indptr: Numbers, indices: Numbers) -> Numbers:
     """Return the `slots` of `Sparsity` for one element."""
     slots = np.empty((*cells.shape, cells.shape[1]), np.int32)
 
-    def find(part: tuple[int, int]) -> None:
-        rows = slice(*part)
+    def find(portion: tuple[int, int]) -> None:
+        rows = slice(*portion)
         pattern_kernels.find_slots(cells[rows], indptr, indices, slots[rows])
 
     parallel.shared(find, parallel.portions(*cells.shape))
@@ -188,8 +188,8 @@ def _add_part(
     number of the first cell with a Jacobian that is not positive, or -1.
     """
     (D, isotropic, split, bends), tables = moduli, elements.get(name).tables
-    owner, parts = pattern.owners(mesh, name)
-    rows = slice(*parts[number])
+    owner, row_ranges = pattern.owners(mesh, name)
+    rows = slice(*row_ranges[number])
     cells, material, slots = mesh.cells[name][rows], material[rows], pattern.slots[name][rows]
     target = axisymmetric, slots, owner, number, data
     for tables_of_pass, numbers in _passes(tables, material):

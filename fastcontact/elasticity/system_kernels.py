@@ -16,7 +16,7 @@ def _near(i, indptr, indices, supported_nodes):
 
 
 @interpretable_kernel
-def take_out(indptr, indices, data, supported, supported_nodes, kept, low, high, start, columns, taken, moves):
+def take_out(indptr, indices, data, supported, supported_nodes, pivots, low, high, start, columns, removed, moves):
     """Move rows and columns of supports from `data` to (start, columns, taken), compressed rows of single numbers.
 
     Parameters
@@ -43,10 +43,10 @@ def take_out(indptr, indices, data, supported, supported_nodes, kept, low, high,
                 j = indices[k]
                 for b in range(size):
                     if supported[i, a] or supported[j, b]:
-                        stays = kept[row] if size * j + b == row else 0.0
+                        stays = pivots[row] if size * j + b == row else 0.0
                         if data[k, a, b] != stays:
                             if moves:
-                                columns[at], taken[at], data[k, a, b] = size * j + b, data[k, a, b] - stays, stays
+                                columns[at], removed[at], data[k, a, b] = size * j + b, data[k, a, b] - stays, stays
                             at += 1
             if not moves:
                 start[row + 1] = at

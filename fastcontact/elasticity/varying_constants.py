@@ -139,32 +139,32 @@ class Varying:
         low, high = self.range
         return f"{low:{spec}} to {high:{spec}}"
 
-    def _place(self, given: Array, cells: Cells) -> None:
+    def _place(self, values: Array, cells: Cells) -> None:
         """Determine from its length whether an array is by cell or by point."""
         mesh = cells.mesh
         total = sum(map(len, mesh.solids.values()))
         lengths = {"cells": cells.count, "solid cells of the mesh": total, "points of the mesh": mesh.n_points}
         counts = ", ".join(f"{count} {unit}" for unit, count in lengths.items())
-        column = given.ndim == 2 and given.shape[1] == 1
+        column = values.ndim == 2 and values.shape[1] == 1
         if column:
-            given = given[:, 0]
+            values = values[:, 0]
             del lengths["points of the mesh"]
-        if given.ndim != 1 or given.dtype.kind not in "fiu" or len(given) not in lengths.values():
+        if values.ndim != 1 or values.dtype.kind not in "fiu" or len(values) not in lengths.values():
             raise ModelError(
-                f"{self._name} is an array of {given.dtype} of shape {given.shape}: it must have a number for each cell of "
+                f"{self._name} is an array of {values.dtype} of shape {values.shape}: it must have a number for each cell of "
                 f"the material or of the mesh, or for each point ({counts})"
             )
-        if not column and len(given) == mesh.n_points and len(given) in (cells.count, total):
+        if not column and len(values) == mesh.n_points and len(values) in (cells.count, total):
             raise ModelError(
-                f"{self._name} has {len(given)} numbers, and there are as many cells as points: give those of cells as a "
+                f"{self._name} has {len(values)} numbers, and there are as many cells as points: give those of cells as a "
                 "column, shape (n, 1), those of points as a function"
             )
-        if not np.isfinite(given).all():
-            raise ModelError(f"{self._name} is not finite at row {int(np.flatnonzero(~np.isfinite(given))[0])}")
-        if len(given) == mesh.n_points and not column:
-            self._nodal = given.astype(float)
+        if not np.isfinite(values).all():
+            raise ModelError(f"{self._name} is not finite at row {int(np.flatnonzero(~np.isfinite(values))[0])}")
+        if len(values) == mesh.n_points and not column:
+            self._nodal = values.astype(float)
             return
-        self._by_cell = _by_cell(given, cells)
+        self._by_cell = _by_cell(values, cells)
 
     @property
     def inside(self) -> bool:
@@ -199,15 +199,15 @@ class CellAxes(Varying):
     One for each cell of the material, or of the mesh.
     """
 
-    def _place(self, given: Array, cells: Cells) -> None:
+    def _place(self, values: Array, cells: Cells) -> None:
         """Determine from its length whether an array has axes for the cells of the material or of the mesh."""
         total = sum(map(len, cells.mesh.solids.values()))
-        if len(given) not in (cells.count, total):
+        if len(values) not in (cells.count, total):
             raise ModelError(
-                f"the axes of a material are {len(given)}: they must be as many as its cells, {cells.count}, or those of the "
-                f"mesh, {total}"
+                f"the axes of a material are {len(values)}: they must be as many as its cells, {cells.count}, or those of "
+                f"the mesh, {total}"
             )
-        self._by_cell = _by_cell(given, cells)
+        self._by_cell = _by_cell(values, cells)
 
     def at(self, name: str, rows: Indices, N: Array) -> Array:
         """Return the axes (n_rows * n, 3, 3) [-] at points of cells, see `Varying.at`."""
@@ -216,13 +216,13 @@ class CellAxes(Varying):
         return np.repeat(self._by_cell[name][rows], len(N), axis=0)
 
 
-def _by_cell(given: Array, cells: Cells) -> dict[str, Array]:
-    """Return the values (n_cells, ...) `given` for `cells` or for all solid cells, by element; NaN elsewhere."""
+def _by_cell(values: Array, cells: Cells) -> dict[str, Array]:
+    """Return the values `values` for `cells` or for all solid cells, by element; NaN elsewhere."""
     blocks, first = {}, 0
     for name, block in cells.mesh.solids.items():
-        blocks[name] = np.full((len(block), *given.shape[1:]), np.nan)
-        rows = np.arange(len(block)) if len(given) != cells.count else cells.rows.get(name, np.empty(0, np.intp))
-        blocks[name][rows] = given[first : first + len(rows)]
+        blocks[name] = np.full((len(block), *values.shape[1:]), np.nan)
+        rows = np.arange(len(block)) if len(values) != cells.count else cells.rows.get(name, np.empty(0, np.intp))
+        blocks[name][rows] = values[first : first + len(rows)]
         first += len(rows)
     return blocks
 

@@ -129,8 +129,8 @@ def _of_function(
     """Return the study of a model function; `options` are those of `run_functions`."""
     if isinstance(sizes, int | np.integer):
         raise CaseError(f"a study of a function needs its mesh sizes, such as [4.0, 2.0, 1.0], not {sizes} levels")
-    given = sorted(map(float, sizes), reverse=True)
-    if not given or len({*given}) < len(given) or not (given[-1] > 0 and given[0] < np.inf):
+    descending = sorted(map(float, sizes), reverse=True)
+    if not descending or len({*descending}) < len(descending) or not (descending[-1] > 0 and descending[0] < np.inf):
         raise CaseError(f"the mesh sizes must be positive and all different, not {[*sizes]}")
     name, measures, argument = (
         functions.function_name(function),
@@ -142,10 +142,10 @@ def _of_function(
             label=f"{argument} = {size:g}", name=name, marks={"level": level}, size=level,
             function=function, positional=(size,), named={}, measures=measures,
         )
-        for level, size in enumerate(given)
+        for level, size in enumerate(descending)
     ]  # fmt: skip
     results = functions.run_functions(runs, "no size could be solved", **options)
-    solved = [(level, {**result, "h": given[level]}) for level, result in enumerate(results)]
+    solved = [(level, {**result, "h": descending[level]}) for level, result in enumerate(results)]
     series = _series(Named(None, None, name), solved, [*wanted], (), (None, 1.0, ""), asked=tuple(wanted))
     _tell_coarser(series.levels)
     return Study(**functions.of_function(function, results), series=[series], failed={}, theory=None)

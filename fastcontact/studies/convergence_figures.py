@@ -102,10 +102,10 @@ def draw_pressure(ax: Any, series: Series, theory: Any, units: Mapping[str, str]
 
 def _draw_theory(ax: Any, theory: Any, series: Series, x: Array) -> None:
     """Draw the pressure of a theory, if it has one, at equal approach and at equal force."""
-    given = pressure_curve(theory)
-    if given is None:
+    curve_given = pressure_curve(theory)
+    if curve_given is None:
         return
-    curves = [("theory" if series.exact_theory else f"theory {series.compared}", "k-", given)]
+    curves = [("theory" if series.exact_theory else f"theory {series.compared}", "k-", curve_given)]
     force = series.limits.get("force")
     if force is not None and force.value > 0 and hasattr(theory, "at_force"):
         same = pressure_curve(theory.at_force(force.value / series.share))

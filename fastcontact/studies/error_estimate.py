@@ -99,9 +99,9 @@ def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
     smooth = smoothed_stress(model.mesh, model.kinematics, model.material_field(), step.displacement, offset)
     squares, energy = [], 0.0
     for name in model.mesh.solids:
-        difference, whole = _differences(model, step.displacement, name, smooth[name], offset)
+        difference, total = _differences(model, step.displacement, name, smooth[name], offset)
         squares.append(difference)
-        energy += whole
+        energy += total
     contact = np.zeros(sum(map(len, squares)))
     for result in step.contact.values():
         _add_contact(model, result, smooth, contact)

@@ -107,9 +107,9 @@ class Job(Run):
     def key(self) -> str:
         """Hash of all inputs of the numbers: the case, its mesh, the contents of the files it names, the version."""
         data = {key: value for key, value in self.data.items() if key not in ("title", "units", "check")}
-        whole = {"version": __version__, "schema": SCHEMA, "data": data, "pair": self.pair, "recipe": self.recipe}
-        whole["files"] = digest(files_named({key: data[key] for key in data if key != "mesh"}, self.folder))
-        hashed = hashlib.sha256(json.dumps(whole, sort_keys=True, default=str).encode())
+        inputs = {"version": __version__, "schema": SCHEMA, "data": data, "pair": self.pair, "recipe": self.recipe}
+        inputs["files"] = digest(files_named({key: data[key] for key in data if key != "mesh"}, self.folder))
+        hashed = hashlib.sha256(json.dumps(inputs, sort_keys=True, default=str).encode())
         if self.base is not None:
             hashed.update(_fingerprint(self.base))
         return hashed.hexdigest()[:32]

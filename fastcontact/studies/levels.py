@@ -27,35 +27,35 @@ class Rule:
     root: tuple[str, ...] = ()  # ratios of neighbouring edges: their square roots are taken
 
 
-def _spheres(element: str, given: Mapping[str, Any]) -> Rule:
-    R = float(given.get("R", 50.0))
+def _spheres(element: str, arguments: Mapping[str, Any]) -> Rule:
+    R = float(arguments.get("R", 50.0))
     if shape_of(element) == "triangles":
         return Rule({"size": R / 25}, ("size", "contact_size"))
     return Rule({"arc_sizes": (R / 250, R / 25), "segments": 15}, ("arc_sizes", "radial_sizes"), ("segments",))
 
 
-def _cylinder(element: str, given: Mapping[str, Any]) -> Rule:
-    R = float(given.get("R", 50.0))
-    far = float(given.get("size", R / 10))
-    return Rule({"size": far, "contact_size": min(R / 100, far)}, ("size", "contact_size"))
+def _cylinder(element: str, arguments: Mapping[str, Any]) -> Rule:
+    R = float(arguments.get("R", 50.0))
+    coarse = float(arguments.get("size", R / 10))
+    return Rule({"size": coarse, "contact_size": min(R / 100, coarse)}, ("size", "contact_size"))
 
 
-def _ball(element: str, given: Mapping[str, Any]) -> Rule:
-    R = float(given.get("R", 50.0))
-    far = float(given.get("size", R / 4))
+def _ball(element: str, arguments: Mapping[str, Any]) -> Rule:
+    R = float(arguments.get("R", 50.0))
+    coarse = float(arguments.get("size", R / 4))
     # Along a graded line the edges grow by `growth` times the distance, irrespective of their lengths.
-    return Rule({"size": far, "contact_size": min(R / 50, far)}, ("size", "contact_size", "growth"))
+    return Rule({"size": coarse, "contact_size": min(R / 50, coarse)}, ("size", "contact_size", "growth"))
 
 
-def _half_space(element: str, given: Mapping[str, Any]) -> Rule:
-    width = float(given.get("width", 10.0))
-    radius, far = float(given.get("contact_radius", width / 10)), float(given.get("size", width / 4))
-    least = min(radius, float(given.get("contact_radius_y", radius)))
-    return Rule({"size": far, "contact_size": min(least / 10, far)}, ("size", "contact_size", "growth"))
+def _half_space(element: str, arguments: Mapping[str, Any]) -> Rule:
+    width = float(arguments.get("width", 10.0))
+    radius, coarse = float(arguments.get("contact_radius", width / 10)), float(arguments.get("size", width / 4))
+    least = min(radius, float(arguments.get("contact_radius_y", radius)))
+    return Rule({"size": coarse, "contact_size": min(least / 10, coarse)}, ("size", "contact_size", "growth"))
 
 
-def _punched(element: str, given: Mapping[str, Any]) -> Rule:
-    return Rule({"edge_size": float(given.get("punch_radius", 1.0)) / 200}, ("edge_size",), root=("growth",))
+def _punched(element: str, arguments: Mapping[str, Any]) -> Rule:
+    return Rule({"edge_size": float(arguments.get("punch_radius", 1.0)) / 200}, ("edge_size",), root=("growth",))
 
 
 RULES: dict[str, Callable[[str, Mapping[str, Any]], Rule]] = {
@@ -88,10 +88,10 @@ def recipe(settings: Settings, element: str | None, level: int) -> Recipe:
     shape = shape_of(element)
     # If level 0 is given by shape, it is for quadratic cells; linear cells use the same nodes.
     finer = level + int(settings.by_shape and elements.get(element).order == 1)
-    given = settings.arguments.get(shape, settings.arguments.get("", {}))
+    level_0 = settings.arguments.get(shape, settings.arguments.get("", {}))
     # A new free triangulation has another pattern, which changes the largest pressure at random: refine instead.
     halvings, refinements = (0, finer) if shape == "triangles" else (finer, 0)
-    arguments = _finer(settings, element, given, halvings)
+    arguments = _finer(settings, element, level_0, halvings)
     return {"generator": settings.generator, "arguments": arguments, "refinements": refinements}
 
 
@@ -112,14 +112,14 @@ def _not_makeable(settings: Settings, element: str) -> str:
     )
 
 
-def _finer(settings: Settings, element: str, given: Mapping[str, Any], level: int) -> Arguments:
+def _finer(settings: Settings, element: str, level_0: Mapping[str, Any], level: int) -> Arguments:
     """Return generator arguments with sizes halved and counts doubled `level` times."""
     name = str(settings.generator)
     check_known("study.generator", name, generate.GENERATORS, CaseError)
     signature = inspect.signature(generate.GENERATORS[name]).parameters
-    for key in (*given, *settings.halve, *settings.double):
+    for key in (*level_0, *settings.halve, *settings.double):
         check_known(f"argument of the generator {name} in [study]", key, signature, CaseError)
-    rule = RULES[name](element, given) if name in RULES else Rule()
+    rule = RULES[name](element, level_0) if name in RULES else Rule()
     own_rule = bool(settings.halve or settings.double)  # then the ratios of the rule may not apply
     halve, double = settings.halve or rule.halve, settings.double or rule.double
     if not (halve or double):
@@ -127,7 +127,7 @@ def _finer(settings: Settings, element: str, given: Mapping[str, Any], level: in
             f"it is not known how the generator '{name}' makes finer meshes: name its arguments in [study] as "
             "halve = [...] or double = [...]"
         )
-    arguments = {**rule.defaults, **given, **({"element": element} if "element" in signature else {})}
+    arguments = {**rule.defaults, **level_0, **({"element": element} if "element" in signature else {})}
     for names, factor in ((halve, 0.5**level), (double, 2**level)):
         for key in names:
             value = arguments.get(key, signature[key].default if key in signature else None)

@@ -114,8 +114,8 @@ def contact_radius(contact: ContactResult) -> float:
     used = used[np.argsort(r[used])]
     if len(used) < 3:
         return float(0.5 * (inside + outside))
-    kept = used[:-2] if len(used) >= 5 else used
-    slope, start = np.polyfit((r[kept] / outside) ** 2, (contact.pressure[kept] / contact.pressure.max()) ** 2, 1)
+    fitted = used[:-2] if len(used) >= 5 else used
+    slope, start = np.polyfit((r[fitted] / outside) ** 2, (contact.pressure[fitted] / contact.pressure.max()) ** 2, 1)
     if slope >= 0:
         return float(outside)
     return float(np.clip(outside * np.sqrt(max(-start / slope, 0.0)), inside, outside))

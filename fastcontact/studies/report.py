@@ -78,12 +78,12 @@ class Report:
 
     def html(self) -> str:
         """Return the study as one self-contained HTML page."""
-        parts = [*map(page.paragraph, self.sentences()), page.image(self.figure(), self.picture)]
-        parts += [page.table(rows, caption) for caption, rows in self.tables()]
-        parts += map(page.failure, self.remarks())
+        blocks = [*map(page.paragraph, self.sentences()), page.image(self.figure(), self.picture)]
+        blocks += [page.table(rows, caption) for caption, rows in self.tables()]
+        blocks += map(page.failure, self.remarks())
         if self.explanations:
-            parts += [page.section("How to read this"), *map(page.paragraph, self.explanations)]
-        return page.page(f"{self.kind}: {self.title}", parts, self.text)
+            blocks += [page.section("How to read this"), *map(page.paragraph, self.explanations)]
+        return page.page(f"{self.kind}: {self.title}", blocks, self.text)
 
     def table(self) -> AnyArray:
         """Return the numbers as a structured array (n_rows,)."""

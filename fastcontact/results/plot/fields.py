@@ -90,17 +90,17 @@ def field_of(mesh: Mesh, step: StepResult, name: str) -> Field:
         return Field(mesh, everywhere, step.temperature, name, "")
     if name in step.cell_fields:
         return Field(mesh, everywhere, _of_cells(mesh, step.cell_fields[name]), CELLS.get(name, name), "")
-    apart, node, stress = separated(mesh, step)
-    if name == "von_mises" and apart is mesh:
+    separate_mesh, node, stress = separated(mesh, step)
+    if name == "von_mises" and separate_mesh is mesh:
         return Field(mesh, node, step.von_mises, CAPTIONS[name], "pressure")
     if name not in names(mesh):
         further = [*step.cell_fields, *(["temperature"] if step.temperature is not None else [])]
         raise FastcontactError(unknown("field", name, [*names(mesh), *further]))
     if name in CAPTIONS:
-        return Field(apart, node, OF_STRESS[name](stress), CAPTIONS[name], "pressure")
+        return Field(separate_mesh, node, OF_STRESS[name](stress), CAPTIONS[name], "pressure")
     component = name.removeprefix("stress.")
     values = stress[:, STRESS_COMPONENTS.index(component)]
-    return Field(apart, node, values, f"stress {component}", "pressure")
+    return Field(separate_mesh, node, values, f"stress {component}", "pressure")
 
 
 def names(mesh: Mesh) -> list[str]:

@@ -105,10 +105,10 @@ def _largest(curve: PressureCurve, units: Units) -> str:
 
 def _curves(theory: Any, others: Mapping[str, Any]) -> dict[str, PressureCurve]:
     """Return the curves of theories, by legend."""
-    for given in (theory, *others.values()):
-        if given is not None and not is_dataclass(given) and pressure_curve(given) is None:
+    for theory_given in (theory, *others.values()):
+        if theory_given is not None and not is_dataclass(theory_given) and pressure_curve(theory_given) is None:
             raise FastcontactError(
-                f"a theory has a pressure, as those of fastcontact.analytic do, which {given!r} has not"
+                f"a theory has a pressure, as those of fastcontact.analytic do, which {theory_given!r} has not"
             )
     curves = {legend: pressure_curve(other) for legend, other in others.items()}
     curve = pressure_curve(theory)

@@ -121,8 +121,8 @@ def _facing(shown: Field, points: Array, eye: Array) -> list[tuple[str, Array, A
     for name, facets in (_without_cuts(shown.mesh, shown.node) if cut else outer_facets(shown.mesh)).items():
         flat = flat_triangles(facets.shape[1])
         a, b, c = np.moveaxis(points[facets][:, flat], -2, 0)
-        kept = facets[np.cross(b - a, c - a).sum(axis=1) @ eye > 0]
-        facing.append((name, points[kept], shown.values[kept], flat))
+        visible = facets[np.cross(b - a, c - a).sum(axis=1) @ eye > 0]
+        facing.append((name, points[visible], shown.values[visible], flat))
     return facing
 
 
@@ -131,31 +131,31 @@ def _seen(triangles: Array, values: Array, screen: Screen) -> tuple[Array, Array
 
     Partly hidden triangles are recursively divided into four; of the smallest ones those with a visible middle are kept.
     """
-    kept: list[tuple[Array, Array]] = []
+    visible: list[tuple[Array, Array]] = []
     for left in range(FINEST, -1, -1):
         middle = triangles.mean(axis=1, keepdims=True)
         tests = np.concatenate([middle, middle + 0.98 * (triangles - middle)], axis=1)
         hidden = screen.hidden(tests)
         seen = ~hidden[:, 0] if left == 0 else ~hidden.any(axis=1)
-        kept.append((triangles[seen], values[seen]))
+        visible.append((triangles[seen], values[seen]))
         rest = ~seen & ~hidden.all(axis=1)
         if left == 0 or not rest.any():
             break
         weights = _cut(2)
         triangles = np.einsum("pcw,nwd->npcd", weights, triangles[rest]).reshape(-1, 3, 3)
         values = np.einsum("pcw,nw->npc", weights, values[rest]).reshape(-1, 3)
-    return np.concatenate([part for part, _ in kept]), np.concatenate([part for _, part in kept])
+    return np.concatenate([block for block, _ in visible]), np.concatenate([block for _, block in visible])
 
 
 def _seen_strokes(strokes: Array, screen: Screen) -> Array:
     """Return the visible parts of strokes (n, 2, 3): sixteenths of partly hidden ones."""
     ends = np.linspace(0.0, 1.0, 17)[:, None]
     points = strokes[:, None, 0] + ends * (strokes[:, None, 1] - strokes[:, None, 0])
-    parts = np.stack([points[:, :-1], points[:, 1:]], axis=2)
-    hidden = screen.hidden(parts.mean(axis=2))
-    whole = ~hidden.any(axis=1)
-    partly = ~whole & ~hidden.all(axis=1)
-    return np.concatenate([strokes[whole], parts[partly][~hidden[partly]]])
+    segments = np.stack([points[:, :-1], points[:, 1:]], axis=2)
+    hidden = screen.hidden(segments.mean(axis=2))
+    fully = ~hidden.any(axis=1)
+    partly = ~fully & ~hidden.all(axis=1)
+    return np.concatenate([strokes[fully], segments[partly][~hidden[partly]]])
 
 
 def _without_cuts(mesh: Mesh, node: Numbers) -> dict[str, Numbers]:
