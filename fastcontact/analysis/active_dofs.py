@@ -156,11 +156,11 @@ class SurfaceDofs(ActiveDofs):
         place = self._place[rows.indices]
         kept = (place >= 0) & (rows.data != 0.0)
         start = np.concatenate([[0], np.cumsum(kept)])[rows.indptr]
-        own = csr_array((rows.data[kept], place[kept], start), shape=(rows.shape[0], self._columns))
+        reduced = csr_array((rows.data[kept], place[kept], start), shape=(rows.shape[0], self._columns))
         if self._system.T is not None:
-            own = csr_array(own @ self._T)
-            own.eliminate_zeros()
-        return own, offset
+            reduced = csr_array(reduced @ self._T)
+            reduced.eliminate_zeros()
+        return reduced, offset
 
     def unknowns(self, u: Array, lift: Array) -> Array:
         """See `ActiveDofs`."""
@@ -207,12 +207,12 @@ def constraints_on_unknowns(dofs: ActiveDofs, constraints: Constraints, lift: Ar
     """
 
     def on_unknowns(rows: csr_array, offset: Array) -> tuple[csr_array, Array]:
-        own, offset = dofs.rows(rows, offset, lift)
-        return without_remnants(own, rows, HELD), offset
+        reduced, offset = dofs.rows(rows, offset, lift)
+        return without_remnants(reduced, rows, HELD), offset
 
     B, gap0 = on_unknowns(constraints.B, constraints.gap0)
     slip0 = constraints.slip0 if constraints.slip0 is not None else np.zeros((len(constraints.tangents), 1))
-    slips = [own - T @ start for T, own in zip(constraints.tangents, slip0, strict=True)]
+    slips = [reduced - T @ start for T, reduced in zip(constraints.tangents, slip0, strict=True)]
     pairs = [on_unknowns(T, slip) for T, slip in zip(constraints.tangents, slips, strict=True)]
     tangents = tuple(T for T, _ in pairs)
     return replace(

@@ -111,11 +111,11 @@ def nearest_nodes(problem: Problem, constraints: StackedConstraints, rows: Indic
     """Return, by contact pair, the secondary nodes nearest to constraints, numbered through the pairs."""
     nodes: Nodes = {}
     for name, rows_of_pair in constraints.rows().items():
-        mine = rows[(rows >= rows_of_pair.start) & (rows < rows_of_pair.stop)] - rows_of_pair.start
-        if len(mine):
+        rows_in_pair = rows[(rows >= rows_of_pair.start) & (rows < rows_of_pair.stop)] - rows_of_pair.start
+        if len(rows_in_pair):
             points = problem.pairs[name].secondary.points
-            apart = constraints.parts[name].positions[mine][:, None] - problem.model.mesh.points[points][None]
-            nodes[name] = np.unique(points[np.linalg.norm(apart, axis=2).argmin(axis=1)]).tolist()
+            away = constraints.parts[name].positions[rows_in_pair][:, None] - problem.model.mesh.points[points][None]
+            nodes[name] = np.unique(points[np.linalg.norm(away, axis=2).argmin(axis=1)]).tolist()
     return nodes
 
 

@@ -211,10 +211,10 @@ class Heat:
         held = self.merged @ self.fixed + films.diagonal() > 0.0
         pairs = coo_array(self.merged if contact is None else self.merged + contact)
         joined = np.stack([pairs.row, pairs.col], axis=1)[pairs.data != 0.0]
-        alone = not_reached(self.body, held, joined)
-        if len(alone):
+        cut_off = not_reached(self.body, held, joined)
+        if len(cut_off):
             raise ConvergenceError(
-                f"no heat reaches body {body_name(self.model.mesh, self.body, alone[0])}: its contacts are open or conduct "
+                f"no heat reaches body {body_name(self.model.mesh, self.body, cut_off[0])}: its contacts are open or conduct "
                 "nothing in this step, so that nothing determines its temperature; add a film, or a conductance by gap"
             )
 

@@ -109,8 +109,8 @@ def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) ->
     if problem.pairs and problem.model.springs:
         # Springs of the model may be weak: without contact, bodies on them have large displacements, and gaps are
         # differences of such displacements, each with an error of a few units in the last place.
-        alone = largest(loaded.full_solution(zero))
-        round_off = max(round_off, 16 * np.finfo(float).eps * alone)
+        from_zero = largest(loaded.full_solution(zero))
+        round_off = max(round_off, 16 * np.finfo(float).eps * from_zero)
     if problem.floating_bodies is not None:
         forces = generalised(problem.floating_bodies.motions, pushing.force)
         rigid_force = max(rigid_force, float(np.abs(forces).max()))

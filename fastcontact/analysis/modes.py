@@ -111,13 +111,13 @@ def modes(
         )
     model = stage_of(model, step)
     sectors = Sectors.of(model)
-    asked = _asked(model, sectors, nodal_diameters)
+    diameters = _asked(model, sectors, nodal_diameters)
     vibration = _Vibration.of(model, sectors, step if stress_stiffening else None, step, hold_sliding)
-    if sectors is None or asked is None:
+    if sectors is None or diameters is None:
         values, vectors = vibration.lowest(n, linear_solver, None if sectors is None else Wave(sectors, 0))
         vibration.warn_of_slides(values, vectors)
         return _modes(vibration, values, vectors)
-    waves = [Wave(sectors, d) for d in asked]
+    waves = [Wave(sectors, d) for d in diameters]
     return _of_ring(vibration, sectors, [(wave, *vibration.of_wave(wave, n, linear_solver)) for wave in waves])
 
 
@@ -247,7 +247,7 @@ def _uniform(model: Model, K: bsr_array, M: bsr_array) -> float:
             u = np.zeros_like(points)
             u[:, component] = points[:, axis]
             densities.append(float(u.ravel() @ (K @ u.ravel())) / float(u.ravel() @ (M @ u.ravel())))
-    return min((own for own in densities if own > 0.0), default=1.0)
+    return min((density for density in densities if density > 0.0), default=1.0)
 
 
 def _modes(vibration: _Vibration, values: Array, vectors: Array) -> Modes:

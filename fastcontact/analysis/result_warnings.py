@@ -238,11 +238,11 @@ def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
 
 def _clearances(problem: Problem, state: State) -> set[str]:
     """Return the names of automatically detected pairs that were apart and never closed, such as a shank in its hole."""
-    found = {pair.name: pair.found_gap for pair in problem.model.contact if pair.found_gap is not None}
-    if not state.touched & found.keys():
+    gap_by_pair = {pair.name: pair.found_gap for pair in problem.model.contact if pair.found_gap is not None}
+    if not state.touched & gap_by_pair.keys():
         return set()
-    apart = LENGTH_ROUND_OFF * float(np.ptp(problem.model.mesh.points, axis=0).max())
-    return {name for name, gap in found.items() if gap > apart and name not in state.touched}
+    open_from = LENGTH_ROUND_OFF * float(np.ptp(problem.model.mesh.points, axis=0).max())
+    return {name for name, gap in gap_by_pair.items() if gap > open_from and name not in state.touched}
 
 
 def _lost(pair: Formulation, contact: ContactResult, touched: bool, loaded: bool) -> Iterator[str]:

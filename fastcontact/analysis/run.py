@@ -203,7 +203,7 @@ def _marched(
         warnings = result_warnings(problem, state, step) if instant == instants[-1] else []
         for text in warnings:
             warn(text)
-        told = (*doubtful * (index == 1), *warnings)
-        yield replace(step, warnings=told, restart=restart.taken(problem, state, case))
+        warned = (*doubtful * (index == 1), *warnings)
+        yield replace(step, warnings=warned, restart=restart.taken(problem, state, case))
         del step  # releases it before the next one is computed
         begin = instant

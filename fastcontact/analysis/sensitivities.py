@@ -140,13 +140,13 @@ def sensitivities(
     >>> round(result.value, 9), round(result.derivatives["E", "BLOCK"], 9)
     (1.0, 0.001)
     """
-    asked = [tuple(parameter) for parameter in parameters]
+    tuples = [tuple(parameter) for parameter in parameters]
     check_asked(model, quantity, parameters)
     problem, contact = settled_step(model, step, ramp_of(ramp), criteria or Criteria(), linear_solver)
     nearest = checked_margin(contact, margin) if problem.pairs else 1.0
     contact, gradient = with_gradient(contact, step, tuple(quantity))
-    values, solutions = _derivatives(contact, gradient, [change_by(contact, parameter) for parameter in asked])
-    return Sensitivities(gradient.value, dict(zip(asked, values.tolist(), strict=True)), nearest, solutions)
+    values, solutions = _derivatives(contact, gradient, [change_by(contact, parameter) for parameter in tuples])
+    return Sensitivities(gradient.value, dict(zip(tuples, values.tolist(), strict=True)), nearest, solutions)
 
 
 def check_asked(model: Model, quantity: Sequence[str | int], parameters: Sequence[Sequence[str | int]]) -> None:

@@ -273,10 +273,10 @@ def _of_one_node(constraints: StackedConstraints) -> tuple[Indices, Indices]:
     order = np.flatnonzero(usable)
     order = order[np.lexsort((constraints.gap0[order], nodes[order]))]
     node, pairs = nodes[order], [np.empty((2, 0), np.intp)]
-    apart = 1
-    while len(same := np.flatnonzero(node[apart:] == node[:-apart])):
-        pairs.append(np.stack([order[same], order[same + apart]]))
-        apart += 1
+    shift = 1
+    while len(same := np.flatnonzero(node[shift:] == node[:-shift])):
+        pairs.append(np.stack([order[same], order[same + shift]]))
+        shift += 1
     first, second = np.concatenate(pairs[::-1], axis=1)
     return first, second
 

@@ -56,7 +56,7 @@ def go_on(
 
 def at_present_length(model: Model) -> list[MultiPointConstraint]:
     """Return the constraints that keep the length of all pretension sections in small motions."""
-    return [own.locked(model.mesh.points.size, 0.0) for own in model.pretensions]
+    return [bolt.locked(model.mesh.points.size, 0.0) for bolt in model.pretensions]
 
 
 def _names(model: Model) -> list[str]:
@@ -76,16 +76,16 @@ def _stage(
     """
     lengths = locked_lengths(model.pretensions, begin, displacement, kept)
     locks = [
-        own.locked(model.mesh.points.size, lengths[own.label]) for own in model.pretensions if own.label in lengths
+        item.locked(model.mesh.points.size, lengths[item.label]) for item in model.pretensions if item.label in lengths
     ]
     reached: dict[str, float | Array] = {**lengths}
     relations: list[MultiPointConstraint] = []
-    for own in model.relations:
-        if not isinstance(own, TemporaryConstraint):
-            relations.append(own)
-        elif own.acts_from(begin):
-            reached[own.name] = kept[own.name] if own.name in kept else own.rows @ displacement.ravel()
-            relations += own.after(np.asarray(reached[own.name]))
+    for item in model.relations:
+        if not isinstance(item, TemporaryConstraint):
+            relations.append(item)
+        elif item.acts_from(begin):
+            reached[item.name] = kept[item.name] if item.name in kept else item.rows @ displacement.ravel()
+            relations += item.after(np.asarray(reached[item.name]))
     loads: list[Any] = []
     for load in model.heat_loads:
         if isinstance(load, FixedTemperature) and load.begins > -np.inf and load.acts_from(begin):
@@ -94,7 +94,7 @@ def _stage(
             loads.append(replace(load, reached=np.asarray(reached[load.label])))
         elif not isinstance(load, TemporaryHeat) or load.acts_from(begin):
             loads.append(load)
-    if not locks and not any(isinstance(own, TEMPORARY) for own in (*model.relations, *model.heat_loads)):
+    if not locks and not any(isinstance(item, TEMPORARY) for item in (*model.relations, *model.heat_loads)):
         return model, reached
     made = copy.copy(model)
     made.relations, made.heat_loads = [*relations, *locks], loads

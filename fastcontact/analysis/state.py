@@ -127,9 +127,9 @@ class State:
             "obstacles": self.u[n_dofs:].copy(),
             "touched": sorted(self.touched),
             "locked": dict(self.locked),
-            "bonds": {name: vars(own) for name, own in self.bonds.items()},
+            "bonds": {name: vars(entry) for name, entry in self.bonds.items()},
             "work": None if self.work is None else dataclasses.asdict(self.work),
-            "forces": {name: vars(own) for name, own in self.forces.items()},
+            "forces": {name: vars(entry) for name, entry in self.forces.items()},
             "history": dict(self.history),
             **({} if self.rise is None else {"rise": self.rise.copy(), "instant": self.instant}),
             "active": dict(self.active),
@@ -143,7 +143,7 @@ class State:
         }
 
     @classmethod
-    def from_dict(cls, kept: Mapping[str, Any], displacement: Array, touched: frozenset[str]) -> State:
+    def from_dict(cls, data: Mapping[str, Any], displacement: Array, touched: frozenset[str]) -> State:
         """Return the state saved by `to_dict`.
 
         Parameters
@@ -152,32 +152,32 @@ class State:
         displacement : ndarray (n_points, dim)
             Displacement at the end of the last step [length].
         touched : frozenset of str
-            Contact pairs that were closed at the end of a step, in addition to those in `kept`.
+            Contact pairs that were closed at the end of a step, in addition to those in `data`.
         """
-        u = np.concatenate([displacement.ravel(), kept["obstacles"]])
-        pairs, numbers = kept["pairs"], kept["numbers"]
+        u = np.concatenate([displacement.ravel(), data["obstacles"]])
+        pairs, numbers = data["pairs"], data["numbers"]
         of_pairs: dict[str, Any] = {
-            name: {pair: _from_list(key, own[key]) for pair, own in pairs.items() if own.get(key) is not None}
+            name: {pair: _from_list(key, entry[key]) for pair, entry in pairs.items() if entry.get(key) is not None}
             for key, name in OF_PAIRS.items()
         }
         return cls(
             u,
             **{name: numbers[key] for key, name in NUMBERS.items()},
             **of_pairs,
-            history=dict(kept.get("history", {})),
-            rise=kept.get("rise"),
-            instant=kept.get("instant", 0.0),
+            history=dict(data.get("history", {})),
+            rise=data.get("rise"),
+            instant=data.get("instant", 0.0),
             halved=int(numbers.get("halved", 0)),
-            active=dict(kept["active"]),
-            pressure=dict(kept["pressure"]),
-            locked=dict(kept.get("locked", {})),
-            bonds={name: Bond(**own) for name, own in kept.get("bonds", {}).items()},
-            work=Work(**kept["work"]) if kept.get("work") else None,
-            forces={name: ContactForces(**own) for name, own in kept.get("forces", {}).items()},
-            extrapolation=Extrapolation.from_dict(kept["extrapolation"], u)
-            if "extrapolation" in kept
+            active=dict(data["active"]),
+            pressure=dict(data["pressure"]),
+            locked=dict(data.get("locked", {})),
+            bonds={name: Bond(**entry) for name, entry in data.get("bonds", {}).items()},
+            work=Work(**data["work"]) if data.get("work") else None,
+            forces={name: ContactForces(**entry) for name, entry in data.get("forces", {}).items()},
+            extrapolation=Extrapolation.from_dict(data["extrapolation"], u)
+            if "extrapolation" in data
             else Extrapolation(),
-            touched=touched.union(kept.get("touched", ())),
+            touched=touched.union(data.get("touched", ())),
         )
 
 

@@ -107,8 +107,8 @@ def elastic_slips(settled: SettledContact) -> dict[str, tuple[Array, Array]]:
     given, solution = {}, settled.solution
     for name, rows in settled.constraints.rows().items():
         constraints = settled.constraints.parts[name]
-        gives = constraints.compliance is not None or constraints.tangential_softness is not None
-        if gives and constraints.tangents and isinstance(solution, FrictionalEquilibrium):
+        compliant = constraints.compliance is not None or constraints.tangential_softness is not None
+        if compliant and constraints.tangents and isinstance(solution, FrictionalEquilibrium):
             slips = constraints.elastic_slips(solution.multiplier[rows], solution.tangential[rows])
             given[name] = constraints.positions, slips
     return given

@@ -46,7 +46,7 @@ def recover(
     """
     mesh, u = problem.model.mesh, problem.displacement(end.u)
     temperature, initial = (
-        problem.factors(own, instant[1]) for own in (problem.model.temperatures, problem.model.initial_states)
+        problem.factors(load, instant[1]) for load in (problem.model.temperatures, problem.model.initial_states)
     )
     pressures = [multiplier(table, problem.ramp, instant[1]) for _, table in problem.following]
     factors = {"temperature_factors": temperature, "initial_factors": initial, "pressure_factors": pressures}
@@ -54,7 +54,7 @@ def recover(
     heat = None if end.rise is None else problem.model.reference_temperature + end.rise
     sections = problem.model.pretensions
     if sections:
-        pulls = [multiplier(own.ramp, problem.ramp, instant[1]) for own in sections]
+        pulls = [multiplier(load.ramp, problem.ramp, instant[1]) for load in sections]
         pretension = section_results(sections, u, reaction.reshape(-1, mesh.dim), pulls)
         iterations = {**iterations, "pretension": pretension}
     if bodies is None:

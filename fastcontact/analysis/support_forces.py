@@ -140,12 +140,12 @@ def pretension_history(steps: Iterable[StepResult]) -> NDArray[np.void]:
     """
     steps = list(steps)
     names = list(dict.fromkeys(name for step in steps for name in step.pretension))
-    asked = [(name, kind) for name in names for kind in ("force", "shortening")]
+    columns_of = [(name, kind) for name in names for kind in ("force", "shortening")]
     rows = [
-        (step.index, step.load_factor, *(step.pretension.get(name, {}).get(kind, np.nan) for name, kind in asked))
+        (step.index, step.load_factor, *(step.pretension.get(name, {}).get(kind, np.nan) for name, kind in columns_of))
         for step in steps
     ]
-    columns = [(f"{name}_{kind}", float) for name, kind in asked]
+    columns = [(f"{name}_{kind}", float) for name, kind in columns_of]
     return np.array(rows, [("step", int), ("load_factor", float), *columns])
 
 

@@ -126,9 +126,9 @@ class SpringForces(_WithoutHistory):
 
     def residual(self, u: Array) -> tuple[Array, Energies]:
         """See `Term`."""
-        force, own = np.zeros_like(u), u[: self._n]
-        force[: self._n] = spring_force(self._springs, own)
-        return force, (0.5 * float(force[: self._n] @ own), 0.0)
+        force, of_points = np.zeros_like(u), u[: self._n]
+        force[: self._n] = spring_force(self._springs, of_points)
+        return force, (0.5 * float(force[: self._n] @ of_points), 0.0)
 
     def tangent(self, u: Array, geometric: int = WHOLE) -> csr_array:
         """See `Term`."""

@@ -156,30 +156,30 @@ def _conducted(problem: Problem, start: State, load: StepLoad, instant: float, e
         at = problem.configuration(name, start, load, displacement, u)
         constraints, force, gap = _pressed(problem, settled, name, rows, at)
         assert constraints.nodal is not None
-        own = crossing(constraints, pair.secondary, pair.primary, pair.points.shape)
+        link = crossing(constraints, pair.secondary, pair.primary, pair.points.shape)
         grown = np.ones(n)  # area ratio of the deformed surface and of the constraints
         if heat.finite:
             before, after = areas(pair, displacement)
             grown[pair.secondary.points] = after / before
-            own = replace(own, area=own.area * (own.secondary @ grown))
+            link = replace(link, area=link.area * (link.secondary @ grown))
         if law is not None:
-            h, facing = np.zeros(len(gap)), own.area > 0.0
-            h[facing] = law(force[facing] / own.area[facing], gap[facing])
+            h, facing = np.zeros(len(gap)), link.area > 0.0
+            h[facing] = law(force[facing] / link.area[facing], gap[facing])
             obstacle_rise = 0.0
             if pair.options.obstacle_temperature is None:
-                matrix = csr_array(matrix + own.matrix(h))
+                matrix = csr_array(matrix + link.matrix(h))
             else:
                 obstacle_rise = pair.options.obstacle_temperature - problem.model.reference_temperature
                 obstacles, given = (
-                    csr_array(obstacles + own.matrix(h)),
-                    given + own.secondary.T @ (h * own.area * obstacle_rise),
+                    csr_array(obstacles + link.matrix(h)),
+                    given + link.secondary.T @ (h * link.area * obstacle_rise),
                 )
-            crossings[name] = own, constraints.nodal, h, obstacle_rise, grown[pair.secondary.points]
+            crossings[name] = link, constraints.nodal, h, obstacle_rise, grown[pair.secondary.points]
         if pair.options.friction_heat and isinstance(solution, FrictionalEquilibrium):
             work = np.maximum(-(solution.tangential[rows] * solution.slip[rows]).sum(axis=1), 0.0)
-            rubbed += own.shared(pair.options.friction_heat * work / (instant - start.instant))
+            rubbed += link.shared(pair.options.friction_heat * work / (instant - start.instant))
     steady = heat.temperatures(instant, displacement, matrix, rubbed, (obstacles, given))
-    powers = {name: h * own.area * (own.jump @ steady.rise - at) for name, (own, _, h, at, _) in crossings.items()}
+    powers = {name: h * link.area * (link.jump @ steady.rise - at) for name, (link, _, h, at, _) in crossings.items()}
     fluxes = {name: crossings[name][1].over_whole_side(power) / crossings[name][4] for name, power in powers.items()}
     balance = {**steady.balance, "contacts": {name: float(power.sum()) for name, power in powers.items()}}
     return Heated(steady.rise, steady.reaction, balance, fluxes)

@@ -32,8 +32,8 @@ def wavering(pair: Formulation, contact: ContactResult) -> Iterator[str]:
     if inside.sum() < MANY:
         return
     pressure = contact.pressure[inside]
-    apart = pressure - ((neighbours @ contact.pressure)[inside] - pressure) / others[inside]
-    size, mean = float(np.median(np.abs(apart))), float(pressure.mean())
+    deviation = pressure - ((neighbours @ contact.pressure)[inside] - pressure) / others[inside]
+    size, mean = float(np.median(np.abs(deviation))), float(pressure.mean())
     if not size > WAVERING * mean > 0.0:
         return
     cells = f"quadrangles or hexahedra along '{pair.secondary.group}', or triangles or tetrahedra there about as deep as wide"

@@ -175,11 +175,11 @@ def contact_work(
         friction, touching = (float(own) for own in solution.work[:, rows].sum(axis=1))
     sliding = float((along + earlier).sum())
     moved = _relative(pair, at)
-    taken = now.kept(before, moved) + before.kept(now, moved) + now.alone(before) - before.alone(now)
+    gained = now.kept(before, moved) + before.kept(now, moved) + now.alone(before) - before.alone(now)
     wider = np.where((now.pressing != 0.0) & (before.pressing != 0.0), now.added - before.added, 0.0)
-    taken -= 0.5 * float((now.pressing + before.pressing) @ wider)
-    taken -= 0.5 * float(((now.tangential + before.tangential) * moved).sum())
-    return now, (friction, touching, taken - (now.stored - before.stored) - sliding)
+    gained -= 0.5 * float((now.pressing + before.pressing) @ wider)
+    gained -= 0.5 * float(((now.tangential + before.tangential) * moved).sum())
+    return now, (friction, touching, gained - (now.stored - before.stored) - sliding)
 
 
 def _areas(constraints: Constraints) -> Array:
@@ -205,7 +205,7 @@ def _forces(
     along = np.zeros(size)
     for tangent, own in zip(constraints.tangents, tangents.T, strict=False):
         along += (tangent.T @ own)[:size]
-    ours = rows.sum(axis=0).reshape(-1, dim)[pair.secondary.points]
+    rates = rows.sum(axis=0).reshape(-1, dim)[pair.secondary.points]
     facing = np.where(np.isfinite(contact.normal), contact.normal, 0.0)
     share = 1.0 / np.where(_areas(constraints) > 0.0, _areas(constraints), np.inf)
     give = (
@@ -218,7 +218,7 @@ def _forces(
         give = np.divide(energy, normal, out=np.zeros_like(normal), where=normal != 0.0)
     return ContactForces(
         constraints.positions, normal * share, force * share[:, None], give * normal, (rows.data, rows.indices, rows.indptr),
-        along.reshape(-1, dim), np.einsum("nd,nd->n", ours, facing), added, _stored(constraints, normal, tangents, give),
+        along.reshape(-1, dim), np.einsum("nd,nd->n", rates, facing), added, _stored(constraints, normal, tangents, give),
     )  # fmt: skip
 
 
@@ -259,5 +259,5 @@ def _added(pair: Formulation, at: Configuration, contact: ContactResult) -> Arra
     """Return the contribution of clearances and wear to the gaps (n_nodes,) of the secondary nodes [length]."""
     if pair.options.clearance is None and at.worn is None:
         return np.zeros(len(contact.gap))
-    bare = pair.nodal_gap(at, with_clearance=False)[0]
-    return np.subtract(contact.gap, bare, out=np.zeros_like(bare), where=np.isfinite(bare) & np.isfinite(contact.gap))
+    open = pair.nodal_gap(at, with_clearance=False)[0]
+    return np.subtract(contact.gap, open, out=np.zeros_like(open), where=np.isfinite(open) & np.isfinite(contact.gap))

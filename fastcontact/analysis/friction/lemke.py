@@ -40,8 +40,8 @@ def solved(M: Array, q: Array, most: int) -> tuple[Array | None, int]:
         leaving = int(basic[row])
         basic[row], others[column] = others[column], leaving
         if leaving == 2 * n:
-            own = basic >= n
-            z[basic[own] - n] = np.maximum(table[own, -1], 0.0)
+            in_basis = basic >= n
+            z[basic[in_basis] - n] = np.maximum(table[in_basis, -1], 0.0)
             return z, count
         column = int(np.flatnonzero(others == (leaving + n if leaving < n else leaving - n))[0])
         blocking = _blocking(table, basic, column)

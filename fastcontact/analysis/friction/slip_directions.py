@@ -36,7 +36,7 @@ def compliance_of_rows(rows: tuple[csr_array, ...], yielding: Array) -> Array:
         Compliance of each unknown [length / force].
     """
     weighted = [csr_array((R.data * yielding[R.indices], R.indices, R.indptr), shape=R.shape) for R in rows]
-    return np.array([[own.multiply(R).sum(axis=1) for R in rows] for own in weighted])
+    return np.array([[weighted_rows.multiply(R).sum(axis=1) for R in rows] for weighted_rows in weighted])
 
 
 def aligning(compliance: Array, directions: tuple[Array, ...] = ()) -> csr_array | None:
@@ -51,8 +51,8 @@ def aligning(compliance: Array, directions: tuple[Array, ...] = ()) -> csr_array
     gap = np.maximum(compliance[0, 0], TINY)
     first, second = compliance[1, 1] - compliance[1, 0] ** 2 / gap, compliance[2, 2] - compliance[2, 0] ** 2 / gap
     mixed = compliance[1, 2] - compliance[1, 0] * compliance[2, 0] / gap
-    apart = np.hypot(0.5 * (first - second), mixed)
-    largest, least = 0.5 * (first + second) + apart, 0.5 * (first + second) - apart
+    radius = np.hypot(0.5 * (first - second), mixed)
+    largest, least = 0.5 * (first + second) + radius, 0.5 * (first + second) - radius
     across = (least <= IDLE * np.maximum(largest, gap)) & (np.abs(mixed) > IDLE * np.maximum(largest, gap))
     if not across.any() and not directions:
         return None

@@ -138,20 +138,20 @@ def _among(
         slips = np.arange(len(rows), len(F))
         F[slips, slips] += np.tile(constraints.tangential_softness[rows], k)
     Q = aligning(own_compliance(F, 3)) if k == 2 else None
-    own = own_compliance(F if Q is None else np.asarray(Q @ (Q @ F).T), 1 + k)
-    idle_slips = idle(own)
+    C = own_compliance(F if Q is None else np.asarray(Q @ (Q @ F).T), 1 + k)
+    idle_slips = idle(C)
     still = np.flatnonzero(idle_slips) + len(rows)
     _add_compliance(F, constraints, rows)
     free = free.reshape(1 + k, -1) + at_rest[:, rows]
     start = None if forces is None else forces[:, rows]
     begin = np.zeros_like(free) if path is None else path.forces(constraints.directions, rows)
     if Q is not None:
-        F, free, begin = np.asarray(Q @ (Q @ F).T), *((Q @ own.ravel()).reshape(free.shape) for own in (free, begin))
+        F, free, begin = np.asarray(Q @ (Q @ F).T), *((Q @ C.ravel()).reshape(free.shape) for C in (free, begin))
         start = None if start is None else (Q @ start.ravel()).reshape(free.shape)
     if len(still):
         moved = idle_slips & constraints.moved_past(rows, Q)
         F[still], F[:, still] = 0.0, 0.0
-        F[still, still] = np.where(moved, GIVING * own[0, 0], np.diag(F).max())[idle_slips]
+        F[still, still] = np.where(moved, GIVING * C[0, 0], np.diag(F).max())[idle_slips]
         free[1:][idle_slips & ~moved] = 0.0
         begin[1:][idle_slips] = 0.0
     equations = np.zeros(len(rows), bool) if constraints.equality is None else constraints.equality[rows]
@@ -169,7 +169,7 @@ def _among(
     if Q is not None:
         y, relative = (Q.T @ y.ravel()).reshape(y.shape), (Q.T @ relative.ravel()).reshape(y.shape)
     u = loaded.involved_solution(R.T @ y.ravel(), u)
-    full, gaps = np.zeros((1 + k, m)), at_rest + np.stack([own @ u for own in (constraints.B, *constraints.tangents)])
+    full, gaps = np.zeros((1 + k, m)), at_rest + np.stack([C @ u for C in (constraints.B, *constraints.tangents)])
     full[:, rows], gaps[:, rows] = y, relative
     active, sticking = np.zeros(m, bool), np.zeros(m, bool)
     active[rows], sticking[rows] = result.closed, result.sticking

@@ -63,17 +63,17 @@ class Sectors:
             first.sectors, first.turn, periodic_interfaces, np.linalg.lstsq(np.eye(len(off)) - first.turn, off)[0]
         )
 
-    def diameters(self, asked: int | str | Sequence[int]) -> list[int]:
+    def diameters(self, chosen: int | str | Sequence[int]) -> list[int]:
         """Return the nodal diameters asked for, ascending; ModelError if the ring has none of that number."""
         most = self.number // 2
-        if isinstance(asked, str):
-            if asked != "all":
-                raise ModelError(f"nodal_diameters = '{asked}': write \"all\", or whole numbers from 0 to {most}")
+        if isinstance(chosen, str):
+            if chosen != "all":
+                raise ModelError(f"nodal_diameters = '{chosen}': write \"all\", or whole numbers from 0 to {most}")
             return list(range(most + 1))
-        diameters = sorted({asked} if isinstance(asked, int) else set(asked))
+        diameters = sorted({chosen} if isinstance(chosen, int) else set(chosen))
         wrong = [d for d in diameters if not 0 <= d <= most]
         if wrong or not diameters:
-            raise ModelError(f"nodal_diameters = {asked}: a ring of {self.number} sectors has those from 0 to {most}")
+            raise ModelError(f"nodal_diameters = {chosen}: a ring of {self.number} sectors has those from 0 to {most}")
         return diameters
 
 
@@ -135,7 +135,7 @@ class Wave:
             )
             for interface in self.sectors.periodic_interfaces
         ]
-        return [*(MultiPointConstraint(own.name, self.real(own.rows)) for own in others), *ends]
+        return [*(MultiPointConstraint(constraint.name, self.real(constraint.rows)) for constraint in others), *ends]
 
     def joined(self, held: Conditions) -> Conditions:
         """Return contact conditions in the real form, one at each point of the ring.
@@ -154,9 +154,9 @@ class Wave:
         """Return the matrix (k, q) from conditions to those of the ring, and the main condition (k,) of each."""
         left, blocks = np.ones(len(held.nodes), bool), []
         for interface in self.sectors.periodic_interfaces:
-            own = np.flatnonzero(np.isin(held.nodes, interface.first) | np.isin(held.nodes, interface.second))
+            on_interface = np.flatnonzero(np.isin(held.nodes, interface.first) | np.isin(held.nodes, interface.second))
             for a, b in zip(interface.first.tolist(), interface.second.tolist(), strict=True):
-                here, there = own[held.nodes[own] == a], own[held.nodes[own] == b]
+                here, there = on_interface[held.nodes[on_interface] == a], on_interface[held.nodes[on_interface] == b]
                 if a == b and len(here):
                     blocks.append((self._around(held, here), here, here))
                     left[here] = False

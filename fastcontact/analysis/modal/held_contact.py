@@ -77,17 +77,17 @@ class HeldContact:
 
 
 def joined(
-    held: Sequence[Conditions], n_dofs: int, join: Callable[[Conditions], Conditions] = lambda own: own
+    held: Sequence[Conditions], n_dofs: int, join: Callable[[Conditions], Conditions] = lambda conditions: conditions
 ) -> HeldContact:
     """Return all conditions as one, for `n_dofs` displacements; `join` first maps each to conditions of a whole ring."""
     equations, nodes, springs = [csr_array((0, n_dofs))], [np.empty(0, np.intp)], []
-    for own in map(join, held):
-        kept = np.flatnonzero(np.diff(own.rows.indptr) > 0)
-        if own.compliance is None:
-            equations.append(csr_array(own.rows[kept]))
-            nodes.append(own.nodes[kept])
+    for conditions in map(join, held):
+        kept = np.flatnonzero(np.diff(conditions.rows.indptr) > 0)
+        if conditions.compliance is None:
+            equations.append(csr_array(conditions.rows[kept]))
+            nodes.append(conditions.nodes[kept])
         elif len(kept):
-            springs.append((csr_array(own.rows[kept]), own.compliance.toarray()[np.ix_(kept, kept)]))
+            springs.append((csr_array(conditions.rows[kept]), conditions.compliance.toarray()[np.ix_(kept, kept)]))
     return HeldContact(csr_array(vstack(equations, format="csr")), np.concatenate(nodes), springs)
 
 
@@ -122,7 +122,7 @@ def _conditions(
     owners, n = pair.secondary.points[node].astype(np.intp), len(node)
     areas = np.ones(n) if areas is None else areas
     along = part.directions if tied is None else tied.directions
-    directions = [np.asarray(moments @ own) for own in along]
+    directions = [np.asarray(moments @ component) for component in along]
     if tied is not None:
         yield Conditions(tied.rows[0], owners, areas)
         if directions:
@@ -142,7 +142,7 @@ def _conditions(
     )
     if part.tangents:
         tested = csr_array(moments[stuck])
-        rows, give = [tested @ own for own in part.tangents], _compliance(tested, part.tangential_softness)
+        rows, give = [tested @ component for component in part.tangents], _compliance(tested, part.tangential_softness)
         yield _along(directions, rows, stuck, owners, areas, give)
 
 
@@ -154,7 +154,7 @@ def _along(
     count = len(rows)
     give = None if compliance is None else csr_array(block_diag([compliance] * count, format="csr"))
     stacked = csr_array(vstack(rows, format="csr"))
-    tangents = np.concatenate([own[kept] for own in directions])
+    tangents = np.concatenate([direction[kept] for direction in directions])
     return Conditions(stacked, np.tile(owners[kept], count), np.tile(areas[kept], count), tangents, give)
 
 
@@ -168,8 +168,8 @@ def _nodes(pair: Formulation, constraints: Constraints, moments: csr_array) -> I
     """Return the secondary node (q,), as an index on its side, of each row of the moments (q, m)."""
     if isinstance(constraints.nodal, PressureField):
         field = constraints.nodal
-        alone = moments.indices[moments.indptr[len(field.independent) : -1]]  # points on an axis
-        nearest = field.around[alone, field.shape[alone].argmax(axis=1)]
+        on_axis = moments.indices[moments.indptr[len(field.independent) : -1]]  # points on an axis
+        nearest = field.around[on_axis, field.shape[on_axis].argmax(axis=1)]
         return np.concatenate([field.independent, nearest])
     points = pair.secondary.points
     if constraints.nodes is None:

@@ -23,10 +23,10 @@ from fastcontact.model.ramp import combined
 CONSTANTS = {"E": "123", "nu": NAMES, "G": NAMES, "expansion": "123"}
 
 
-def by_constant(contact: MovingContact, asked: Asked) -> tuple[Array, Array | None]:
+def by_constant(contact: MovingContact, parameter: Asked) -> tuple[Array, Array | None]:
     """Return the derivatives of `Change.out` (n_dofs,) and `Change.sample` with respect to a constant, None for zero."""
-    model, name = contact.problem.model, str(asked[0])
-    number, material, component = _found(model, asked)
+    model, name = contact.problem.model, str(parameter[0])
+    number, material, component = _found(model, parameter)
     step = CHANGED * _room(material, name, component)
 
     def at(by: float) -> MovingContact:
@@ -38,43 +38,43 @@ def by_constant(contact: MovingContact, asked: Asked) -> tuple[Array, Array | No
         return replace(contact, problem=_with_model(contact.problem, made))
 
     # Fourth order: the error is proportional to the fourth power of the step.
-    parts = [weight * (_inside(at(far * step)) - _inside(at(-far * step))) for far, weight in ((1, 8.0), (2, -1.0))]
-    return (parts[0] + parts[1]) / (12.0 * step), contact.along(at, step) if contact.problem.pairs else None
+    forces = [weight * (_inside(at(far * step)) - _inside(at(-far * step))) for far, weight in ((1, 8.0), (2, -1.0))]
+    return (forces[0] + forces[1]) / (12.0 * step), contact.along(at, step) if contact.problem.pairs else None
 
 
-def check_constant(model: Model, asked: Asked) -> None:
+def check_constant(model: Model, parameter: Asked) -> None:
     """Raise ModelError if no material has such a constant, or the constant varies."""
-    _found(model, asked)
+    _found(model, parameter)
 
 
-def _found(model: Model, asked: Asked) -> tuple[int, Material, int | None]:
+def _found(model: Model, parameter: Asked) -> tuple[int, Material, int | None]:
     """Return the number of a material in the model, the material, and the requested component."""
     matches = [
         (i, material) for i, (material, groups) in enumerate(model.materials)
-        if asked[1] == i or (groups is not None and asked[1] in groups)
+        if parameter[1] == i or (groups is not None and parameter[1] in groups)
     ]  # fmt: skip
     if not matches:
         names = [name for _, groups in model.materials for name in groups or ()]
-        raise ModelError(unknown("material", str(asked[1]), [*names, *map(str, range(len(model.materials)))]))
-    (number, material), name = matches[0], str(asked[0])
+        raise ModelError(unknown("material", str(parameter[1]), [*names, *map(str, range(len(model.materials)))]))
+    (number, material), name = matches[0], str(parameter[0])
     value = getattr(material, name, None)
     components = value if isinstance(value, tuple) else (value,)
     if value is None or any(map(varying, components)):
         raise ModelError(
-            f"the material {asked[1]!r} has no {name}, or one that varies: there is no sensitivity by that"
+            f"the material {parameter[1]!r} has no {name}, or one that varies: there is no sensitivity by that"
         )
-    return number, material, _component(asked, list(CONSTANTS[name]) if len(components) > 1 else [])
+    return number, material, _component(parameter, list(CONSTANTS[name]) if len(components) > 1 else [])
 
 
-def _component(asked: Asked, names: Sequence[str]) -> int | None:
+def _component(parameter: Asked, names: Sequence[str]) -> int | None:
     """Return the number of the requested component; None if a constant has only one, or all are requested."""
-    if len(asked) == 2 and (not names or asked[0] == "expansion"):
+    if len(parameter) == 2 and (not names or parameter[0] == "expansion"):
         return None
-    if len(asked) == 2:
-        raise ModelError(f"{asked[0]} of the material {asked[1]!r} has components: ask for (..., '{names[0]}')")
-    if str(asked[2]) not in names:
-        raise ModelError(unknown(f"component of {asked[0]}", str(asked[2]), names))
-    return names.index(str(asked[2]))
+    if len(parameter) == 2:
+        raise ModelError(f"{parameter[0]} of the material {parameter[1]!r} has components: ask for (..., '{names[0]}')")
+    if str(parameter[2]) not in names:
+        raise ModelError(unknown(f"component of {parameter[0]}", str(parameter[2]), names))
+    return names.index(str(parameter[2]))
 
 
 def _room(material: Material, name: str, component: int | None) -> float:

@@ -167,14 +167,14 @@ class MovingContact:
 
     def kinks(self, forward: csr_array, backward: csr_array) -> csr_array:
         """Return half the difference of the two `derivatives` where points lie on the line between two facets."""
-        apart, n = csr_array(0.5 * (forward - backward)), len(self.u)
+        jump, n = csr_array(0.5 * (forward - backward)), len(self.u)
         force = float(np.abs(self.solution.multiplier).max(initial=0.0)) * DIFFERENCES / self.step
-        row = np.repeat(np.arange(apart.shape[0]), np.diff(apart.indptr))
+        row = np.repeat(np.arange(jump.shape[0]), np.diff(jump.indptr))
         # Pressures follow from forces: they are smooth where forces are.
         size = np.where(row < n, force, np.where(row < n + len(self.active), 1.0, np.inf))
-        apart.data[np.abs(apart.data) <= SMOOTH * size] = 0.0
-        apart.eliminate_zeros()
-        return apart
+        jump.data[np.abs(jump.data) <= SMOOTH * size] = 0.0
+        jump.eliminate_zeros()
+        return jump
 
     def _moving_dofs(self) -> Indices:
         """Return the displacement components that active constraints may depend on."""
@@ -269,8 +269,8 @@ def _apart(dofs: Indices, reached: csr_array, dim: int) -> list[Indices]:
     colour: dict[int, int] = {}
     for point in points.tolist():
         neighbours = further.indices[further.indptr[point] : further.indptr[point + 1]].tolist()
-        taken = {colour[other] for other in neighbours if other in colour}
-        colour[point] = next(c for c in range(len(points)) if c not in taken)
+        used = {colour[other] for other in neighbours if other in colour}
+        colour[point] = next(c for c in range(len(points)) if c not in used)
     groups: list[Indices] = []
     for c in range(max(colour.values(), default=-1) + 1):
         group = np.array([p for p, c_of_node in colour.items() if c_of_node == c], np.intp)
