@@ -71,16 +71,16 @@ class KernelFiles:
         try:
             with open(path, "rb") as file:
                 if not _is_own(os.fstat(file.fileno())):
-                    _tell(f"others may write to the compiled kernel '{path}'")
+                    _log_once(f"others may write to the compiled kernel '{path}'")
                     return None
                 content = file.read()
             if _digest(content[:-DIGEST]).encode() == content[-DIGEST:]:
                 return self._numbas._load_data(str(path))
-            _tell(f"the compiled kernel '{path}' is damaged")
+            _log_once(f"the compiled kernel '{path}' is damaged")
         except FileNotFoundError:
             pass
         except Exception as error:  # e.g. an object written by another release of a library
-            _tell(f"the compiled kernel '{path}' cannot be read ({error})")
+            _log_once(f"the compiled kernel '{path}' cannot be read ({error})")
         return None
 
     def save(self, key: Any, data: Any) -> None:
@@ -92,7 +92,7 @@ class KernelFiles:
             temporary.write_bytes(content + _digest(content).encode())
             os.replace(temporary, path)
         except OSError as error:
-            _tell(f"compiled kernels cannot be kept in '{path.parent}' ({error.strerror or error})")
+            _log_once(f"compiled kernels cannot be kept in '{path.parent}' ({error.strerror or error})")
             with contextlib.suppress(OSError):
                 temporary.unlink(missing_ok=True)
 
@@ -184,7 +184,7 @@ def _is_own(status: os.stat_result) -> bool:
 
 
 @cache
-def _tell(text: str) -> None:
+def _log_once(text: str) -> None:
     """Log a line, once in a process."""
     log.info("%s: compiling instead", text)
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 TEXT = "compiling kernels: once, for up to a minute; they are kept for later runs"
 log = logging.getLogger("fastcontact")
 count = 0  # kernels compiled in this process, plus calls computed in Python instead
-_told = False
+_reported = False
 
 
 def notify() -> None:
@@ -21,9 +21,9 @@ def notify() -> None:
 
 def tell() -> None:
     """Notify all listeners, and once per process the log at level INFO, that kernels are being compiled."""
-    global _told
-    if not _told:
-        _told = True
+    global _reported
+    if not _reported:
+        _reported = True
         log.info(TEXT)
     for listener in list(listeners):
         listener()

@@ -87,12 +87,12 @@ def _ended(
     if settled is None and start.work is not None:
         end = replace(end, work=start.work.after(balanced.energy, 0.0, (0.0, 0.0, 0.0)))
     if end.work is not None:
-        iterations["work"] = end.work.told()
+        iterations["work"] = end.work.as_dict()
     if problem.floating_bodies is not None and end.rigid is not None:
         iterations["regularised"] = problem.floating_bodies.report(end.rigid, end.largest_rigid_force)
     end = replace(end, solver=problem.solver.snapshot())
     result = recover(problem, end, contact, balanced.reaction, iterations, instant, solution.bodies)
-    return end, result if heated is None else heated.told(problem, result)
+    return end, result if heated is None else heated.completed(problem, result)
 
 
 def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) -> Beginning:

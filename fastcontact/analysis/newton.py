@@ -153,7 +153,7 @@ class _Newton:
                 balanced = self._balanced(u, contact_force, before) if fraction < 1.0 else balanced
             moved = largest_difference(u, before)
             changes.append(self._relative(moved, u))
-            history.append(_told(self._iterate, changes[-1], balanced, fraction))
+            history.append(_history_entry(self._iterate, changes[-1], balanced, fraction))
             small = self._stands_still(changes) or moved <= self._start.gap_round_off
             if fraction == 1.0 and balanced.excess <= 1.0 and small:
                 return StepEquilibrium(self._settled, u, balanced, self._terms, history)
@@ -360,7 +360,7 @@ class _Newton:
         return target, fraction
 
 
-def _told(iterate: Iterate, change: float, balanced: Balance, fraction: float) -> dict[str, Any]:
+def _history_entry(iterate: Iterate, change: float, balanced: Balance, fraction: float) -> dict[str, Any]:
     """Return the entry of the history for an iteration."""
     inner = iterate.history
     return {

@@ -19,7 +19,7 @@ class StatusLine:
     def __init__(self, width: int, show: bool) -> None:
         self._width, self._show = width, show
         self._started = time.perf_counter()
-        self._told = False
+        self._reported = False
 
     def __enter__(self) -> Self:
         compiling.listeners.append(self._compiling)
@@ -30,8 +30,8 @@ class StatusLine:
         self.close()
 
     def _compiling(self) -> None:
-        if not self._told:
-            self._told = True
+        if not self._reported:
+            self._reported = True
             self.draw(compiling.TEXT)
 
     def draw(self, text: str) -> None:

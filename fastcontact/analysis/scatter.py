@@ -73,7 +73,7 @@ class Watch:
         if len(self._changes) < WINDOW:
             return None
         changes, half = self._changes, WINDOW // 2
-        scatter = Scatter(_apart(self._parts) / size, _apart(self._forces) / (largest(force) or 1.0))
+        scatter = Scatter(_last_change(self._parts) / size, _last_change(self._forces) / (largest(force) or 1.0))
         declining = np.median(changes[half:]) < DECLINE * np.median(changes[:half])
         if declining or scatter.displacement * size > APART * float(np.median(changes)):
             return None
@@ -86,6 +86,6 @@ class Watch:
         self._changes.clear()
 
 
-def _apart(vectors: list[Array]) -> float:
+def _last_change(vectors: list[Array]) -> float:
     """Return the largest difference of the last of some vectors from the others."""
     return max(float(largest_difference(vectors[-1], other)) for other in vectors[:-1])

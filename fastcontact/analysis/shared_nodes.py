@@ -251,7 +251,7 @@ def _alike(constraints: StackedConstraints) -> tuple[Indices, Indices, Indices]:
     first, second = _of_one_node(constraints)
     if not len(first):
         return first, first, first
-    alike = _apart(constraints.B, first, second) <= LENGTH_ROUND_OFF
+    alike = _row_differences(constraints.B, first, second) <= LENGTH_ROUND_OFF
     if constraints.equality is not None:
         alike &= ~(constraints.equality[first] | constraints.equality[second])
     first, second = first[alike], second[alike]
@@ -281,7 +281,7 @@ def _of_one_node(constraints: StackedConstraints) -> tuple[Indices, Indices]:
     return first, second
 
 
-def _apart(rows: csr_array, first: Indices, second: Indices) -> Array:
+def _row_differences(rows: csr_array, first: Indices, second: Indices) -> Array:
     """Return the largest difference (k,) between entries of rows."""
     if not len(first):
         return np.empty(0)

@@ -148,7 +148,7 @@ class State:
 
         Parameters
         ----------
-        kept : mapping
+        data : mapping
         displacement : ndarray (n_points, dim)
             Displacement at the end of the last step [length].
         touched : frozenset of str

@@ -46,7 +46,7 @@ class Heated(Temperatures):
 
     fluxes: dict[str, Array]
 
-    def told(self, problem: Problem, step: StepResult) -> StepResult:
+    def completed(self, problem: Problem, step: StepResult) -> StepResult:
         """Return the result of a load step with its heat."""
         assert problem.heat is not None
         flux = problem.heat.conductors(step.displacement).flux(self.rise)

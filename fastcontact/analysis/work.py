@@ -124,7 +124,7 @@ class Work:
         terms = (self.largest, *energy, work.friction, abs(work.external))
         return replace(work, largest=max(terms))
 
-    def told(self) -> dict[str, float]:
+    def as_dict(self) -> dict[str, float]:
         """Return the reported quantities, see `StepResult.work`."""
         return {
             "strain_energy": self.strain_energy, "plastic_work": self.plastic,

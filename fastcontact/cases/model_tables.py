@@ -245,7 +245,7 @@ def _add_lists(model: Model, data: dict[str, Any], folder: Path, adding: Mapping
                     raise CaseError(f"{where} needs '{key}'")
             with at(where):
                 given = _from_files(where, entry, model.mesh, folder) if kind == "material" else entry
-                add(model, **_arguments(where, _found(folder, _changed(where, given, VALUES, _function))))
+                add(model, **_arguments(where, _with_paths(folder, _changed(where, given, VALUES, _function))))
 
 
 def _add_contacts(model: Model, data: dict[str, Any]) -> None:
@@ -275,7 +275,7 @@ def _from_files(where: str, entry: dict[str, Any], mesh: Mesh, folder: Path) -> 
         check_keys(name, value, FIELD)
         if "field" not in value:
             raise CaseError(f"'{name}' needs 'field', its name in the file")
-        return read_field(mesh, groups=entry.get("groups"), **_found(folder, value))
+        return read_field(mesh, groups=entry.get("groups"), **_with_paths(folder, value))
 
     return _changed(where, entry, CONSTANTS, read)
 
@@ -294,7 +294,7 @@ def _changed(
     return values
 
 
-def _found(folder: Path, entry: dict[str, Any]) -> dict[str, Any]:
+def _with_paths(folder: Path, entry: dict[str, Any]) -> dict[str, Any]:
     """Return an entry with its paths taken relative to the folder of the case file."""
     file = entry.get("file")
     if file is None:

@@ -99,10 +99,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     raised: list[int] = []
     with interruptible(raised):  # also while the reason of the end is printed
-        return _told(sys.argv[1:] if argv is None else list(argv), raised)
+        return _run_with_exit_code(sys.argv[1:] if argv is None else list(argv), raised)
 
 
-def _told(words: list[str], raised: list[int]) -> int:
+def _run_with_exit_code(words: list[str], raised: list[int]) -> int:
     """Run a command; print an error and return its exit code. `raised` are the signals received."""
     try:
         with meant(raised):

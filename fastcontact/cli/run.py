@@ -150,7 +150,7 @@ def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[int,
             (of_step(step), step.warnings) for step in writer.done
         ]  # each is read only once: there may be many large ones
         steps = [summary for summary, _ in done]
-        _tell_other_steps(case, [summary["load_factor"] for summary in steps], output)
+        _warn_of_other_steps(case, [summary["load_factor"] for summary in steps], output)
         total = len(steps) + len(remaining(case.ramp, last))
         progress = Progress(total, show=somebody_watches() and not options.quiet, done=len(steps))
         try:
@@ -175,7 +175,7 @@ def _stopped(error: BaseException, writer: ResultWriter, output: Path, summary: 
         writer.wait()
     except FileError as failure:
         error.add_note(str(failure))
-    error.add_note(_kept(output, writer.n_steps))
+    error.add_note(_kept_steps(output, writer.n_steps))
     if summary:  # replaces the summary of an earlier run
         write_json(summary, {"failed": str(error) or "interrupted from the keyboard", "complete_steps": writer.n_steps})
 
@@ -191,7 +191,7 @@ def _check_same(case: Any, done: Sequence[Any], output: Path) -> None:
             raise ModelError(f"'{output}' cannot be resumed: {error}") from error
 
 
-def _tell_other_steps(case: Case, done: Sequence[float], output: Path) -> None:
+def _warn_of_other_steps(case: Case, done: Sequence[float], output: Path) -> None:
     """Warn if load factors of existing steps are not in the current case."""
     known = case.ramp.instants
     others = [factor for factor in done if not any(math.isclose(factor, instant, rel_tol=1e-9) for instant in known)]
@@ -202,7 +202,7 @@ def _tell_other_steps(case: Case, done: Sequence[float], output: Path) -> None:
         )
 
 
-def _kept(output: Path, steps: int) -> str:
+def _kept_steps(output: Path, steps: int) -> str:
     """Return a message on the complete steps in the result file of a stopped run."""
     if not steps:
         return f"'{output}' holds no complete step"

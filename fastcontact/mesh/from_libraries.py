@@ -55,7 +55,7 @@ def from_meshio(mesh: Any) -> Mesh:
         raise MeshError(f"meshio's mesh {REFUSAL}")
     # meshio's readers keep the dimension of Gmsh's tag names; the format repeats a cell for each of its groups.
     file_format = "gmsh" if any(key.startswith("gmsh:") for key in mesh.cell_data) else ""
-    return _made(plain_parts(mesh), file_format, "meshio's mesh")
+    return _mesh_of(plain_parts(mesh), file_format, "meshio's mesh")
 
 
 def from_pyvista(grid: Any) -> Mesh:
@@ -100,7 +100,7 @@ def from_pyvista(grid: Any) -> Mesh:
         "point_data": _flags(grid.point_data, POINT_PREFIX),
         "cell_sets": {}, "point_sets": {}, "field_data": {},
     }  # fmt: skip
-    return _made(content, "", "PyVista's data set")
+    return _mesh_of(content, "", "PyVista's data set")
 
 
 def from_gmsh() -> Mesh:
@@ -138,7 +138,7 @@ def from_gmsh() -> Mesh:
     dim = gmsh.model.getDimension()
     if not any(map(len, gmsh.model.mesh.getElements(dim)[1])) if dim >= 0 else True:
         raise MeshError("the model that is open in gmsh has no mesh: call gmsh.model.mesh.generate(2) or (3)")
-    _tell_what_is_left_out(gmsh, dim)
+    _warn_of_omissions(gmsh, dim)
     before = {name: gmsh.option.getNumber(name) for name in GMSH_OPTIONS}
     try:
         with tempfile.TemporaryDirectory() as folder:
@@ -152,7 +152,7 @@ def from_gmsh() -> Mesh:
             gmsh.option.setNumber(name, value)
 
 
-def _tell_what_is_left_out(gmsh: Any, dim: int) -> None:
+def _warn_of_omissions(gmsh: Any, dim: int) -> None:
     """Warn of solid cells without a physical group, which Gmsh does not write if there are any groups."""
     if not gmsh.model.getPhysicalGroups():
         return
@@ -180,7 +180,7 @@ def _flags(data: Any, prefix: str) -> dict[str, Any]:
     return groups
 
 
-def _made(content: dict[str, Any], file_format: str, library: str) -> Mesh:
+def _mesh_of(content: dict[str, Any], file_format: str, library: str) -> Mesh:
     """Return the mesh of plain data, with inverted cells reoriented."""
     try:
         mesh, _ = mesh_of(content, file_format)

@@ -140,7 +140,7 @@ class Model(ModelSupports):
         if self.initial_states:
             self.refuse_nonlinear("initial stresses and strains are")
         fixed, prescribed = self.prescribed_by_ramp()
-        self._tell_axis()
+        self._log_axis()
         forces = self.forces_by_ramp()
         self.thermal_forces_by_ramp()
         for begin in self._changes():

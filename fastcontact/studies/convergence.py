@@ -147,11 +147,11 @@ def _of_function(
     results = functions.run_functions(runs, "no size could be solved", **options)
     solved = [(level, {**result, "h": descending[level]}) for level, result in enumerate(results)]
     series = _series(Named(None, None, name), solved, [*wanted], (), (None, 1.0, ""), asked=tuple(wanted))
-    _tell_coarser(series.levels)
+    _warn_of_coarser_meshes(series.levels)
     return Study(**functions.of_function(function, results), series=[series], failed={}, theory=None)
 
 
-def _tell_coarser(levels: Sequence[Level]) -> None:
+def _warn_of_coarser_meshes(levels: Sequence[Level]) -> None:
     for coarse, fine in pairwise(levels):
         if fine.n_dofs <= coarse.n_dofs:
             warn(

@@ -24,7 +24,7 @@ from fastcontact._tools.paths import replacing
 from fastcontact.errors import CaseError, FastcontactError, FileError
 from fastcontact.results.committed_file import uninterrupted
 from fastcontact.studies.job import Run, run
-from fastcontact.studies.progress import told
+from fastcontact.studies.progress import reporting
 
 Result = dict[str, Any]
 # NumPy and Numba read these when they are imported, so they are set before a worker process starts.
@@ -97,8 +97,8 @@ def run_study(
     jobs: Sequence[Run], name: str, *, on_progress: Callable[[Progress], None] | None, progress: bool, **options: Any
 ) -> list[Result]:
     """Return the results of `run_all`, with a status line if `progress`; if all fail, raise the first error after `name`."""
-    with told(on_progress, progress) as told_to:
-        results = run_all(jobs, on_progress=told_to, **options)
+    with reporting(on_progress, progress) as report:
+        results = run_all(jobs, on_progress=report, **options)
     if all("error" in result for result in results):
         kind = getattr(errors, str(results[0].get("kind")), CaseError)
         raise kind(f"{name}; {jobs[0].label}: {results[0]['error']}")

@@ -41,13 +41,13 @@ class FunctionRun(Run):
 
     def solved(self) -> tuple[Case | None, Sequence[StepResult]]:
         """See `Run`."""
-        return _solved(self._made(), self.name)
+        return _solved(self._result(), self.name)
 
     def further(self, steps: Sequence[StepResult]) -> dict[str, float]:
         """See `Run`."""
         return {name: _number(name, measure, steps) for name, measure in self.measures.items()}
 
-    def _made(self) -> Any:
+    def _result(self) -> Any:
         """Return the value of the function; raises CaseError with the line that failed."""
         try:
             return self.function(*self.positional, **self.named)

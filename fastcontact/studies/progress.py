@@ -32,7 +32,7 @@ class Runs(StatusLine):
 
 
 @contextlib.contextmanager
-def told(on_progress: Callable[[Any], None] | None, show: bool) -> Iterator[Callable[[Any], None]]:
+def reporting(on_progress: Callable[[Any], None] | None, show: bool) -> Iterator[Callable[[Any], None]]:
     """Yield the function to call after every run; it calls that of the user and redraws a line if `show`."""
     with Runs(show) as line:
 

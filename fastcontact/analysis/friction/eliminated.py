@@ -120,13 +120,13 @@ class Eliminated:
         k, m = len(rows) - 1, len(constraints)
         yielding = np.divide(1.0, diagonal := loaded.diagonal(), out=np.zeros(len(u)), where=diagonal > 0.0)
         self._gives = diagonal_compliance(constraints)
-        compliance = self._own(rows, yielding)
+        compliance = self._compliance_of_rows(rows, yielding)
         self._turn = aligning(compliance, constraints.directions) if k == 2 else None
         if self._turn is not None:
             turned = csr_array(self._turn @ vstack(rows, format="csr"))
             rows = tuple(turned[a * m : (a + 1) * m] for a in range(3))
             free = (self._turn @ free.ravel()).reshape(free.shape)
-            compliance = self._own(rows, yielding)
+            compliance = self._compliance_of_rows(rows, yielding)
         still = idle(compliance)
         moved = still & constraints.moved_past(np.arange(m), self._turn)
         self._gives[1:][moved] += np.broadcast_to(GIVING * compliance[0, 0], still.shape)[moved]
@@ -143,7 +143,7 @@ class Eliminated:
             16 * np.finfo(float).eps * np.abs(self._unit * self._gaps(u))[:, usable].max(initial=0.0)
         )
 
-    def _own(self, rows: tuple[csr_array, ...], yielding: Array) -> Array:
+    def _compliance_of_rows(self, rows: tuple[csr_array, ...], yielding: Array) -> Array:
         """Return `compliance_of_rows` plus the tangential compliance: directions with compliance are not idle."""
         compliance = compliance_of_rows(rows, yielding)
         slips = np.arange(1, len(rows))

@@ -117,14 +117,14 @@ class Adjoint:
 
     def _solve(self) -> tuple[Array, Array]:
         right, multiplier = self._right()
-        w, mu = self._kept(right, multiplier)
+        w, mu = self._solve_transposed(right, multiplier)
         first = self._transposed(w, mu)
         if not first.any():
             return w, mu
         none = np.zeros(self._k)
 
         def product(s: Array) -> Array:
-            return s + self._transposed(*self._kept(s, none))
+            return s + self._transposed(*self._solve_transposed(s, none))
 
         n = len(right)
         s, info = gmres(LinearOperator((n, n), product), first, rtol=LEFT, atol=0.0, restart=SOLUTIONS, maxiter=1)
@@ -133,9 +133,9 @@ class Adjoint:
                 f"the adjoint equations of the moving contact geometry are not solved after {self.solutions} solutions: "
                 "keep the pairing (Criteria(keep_pairing=True)), or take differences of two solutions"
             )
-        return self._kept(right - s, multiplier)
+        return self._solve_transposed(right - s, multiplier)
 
-    def _kept(self, right: Array, multiplier: Array) -> tuple[Array, Array]:
+    def _solve_transposed(self, right: Array, multiplier: Array) -> tuple[Array, Array]:
         """Return ``J0^-T`` applied to right-hand sides (n,) and (k,), by the linear solver of the analysis."""
         self.solutions += 1
         loaded = self._solver.load(np.ascontiguousarray(right))

@@ -26,7 +26,7 @@ CONSTANTS = {"E": "123", "nu": NAMES, "G": NAMES, "expansion": "123"}
 def by_constant(contact: MovingContact, parameter: Asked) -> tuple[Array, Array | None]:
     """Return the derivatives of `Change.out` (n_dofs,) and `Change.sample` with respect to a constant, None for zero."""
     model, name = contact.problem.model, str(parameter[0])
-    number, material, component = _found(model, parameter)
+    number, material, component = _constant_of(model, parameter)
     step = CHANGED * _room(material, name, component)
 
     def at(by: float) -> MovingContact:
@@ -44,10 +44,10 @@ def by_constant(contact: MovingContact, parameter: Asked) -> tuple[Array, Array 
 
 def check_constant(model: Model, parameter: Asked) -> None:
     """Raise ModelError if no material has such a constant, or the constant varies."""
-    _found(model, parameter)
+    _constant_of(model, parameter)
 
 
-def _found(model: Model, parameter: Asked) -> tuple[int, Material, int | None]:
+def _constant_of(model: Model, parameter: Asked) -> tuple[int, Material, int | None]:
     """Return the number of a material in the model, the material, and the requested component."""
     matches = [
         (i, material) for i, (material, groups) in enumerate(model.materials)

@@ -160,7 +160,7 @@ class MovingContact:
             return csr_array((size, n)), csr_array((size, n))
         if len(dofs) > FEW:
             owner = self._reached()
-            derivatives = self._differences(_apart(dofs, owner, self.problem.model.mesh.dim), owner)
+            derivatives = self._differences(_independent_groups(dofs, owner, self.problem.model.mesh.dim), owner)
             if self._agrees(0.5 * (derivatives[0] + derivatives[1]), dofs):
                 return derivatives
         return self._differences([np.array([dof]) for dof in dofs], None)
@@ -260,7 +260,7 @@ class MovingContact:
         return all(off[p].max(initial=0.0) <= TOGETHER * np.abs(difference[p]).max(initial=0.0) for p in parts)
 
 
-def _apart(dofs: Indices, reached: csr_array, dim: int) -> list[Indices]:
+def _independent_groups(dofs: Indices, reached: csr_array, dim: int) -> list[Indices]:
     """Return groups of components of which no two affect the same constraint, or constraints of common points."""
     n_points = reached.shape[1]
     points = np.unique(dofs[dofs < n_points * dim] // dim)

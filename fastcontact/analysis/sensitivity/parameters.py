@@ -62,7 +62,7 @@ def change_by(contact: MovingContact, parameter: Asked) -> Change:
     return KINDS[str(parameter[0])][1](contact, parameter)
 
 
-def _one(kind: str, known: Mapping[str, Any], parameter: Asked) -> Any:
+def _item(kind: str, known: Mapping[str, Any], parameter: Asked) -> Any:
     """Return the item of a given name; ModelError if there is none."""
     if parameter[1] not in known:
         raise ModelError(unknown(kind, str(parameter[1]), known))
@@ -150,7 +150,7 @@ def _of_temperature(contact: MovingContact, parameter: Asked) -> Change:
 
 def _pretension(model: Model, parameter: Asked) -> Pretension:
     """Return a pretension section."""
-    section: Pretension = _one("pretension", {item.label: item for item in model.pretensions}, parameter)
+    section: Pretension = _item("pretension", {item.label: item for item in model.pretensions}, parameter)
     return section
 
 
@@ -210,7 +210,7 @@ def _lifted(contact: MovingContact, values: Array, along: Sequence[int]) -> Chan
 def _moved(model: Model, parameter: Asked) -> ContactPair:
     """Return the pair of a rigid obstacle with a prescribed motion."""
     moved = {pair.name: pair for pair in model.contact if any(pair.motion)}
-    obstacle: ContactPair = _one("rigid obstacle with a motion", moved, parameter)
+    obstacle: ContactPair = _item("rigid obstacle with a motion", moved, parameter)
     return obstacle
 
 
@@ -238,7 +238,7 @@ def _of_motion(contact: MovingContact, parameter: Asked) -> Change:
 
 def _opened(model: Model, parameter: Asked) -> None:
     """Refuse clearances of pairs that do not exist or are tied."""
-    if _one("contact pair", {pair.name: pair for pair in model.contact}, parameter).options.get("kind") == "tied":
+    if _item("contact pair", {pair.name: pair for pair in model.contact}, parameter).options.get("kind") == "tied":
         raise ModelError(f"contact '{parameter[1]}' is tied: it keeps its gaps, and has no clearance")
 
 

@@ -132,7 +132,7 @@ class Deck:
             displacement[at] = table_value(table, step.load_factor)
         step = replace(step, displacement=displacement)
         if self.building.content.steps and step.load_factor == self.ramp.instants[-1]:
-            self._tell_nonlinear(step)
+            self._warn_of_large_strains(step)
         t = self.thickness
         if t == 1.0:
             return replace(step, reaction=reaction)
@@ -173,7 +173,7 @@ class Deck:
             )
         return largest
 
-    def _tell_nonlinear(self, step: StepResult) -> None:
+    def _warn_of_large_strains(self, step: StepResult) -> None:
         """Warn with the largest strain and rotation if the deck has NLGEOM but small strains were solved."""
         for asked in (s for s in self.building.content.steps if s.nonlinear and self.building.linearised):
             strain = self._largest_strain(step)

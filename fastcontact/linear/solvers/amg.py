@@ -199,7 +199,7 @@ def _or_by_factors(method: Callable[..., Any]) -> Callable[..., Any]:
     """Decorate a method to fall back on a factorisation where the iteration stalls."""
 
     @functools.wraps(method)
-    def found(self: _Loaded, *args: Any, **options: Any) -> Any:
+    def with_fallback(self: _Loaded, *args: Any, **options: Any) -> Any:
         if self._solver.instead is None:
             try:
                 return method(self, *args, **options)
@@ -207,7 +207,7 @@ def _or_by_factors(method: Callable[..., Any]) -> Callable[..., Any]:
                 self._solver.give_up(stalled)
         return getattr(self._factored, method.__name__)(*args, **options)
 
-    return found
+    return with_fallback
 
 
 class _Loaded(LoadedMultigrid):

@@ -118,7 +118,7 @@ def inner_seeds(outline: Array, spacing: Spacing, density: float) -> Array:
     """Return points (m, 2) [length] inside a convex `outline` (n, 2) [length], about ``density * spacing`` apart."""
     low, high = outline.min(axis=0), outline.max(axis=0)
     field = _lattice(spacing, density, low, high) if spacing.uniform else _rings(spacing, density, low, high)
-    corners = _apart(_corner_seeds(outline, spacing, density), outline, spacing, density)
+    corners = _spaced(_corner_seeds(outline, spacing, density), outline, spacing, density)
     size = density * spacing(field)
     inside = field[_depth(outline, field) > _CLEAR * size]
     if not len(corners):
@@ -127,7 +127,7 @@ def inner_seeds(outline: Array, spacing: Spacing, density: float) -> Array:
     return np.vstack([corners, inside[free]])
 
 
-def _apart(seeds: Array, outline: Array, spacing: Spacing, density: float) -> Array:
+def _spaced(seeds: Array, outline: Array, spacing: Spacing, density: float) -> Array:
     """Return the seeds (m, 2) far enough from the outline and from earlier seeds, where a body is narrow."""
     accepted: list[Array] = []
     for seed, depth, size in zip(seeds, _depth(outline, seeds), density * spacing(seeds), strict=True):

@@ -217,7 +217,7 @@ class ModelSupports(ModelContact):
         """Nodes (k,) on the axis of an axisymmetric model, where x is fixed without a support; otherwise empty."""
         return axis_nodes(self.mesh) if self.kinematics == "axisymmetric" else np.empty(0, np.intp)
 
-    def _tell_axis(self) -> None:
+    def _log_axis(self) -> None:
         """Log the nodes held on the axis by symmetry rather than by a support."""
         named = [self.mesh.points_of(support.group) for support in self.supports if support.component == 0]
         held = np.setdiff1d(self.axis_nodes, np.concatenate(named)) if named else self.axis_nodes

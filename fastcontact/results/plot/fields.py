@@ -61,7 +61,7 @@ class Field:
         low, high = float(self.values.min()), float(self.values.max())
         return low < 0.0 < high and min(-low, high) > 0.1 * max(-low, high)
 
-    def told(self, value: float, units: Mapping[str, str], where: str = "") -> str:
+    def described(self, value: float, units: Mapping[str, str], where: str = "") -> str:
         """Return an extreme value as text."""
         kind = "maximum" if value >= 0.0 else "minimum"
         return f"{kind}{where} {valued(float(value), units, self.quantity, 5)}"

@@ -216,4 +216,4 @@ def _stroke(axes: Any, strokes: Array) -> None:
 def _mark(axes: Any, at: Array, value: float, before: Array, points: Array, units: Units, shown: Field) -> None:
     """Mark the largest value of the section, at (2,) in the picture, at `before` (3,) on the undeformed bodies."""
     size = float(np.ptp(points, axis=0).max())
-    mark(axes, at, f"{shown.told(value, units, ' on the section')}\nundeformed at {placed(before, size)}")
+    mark(axes, at, f"{shown.described(value, units, ' on the section')}\nundeformed at {placed(before, size)}")

@@ -146,7 +146,7 @@ def _mark(axes: Any, shown: Field, points: Array, mesh: Mesh, units: Units, hidd
     before = mesh.points[shown.node[shown.extreme]]
     at, size = points[shown.extreme], float(np.ptp(points, axis=0).max())
     here, there = placed(at, size), placed(before, size)
-    label = f"{shown.told(shown.values[shown.extreme], units)} at {here}{', hidden' * hidden}"
+    label = f"{shown.described(shown.values[shown.extreme], units)} at {here}{', hidden' * hidden}"
     mark(axes, at, label + (f"\nundeformed at {there}" if here != there else ""))
 
 

@@ -52,7 +52,7 @@ def forget():
     """Forget what a process remembers of modules and of the cache."""
     for name in ("caller", "callee", "constants"):
         sys.modules.pop(name, None)
-    for remembered in (cache.folder_of, cache.is_trusted, cache._tell, cache._digest_of_file):
+    for remembered in (cache.folder_of, cache.is_trusted, cache._log_once, cache._digest_of_file):
         remembered.cache_clear()
     decorators._cache_reported = False
 
