@@ -30,7 +30,7 @@ def parsed(text: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except RecursionError:
-        raise ValueError("tables or lists stand too deep in each other") from None
+        raise ValueError("tables or lists are nested too deeply") from None
 
 
 def written(data: Any) -> str:
@@ -57,4 +57,4 @@ def _value(value: Any) -> str:
         return f"[{', '.join(map(_value, value))}]"
     if isinstance(value, dict):
         return "{" + ", ".join(f"{_key(name)} = {_value(inner)}" for name, inner in value.items()) + "}"
-    raise ValueError(f"{type(value).__name__} is no type of TOML")
+    raise ValueError(f"{type(value).__name__} is not a TOML type")

@@ -34,7 +34,7 @@ def sag_warnings(problem: Problem, state: State, last: StepResult) -> dict[str, 
         if corrected or pair.options.tied or pair.options.gap_only or not (contact.pressure > 0.0).any():
             continue
         at = problem.configuration(name, state, load, displacement, state.u)
-        off = _standing_off(pair, at, contact.active)
+        off = _sag_at_points(pair, at, contact.active)
         text = _text(pair, float(np.ptp(off)), contact) if len(off) else ""
         if text:
             warnings[name] = f"contact '{name}': {text}"
@@ -52,20 +52,20 @@ def _text(pair: Formulation, spread: float, contact: ContactResult) -> str:
     if isinstance(pair.primary, RigidSide):
         doubtful, power = AGAINST_RIGID, 2 * order
         length = float(np.linalg.norm(np.ptp(pair.points[side.points[contact.active]], axis=0)))
-        remedy = "formulation 'node_to_segment' measures the gap at nodes, which stand on the arc"
+        remedy = "formulation 'node_to_segment' measures the gap at nodes, which lie on the arc"
     mean = float(contact.pressure[contact.pressure > 0.0].mean())
     error = pair.modulus * spread / max(length, size)
     if error <= doubtful * mean:
         return ""
     finer = f"facets of length {size * (doubtful * mean / error) ** (1.0 / power):.2g} instead of {size:.2g}"
     return (
-        f"facets of '{side.group}' and of what it faces stand off their arcs by up to {spread:.3g}, which may move pressures "
-        f"by the order of {error:.3g}, beside a mean of {mean:.3g}: {remedy}; "
+        f"facets of '{side.group}' and of what it faces deviate from their arcs by up to {spread:.3g}, which may move "
+        f"pressures by the order of {error:.3g}, beside a mean of {mean:.3g}: {remedy}; "
         f"{'quadratic elements, or ' if order == 1 else ''}{finer} bring it down"
     )
 
 
-def _standing_off(pair: Formulation, at: Configuration, active: Mask) -> Array:
+def _sag_at_points(pair: Formulation, at: Configuration, active: Mask) -> Array:
     """Return the sag of closed facets at the points where their gap is evaluated (n,) [length]."""
     points, deformed, closed = _points(pair), pair.points + at.displacement, np.zeros(len(pair.points), bool)
     closed[pair.secondary.points[active]] = True

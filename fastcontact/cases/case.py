@@ -183,7 +183,7 @@ def _unreadable(path: Path, error: Exception) -> str:
         return f"it does not exist{ready}"
     if isinstance(error, OSError):
         return error.strerror or type(error).__name__
-    return "it is no text in UTF-8; name a TOML file"
+    return "it is not UTF-8 text; name a TOML file"
 
 
 def build_case(
@@ -302,7 +302,7 @@ def _ramp(data: dict[str, Any]) -> Ramp:
         raise CaseError("'ramp' takes either 'instants', or 'steps' and 'end', not both")
     wrong = [t for t in data["instants"] if isinstance(t, bool) or not isinstance(t, NUMBER)]
     if wrong:
-        raise CaseError(f"ramp.instants holds {wrong[0]!r}, which is no number")
+        raise CaseError(f"ramp.instants holds {wrong[0]!r}, which is not a number")
     instants = tuple(float(t) for t in data["instants"])
     table = points(data["table"]) if "table" in data else ((0.0, 0.0), (1.0, 1.0))
     return Ramp(instants, table)

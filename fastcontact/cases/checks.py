@@ -183,7 +183,7 @@ def read_check(
     if check.value is not None and not math.isfinite(check.value):
         raise CaseError(f"{where}.value = {check.value:g} must be finite")
     if check.value == 0.0:
-        raise CaseError(f"{where}: the value is 0, so no relative deviation can be told; check another quantity")
+        raise CaseError(f"{where}: the value is 0, so there is no relative deviation; check another quantity")
     if check.theory:
         check_known(f"theory in {where}", check.theory, theories, CaseError)
         check_target(where, check, theories[check.theory]["theory"])
@@ -212,7 +212,7 @@ def check_target(where: str, check: Check, theory: Any) -> None:
         numbers = [name for name in dir(theory) if not name.startswith("_") and _is_number(theory, name)]
         raise CaseError(unknown(f"number of the theory in {where}.of", check.of, numbers)) from None
     if not (math.isfinite(target) and target):
-        raise CaseError(f"{where}: the theory's {check.of} is {target:g}, so no relative deviation can be told")
+        raise CaseError(f"{where}: the theory's {check.of} is {target:g}, so there is no relative deviation")
 
 
 def _is_number(theory: Any, name: str) -> bool:

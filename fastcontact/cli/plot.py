@@ -80,7 +80,7 @@ def _plane(text: str) -> tuple[int, float]:
     try:
         return "xyz".index(name.strip()), float(value)
     except ValueError:
-        raise CaseError(f"'{text}' is no plane: write for example y=0") from None
+        raise CaseError(f"'{text}' is not a plane: write for example y=0") from None
 
 
 def _animate(options: argparse.Namespace, results: Any, step: Any, case: dict[str, Any]) -> None:

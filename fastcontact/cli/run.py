@@ -198,7 +198,7 @@ def _warn_of_other_steps(case: Case, done: Sequence[float], output: Path) -> Non
     if others:
         warn(
             f"'{output}' holds {len(done)} steps, the case now has {len(known)}: those in the file stay, also at load factor "
-            f"{others[0]:g}, which is none of the case's; without --resume all are solved anew"
+            f"{others[0]:g}, which is not in the case; without --resume all are solved anew"
         )
 
 

@@ -131,7 +131,7 @@ def _meets_axis(points: Array) -> bool:
 def symmetry_planes(surface: Surface, coordinates: Array, motions: HeldMotions | None) -> list[tuple[int, Indices]]:
     """Return the planes of symmetry at the ends of a surface: their axis, and the nodes of the surface on them.
 
-    `coordinates` (n_points, dim) are those of all points; without supports there is no plane.
+    `coordinates` (n_points, dim) are those of all points; without supports there is not a plane.
     """
     if motions is None:
         return []

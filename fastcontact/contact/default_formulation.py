@@ -64,4 +64,4 @@ def against_obstacle(
         if dim == 3 and options.get("friction") and not any(name in options for name in OF_STANDARD):
             why = "multigrid cannot eliminate the continuous one with friction in space"
             return "mortar", {**options, "multipliers": "dual"}, why
-    return "continuous", dict(options), "it also knows what lies between nodes"
+    return "continuous", dict(options), "it also covers the region between nodes"

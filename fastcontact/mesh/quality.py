@@ -162,7 +162,7 @@ def _check_twice(mesh: Mesh, name: str) -> None:
     if (count > 1).any():
         row = int(rows[first[count > 1].min()])
         raise MeshError(
-            f"{_described(mesh, name, row)} stands in the mesh {int(count.max())} times, one of "
+            f"{_described(mesh, name, row)} occurs in the mesh {int(count.max())} times, one of "
             f"{int((count > 1).sum())} such cells: remove the copies"
         )
 

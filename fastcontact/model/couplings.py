@@ -106,7 +106,8 @@ def reference_of(mesh: Mesh, name: str) -> ReferencePoint:
     """Return a reference point by the name of its group; ModelError if there is none of that name."""
     if name + ROTATION not in mesh.point_groups:
         raise ModelError(
-            f"'{name}' is no reference point: make the model of fc.generate.with_reference_points(mesh, {{'{name}': (...)}})"
+            f"'{name}' is not a reference point: make the model of "
+            f"fc.generate.with_reference_points(mesh, {{'{name}': (...)}})"
         )
     point = mesh.point(name)
     return ReferencePoint(point, mesh.point(name + ROTATION), tuple(mesh.points[point].tolist()))

@@ -131,7 +131,7 @@ def cyclic(
                 return [MultiPointConstraint(name, _without_zeros(rows_of))], None
     raise ModelError(
         f"{name}: point {first[far]} of '{ends[0]}', turned by 1/{sectors} of a turn, lies {distance[far]:.3g} from the "
-        f"nearest node of '{ends[1]}', and the groups are no facets that lie upon each other: check axis and sectors"
+        f"nearest node of '{ends[1]}', and the groups are not facets that lie upon each other: check axis and sectors"
     )
 
 

@@ -104,7 +104,7 @@ class Results(Sequence[StepResult]):
         if not os.access(path, os.R_OK, effective_ids=os.access in os.supports_effective_ids):
             raise FileError(f"'{path}' may not be read: ask its owner for the permission")
         if not h5py.is_hdf5(self.path):
-            raise FileError(f"'{path}' is no HDF5 file: name a result file that fastcontact wrote (.vtkhdf)")
+            raise FileError(f"'{path}' is not an HDF5 file: name a result file that fastcontact wrote (.vtkhdf)")
         # A separate file object: by name HDF5 would return a file already open in this process, in its former state.
         self._raw: Any = open(path, "rb")  # noqa: SIM115
         self._file: Any = None
@@ -143,7 +143,7 @@ class Results(Sequence[StepResult]):
         if len(self._rows) != self._n_steps or self._rows.ndim != 1:
             raise ValueError(f"only {len(self._rows)} of {self._n_steps} steps")
         if not isinstance(self.kinematics, str) or not isinstance(self.case_text, str):
-            raise ValueError("its kinematics or its case is no text")
+            raise ValueError("its kinematics or its case is not text")
         self.load_factors: Array = np.ascontiguousarray(self._rows["load_factor"])
         run = self._run_record(group)
         self.log: Any = (run or {}).get("log")
@@ -154,7 +154,7 @@ class Results(Sequence[StepResult]):
         of_steps = [text for note in notes for text in note["warnings"]]
         named = _read_json(group["units"], self._raw) if "units" in group else self._units_of_case()
         if not isinstance(named, dict) or not all(isinstance(text, str) for text in named.values()):
-            raise ValueError("its units are no names")
+            raise ValueError("its units are not names")
         self.units: dict[str, str] = units_of_results(named, self.kinematics) if named else {}
         self.warnings: tuple[str, ...] = tuple(dict.fromkeys([*(run or {}).get("warnings", ()), *of_steps]))
 
@@ -399,7 +399,7 @@ class Results(Sequence[StepResult]):
 
 def _integer(group: Any, name: str) -> int:
     if group.attrs.get_id(name).dtype.kind not in "iu":
-        raise ValueError(f"'{name}' of '{group.name}' is no whole number")
+        raise ValueError(f"'{name}' of '{group.name}' is not a whole number")
     return int(group.attrs[name])
 
 

@@ -25,7 +25,7 @@ def read_text(dataset: Any, raw: Any) -> str:
 
     kind, start = h5py.check_string_dtype(dataset.dtype), dataset.id.get_offset()
     if dataset.shape != () or start is None or kind is None or kind.length is not None:
-        raise ValueError(f"'{dataset.name}' is no text")
+        raise ValueError(f"'{dataset.name}' is not a text")
     file_size = raw.seek(0, os.SEEK_END)
     length, offset, wanted = _unpacked(REFERENCE, raw, start, file_size)
     signature, size = _unpacked(HEAD, raw, offset, file_size)
@@ -43,6 +43,6 @@ def read_text(dataset: Any, raw: Any) -> str:
 
 def _unpacked(kind: struct.Struct, raw: Any, offset: int, end: int) -> tuple[Any, ...]:
     if offset + kind.size > end:
-        raise ValueError(f"its texts are damaged: they stand at byte {offset} of {end}")
+        raise ValueError(f"its texts are damaged: they are at byte {offset} of {end}")
     raw.seek(offset)
     return kind.unpack(raw.read(kind.size))

@@ -121,7 +121,7 @@ class ResultWriter:
         cell_fields = dict.fromkeys((*getattr(mesh, "cell_fields", ()), *cell_fields))
         if not isinstance(mesh, Mesh):
             if not isinstance(getattr(mesh, "mesh", None), Mesh) or not hasattr(mesh, "kinematics"):
-                raise ModelError(f"results need a mesh or a model to stand on, not {type(mesh).__name__}")
+                raise ModelError(f"results need a mesh or a model as a basis, not {type(mesh).__name__}")
             kinematics, self._material = mesh.kinematics, _materials_that_meet(mesh)
             case_text = case_text or getattr(mesh, "case_text", None) or ""
             mesh = mesh.mesh
@@ -428,7 +428,7 @@ def _steps_to_resume(
         begin_anew = "or start anew without resuming, which replaces the file"
         if old.schema < layout.RESUMABLE:
             raise FileError(
-                f"'{path}' was written by an earlier fastcontact, which kept nothing to go on from: name another file "
+                f"'{path}' was written by an earlier fastcontact, which stored no data to resume from: name another file "
                 f"{begin_anew}"
             )
         if lost := old.lacks(layout.CONTINUED):
@@ -489,4 +489,4 @@ def _check_replaceable(path: Any, overwrite: bool) -> None:
             # Not `in`, which follows links, even to other files.
             is_result = isinstance(file.get("VTKHDF", getlink=True), h5py.HardLink)
     if not is_result:
-        raise FileError(f"'{path}' exists and is no result file: name another file or remove it first")
+        raise FileError(f"'{path}' exists and is not a result file: name another file or remove it first")

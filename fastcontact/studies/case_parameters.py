@@ -72,7 +72,7 @@ def _keys(path: str) -> list[str | int]:
     for key in path.split("."):
         match = _PART.match(key)
         if match is None:
-            raise CaseError(f"'{path}' is no path into a case file: write for example support[1].y")
+            raise CaseError(f"'{path}' is not a path into a case file: write for example support[1].y")
         keys.append(match[1])
         keys += [int(number) for number in re.findall(r"\d+", match[2])]
     return keys
@@ -82,7 +82,7 @@ def _inside(entry: Any, key: str | int, path: str) -> Any:
     if isinstance(key, int):
         if not isinstance(entry, list) or key >= len(entry):
             count = len(entry) if isinstance(entry, list) else 0
-            raise CaseError(f"'{path}' asks for entry [{key}], counted from [0], and the case has {count} there")
+            raise CaseError(f"'{path}' refers to entry [{key}], counted from [0], and the case has {count} there")
     elif not isinstance(entry, dict) or key not in entry:
         raise CaseError(unknown(f"entry of the case in '{path}'", key, entry if isinstance(entry, dict) else ()))
     return entry[key]

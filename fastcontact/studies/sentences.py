@@ -64,7 +64,7 @@ def _not_to_theory(series: Series, quantity: str, start: str, split: Split) -> s
     limit = series.limits[quantity]
     tends = f"tends to {number(limit.value, 6)} +- {number(limit.uncertainty, 2)}"
     return (
-        f"{start} {tends} where the theory has {number(split.theory, 6)}. That theory is about the very bodies of the model, "
+        f"{start} {tends} where the theory has {number(split.theory, 6)}. That theory is exact for the bodies of the model, "
         f"so this is no model error: {series.combination} does not converge to it on these meshes. Compare formulations "
         "(--formulations all), or let the meshes of the two sides match."
     )
@@ -79,7 +79,7 @@ def _about_cancelling(series: Series, quantity: str, split: Split) -> list[str]:
     level = series.levels[best]
     return [
         f"Level {level.number} ({level.n_dofs} degrees of freedom) lies only {percent(off[best])} from theory because its "
-        f"mesh error of {percent(off[best] - split.model)} cancels model error: that it agrees is no proof of a good mesh."
+        f"mesh error of {percent(off[best] - split.model)} cancels model error: this agreement is no proof of a good mesh."
     ]
 
 

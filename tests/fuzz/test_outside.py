@@ -130,7 +130,7 @@ def test_a_file_that_only_links_to_results_is_no_result_to_write_over(tmp_path, 
     with h5py.File(path, "w") as file:
         file["VTKHDF"] = h5py.ExternalLink(outside / "bait.h5", "/VTKHDF")
     before, watch = path.read_bytes(), Watch(outside)
-    with pytest.raises(FileError, match="is no result file"):
+    with pytest.raises(FileError, match="is not a result file"):
         ResultWriter(path, solved[0], overwrite=True)
     with pytest.raises(FileError, match="refers to another file"):
         fc.open_results(path)

@@ -168,6 +168,6 @@ COMMANDS = [
     ("mesh into a suffix of no format", ["mesh", "half-spheres", "-o", "a.xyz"],
      r"'.*a\.xyz': unknown mesh file suffix '\.xyz': use \.med, \.msh, \.vtu, \.vtk, \.inp, \.xdmf, \.mesh or another format of meshio"),
     ("export of a case file", ["export", "case.toml", "--xdmf", "a.xdmf"],
-     r"'case\.toml' is no HDF5 file: name a result file that fastcontact wrote \(\.vtkhdf\)"),
+     r"'case\.toml' is not an HDF5 file: name a result file that fastcontact wrote \(\.vtkhdf\)"),
 ]
 # fmt: on

@@ -191,7 +191,7 @@ DOUBTS = [
             '[contact.pair]\nsecondary = "CONT_INNER"\nprimary = "CONT_OUTER"\nformulation = "continuous"\nclearance = -0.2\n',
         ),
         (
-            r"contact 'pair': facets of 'CONT_INNER' and of what it faces stand off their arcs by up to 0\.297, which may move pressures by the order of 49\.9, beside a mean of 3\.85: surface_smoothing=True measures the gap between the arcs; quadratic elements, or facets of length 0\.25 instead of 6\.5 bring it down",
+            r"contact 'pair': facets of 'CONT_INNER' and of what it faces deviate from their arcs by up to 0\.297, which may move pressures by the order of 49\.9, beside a mean of 3\.85: surface_smoothing=True measures the gap between the arcs; quadratic elements, or facets of length 0\.25 instead of 6\.5 bring it down",
         ),
     ),
     Doubt(

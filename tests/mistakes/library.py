@@ -177,7 +177,7 @@ MESH = [
             fc.MeshError,
             r"cell 0 \(tri3 at \(1, 0\), area 0\) is degenerate, one of 1 such cells: remove it or merge its points differently"),
     Mistake("a duplicate cell", lambda: of_square(cells=lambda c: np.vstack([c, c[1]])), fc.MeshError,
-            r"cell 1 \(quad4 at \(0\.25, 0\.75\)\) stands in the mesh 2 times, one of 1 such cells: remove the copies"),
+            r"cell 1 \(quad4 at \(0\.25, 0\.75\)\) occurs in the mesh 2 times, one of 1 such cells: remove the copies"),
     Mistake("a mesh without groups", lambda: blocks(changed(cell_groups={}, point_groups={})), fc.MeshError,
             r"the mesh has no groups at all, so none is 'LOWER_BOTTOM': name groups in the mesher, or with Mesh\.with_groups"),
     Mistake("a mesh of facets only", lambda: fc.Model(fc.Mesh([[0, 0], [1, 0]], {"line2": [[0, 1]]}), "plane_strain"),

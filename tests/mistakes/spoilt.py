@@ -87,7 +87,7 @@ MESHES = [
      r"the mesh has no groups at all, so none is 'SPHHAU': name groups in the mesher, or with Mesh\.with_groups"),
     ("the file has lines only", rewritten(lines_only), r"the mesh has no solid cells, only line2"),
     ("a duplicate cell in the file", rewritten(with_a_copy),
-     r"cell \d+ \(tri3 at \(.*\)\) stands in the mesh 2 times, one of 1 such cells: remove the copies"),
+     r"cell \d+ \(tri3 at \(.*\)\) occurs in the mesh 2 times, one of 1 such cells: remove the copies"),
     ("the file has a 3D mesh", in_space, r"kinematics 'axisymmetric' do not fit a mesh in 3 dimensions: use '3d'"),
 ]
 # fmt: on

@@ -19,7 +19,7 @@ from fastcontact.mesh.generate.box import SOLIDS
 pytestmark = [
     pytest.mark.pairwise,
     pytest.mark.filterwarnings(
-        "ignore:.*stand off their arcs", "ignore:.*raise its penalty", "ignore:multigrid gave up"
+        "ignore:.*deviate from their arcs", "ignore:.*raise its penalty", "ignore:multigrid gave up"
     ),
 ]
 FORMULATIONS = {

@@ -99,7 +99,7 @@ def held_contact(model: Model, step: StepResult | None, held: HeldMotions, hold_
         if bound.options.gap_only:
             continue
         if bound.options.cohesion is not None:
-            raise ModelError(f"modes know no cohesion or adhesion: tie contact '{pair.name}', or leave it out")
+            raise ModelError(f"modes do not support cohesion or adhesion: tie contact '{pair.name}', or leave it out")
         at = Configuration.undeformed(model.mesh.points) if step is None else end_of(step, step, pair.name)
         if contact is not None and contact.wear is not None:
             at = replace(at, worn=at_points(contact.points, contact.wear, model.mesh.n_points))

@@ -61,7 +61,7 @@ def _constant_of(model: Model, parameter: Asked) -> tuple[int, Material, int | N
     components = value if isinstance(value, tuple) else (value,)
     if value is None or any(map(varying, components)):
         raise ModelError(
-            f"the material {parameter[1]!r} has no {name}, or one that varies: there is no sensitivity by that"
+            f"the material {parameter[1]!r} has no {name}, or one that varies: there is no sensitivity to it"
         )
     return number, material, _component(parameter, list(CONSTANTS[name]) if len(components) > 1 else [])
 

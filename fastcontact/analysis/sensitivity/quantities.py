@@ -121,7 +121,7 @@ def _pressure(contact: MovingContact, none: Gradient, step: StepResult, asked: A
         point = _point(contact.problem.model, asked[2])
         places = np.flatnonzero(result.points == point)
         if not len(places):
-            raise ModelError(f"point {point} is no node of the secondary side of contact '{name}'")
+            raise ModelError(f"point {point} is not a node of the secondary side of contact '{name}'")
         row = int(places[0])
     if not result.active[row]:
         raise ModelError(f"point {result.points[row]} of contact '{name}' is open: its pressure is zero")

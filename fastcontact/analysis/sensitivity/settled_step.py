@@ -62,7 +62,7 @@ def _check_path(model: Model, step: StepResult, criteria: Criteria) -> None:
                     f"of one. Take differences of two solutions, or leave out {option}"
                 )
         if pair.fluid is not None:
-            raise ModelError(f"contact '{pair.name}' has a fluid, whose place sensitivities do not know: leave it out")
+            raise ModelError(f"contact '{pair.name}' has a fluid, which sensitivities do not support: leave it out")
         if pair.options.get("kind") == "bilateral_once_closed":
             raise ModelError(
                 f"contact '{pair.name}' never opens what was closed in earlier load steps: sensitivities are those of one "

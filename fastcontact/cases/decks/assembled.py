@@ -238,7 +238,7 @@ class Assembled:
     def facet(self, element: Element, label: int, location: Location) -> int:
         """Return the index of the face with a label, counted from 1, among the facets of its element."""
         if element.type is None:
-            raise location.refuse(f"element {element.number} is no solid, so it has no faces")
+            raise location.refuse(f"element {element.number} is not a solid, so it has no faces")
         faces = element.type.faces
         if not 1 <= label <= len(faces):
             raise location.refuse(
@@ -249,7 +249,7 @@ class Assembled:
     def _free_faces(self, element: Element, location: Location) -> Iterator[Face]:
         """Yield the faces of an element that no other one shares."""
         if element.type is None:
-            raise location.refuse(f"element {element.number} is no solid, so it has no faces")
+            raise location.refuse(f"element {element.number} is not a solid, so it has no faces")
         facets = matching(element.type.element)
         for label in np.flatnonzero(self.free[element.type.element][element.row]).tolist():
             yield element, facets[label]

@@ -75,7 +75,7 @@ class Row(Located):
         """Return an entry as a whole number; errors as for `number`."""
         value = self.number(index, default)
         if value != int(value) or abs(value) > LARGEST_WHOLE:
-            raise self.refuse(f"'{self.text(index)[:LONGEST_QUOTED]}' is no whole number")
+            raise self.refuse(f"'{self.text(index)[:LONGEST_QUOTED]}' is not a whole number")
         return int(value)
 
     def positive(self, index: int, quantity: str) -> float:
@@ -171,9 +171,9 @@ def as_number(location: Location, text: str) -> float:
     try:
         value = float(text.upper().replace("D", "E")) if text[:1].upper() not in "IN" else float("nan")
     except ValueError:
-        raise location.refuse(f"'{text[:LONGEST_QUOTED]}' is no number") from None
+        raise location.refuse(f"'{text[:LONGEST_QUOTED]}' is not a number") from None
     if "_" in text or value != value or value in (float("inf"), float("-inf")):
-        raise location.refuse(f"'{text[:LONGEST_QUOTED]}' is no number that could be used")
+        raise location.refuse(f"'{text[:LONGEST_QUOTED]}' is not a usable number")
     return value
 
 
@@ -319,7 +319,7 @@ def _parameters(location: Location, line: str) -> dict[str, str | None]:
         key, equal, value = part.partition("=")
         key = " ".join(key.upper().split())
         if key in parameters:
-            raise location.refuse(f"the parameter {key} stands there twice")
+            raise location.refuse(f"the parameter {key} is given twice")
         if key:
             parameters[key] = unquoted(value.strip()) if equal else None
     return parameters
@@ -342,7 +342,7 @@ def _included(block: Block, name: str, source: Source) -> Iterator[Block]:
         inside = target.is_relative_to(source.folder)
         there = inside and target.is_file()
     except (OSError, ValueError, RuntimeError):
-        raise block.refuse(f"'{shown}' is no name of a file") from None
+        raise block.refuse(f"'{shown}' is not a file name") from None
     if not inside:
         raise block.refuse(
             f"'{shown}' is outside of the folder of the deck: refused, copy the file below '{source.folder}'"

@@ -193,7 +193,7 @@ class Building:
             if not pair.tied:
                 defined("surface interaction", pair.interaction, self.content.interactions, pair)
             if folded(pair.name) in seen:
-                raise pair.refuse(f"the pair {pair.name} stands there twice")
+                raise pair.refuse(f"the pair {pair.name} is given twice")
             seen.add(folded(pair.name))
 
     def _groups(self, conditions: Conditions) -> list[tuple[str, Any, Table]]:
@@ -321,7 +321,7 @@ class Building:
         for name, (location, stiffness) in self.content.springs.items():
             for element in self.made.elements_of(name, location):
                 if element.cell.type != "SPRINGA":
-                    raise location.refuse(f"element {element.number} is no spring of type SPRINGA")
+                    raise location.refuse(f"element {element.number} is not a spring of type SPRINGA")
                 self.model.add_spring(element.points[0], element.points[1], axial=stiffness / self.thickness)
         check_discrete(self.made, "SPRINGA", self.content.springs, "*SPRING")
 

@@ -15,7 +15,7 @@ MODES = {"BK": "bk", "POWER LAW": "power"}
 def keep(content: Content, current: Interaction, block: Block) -> None:
     """*COHESIVE BEHAVIOR, *DAMAGE INITIATION, *DAMAGE EVOLUTION: stored until all are read."""
     if block.keyword in current.cohesion:
-        raise block.refuse(f"surface interaction '{current.name}' has two of it")
+        raise block.refuse(f"surface interaction '{current.name}' has this keyword twice")
     current.cohesion[block.keyword] = block
 
 

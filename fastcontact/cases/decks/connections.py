@@ -19,7 +19,7 @@ def contact_pair(content: Content, block: Block) -> None:
     if block.choice("TYPE", kinds) == "NODE TO SURFACE":
         content.note(block, "NODE TO SURFACE: mortar contact is solved, which passes uniform pressures on any meshes")
     if "SMALL SLIDING" in block.parameters:
-        content.note(block, "SMALL SLIDING: sides are paired on the deformed shape all the same")
+        content.note(block, "SMALL SLIDING: sides are paired on the deformed shape nevertheless")
     adjust = block.get("ADJUST") if "ADJUST" in block.parameters else ""
     content.pairs += [
         Pair(*sides, block.required("INTERACTION"), adjust=adjust) for sides in _sides(block, "a contact pair")

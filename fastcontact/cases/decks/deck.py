@@ -232,7 +232,7 @@ def read_deck(path: PathLike) -> Deck:
         step = next(step for step in content.steps if step.nonlinear)
         warn(
             f"{step.location}: NLGEOM: with {building.linearised} small strains and rotations are solved; the result is "
-            "valid only while they stay small, and a warning after the solution tells how large they are"
+            "valid only while they stay small, and a warning after the solution reports how large they are"
         )
     return Deck(
         path=file,

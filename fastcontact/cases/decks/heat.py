@@ -104,7 +104,7 @@ def friction_heat_of(content: Content, law: Interaction) -> dict[str, Any]:
     """Return the option for frictional heating of both sides, with the step length as time."""
     if law.friction_heat is None:
         if law.conductance:
-            content.note(law, "friction makes no heat without *GAP HEAT GENERATION, as in CalculiX")
+            content.note(law, "friction generates no heat without *GAP HEAT GENERATION, as in CalculiX")
         return {}
     location, share = law.friction_heat
     periods = {step.period for step in content.steps}
@@ -138,7 +138,7 @@ def check_steps(content: Content) -> None:
                 raise block.refuse("temperatures are computed in this deck: prescribe them by *BOUNDARY, component 11")
             if block.keyword in ("CLOAD", "DLOAD", "DSLOAD") and step.heat == "alone":
                 raise block.refuse(
-                    "is no load of heat: use *COUPLED TEMPERATURE-DISPLACEMENT in place of *HEAT TRANSFER"
+                    "is not a heat load: use *COUPLED TEMPERATURE-DISPLACEMENT in place of *HEAT TRANSFER"
                 )
 
 

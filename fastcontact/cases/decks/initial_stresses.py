@@ -31,7 +31,7 @@ def add_initial_stresses(model: Model, deck_mesh: DeckMesh) -> None:
             numbers = [row.number(index) for index in range(1, 1 + len(names))]
             for element in deck_mesh.made.elements_of(row.text(0), row.location):
                 if element.type is None:
-                    raise row.refuse(f"element {element.number} is no solid, so it has no initial stress")
+                    raise row.refuse(f"element {element.number} is not a solid, so it has no initial stress")
                 if element.section is not None and element.section.orientation:
                     raise row.refuse(
                         f"element {element.number} has an *ORIENTATION: initial stresses along such axes are not supported"

@@ -61,7 +61,7 @@ class Locks:
             if point not in named:
                 location = next(given.block.location for given in supports if given.new)
                 raise location.refuse(
-                    f"node {self.points[point].node} of a pretension section is let go here: once locked it stays so"
+                    f"node {self.points[point].node} of a pretension section is released here: a locked section stays locked"
                 )
 
     def take(self, point: int, component: int, fixed: bool) -> bool:

@@ -65,14 +65,14 @@ class Reader:
             read(content, self.step, block)
         elif known.place == "procedure":
             if self.step is None:
-                raise block.refuse("belongs into a step")
+                raise block.refuse("belongs in a step")
             read(content, self.step, block)
         else:
             read(block)
 
     def _not_in_step(self, block: Block) -> None:
         if self.step is not None:
-            raise block.refuse("cannot stand inside of a step")
+            raise block.refuse("cannot be inside a step")
 
     def _not_in_part(self, block: Block) -> None:
         if self.part is not None or self.instance is not None:
@@ -105,7 +105,7 @@ class Reader:
 
     def _change_friction(self, block: Block) -> None:
         if self.step is None:
-            raise block.refuse("belongs into a step")
+            raise block.refuse("belongs in a step")
         self.interaction = properties.changed_interaction(self.content, block)
 
     def _coupling(self, block: Block) -> None:

@@ -22,7 +22,7 @@ def new_step(content: Content, block: Block) -> Step:
 def static(content: Content, step: Step, block: Block) -> None:
     """*STATIC: first increment and length of the step, which determine its division into increments."""
     if step.static:
-        raise block.refuse("the step has two of it")
+        raise block.refuse("the step has this keyword twice")
     if step.modes:
         raise block.refuse("a step has either *STATIC or one *FREQUENCY")
     if step.perturbation:
@@ -55,7 +55,7 @@ def frequency(content: Content, step: Step, block: Block) -> None:
         raise block.refuse("a step has either *STATIC or one *FREQUENCY")
     number = block.rows[0].whole(0, 10) if block.rows else 10
     if number < 1:
-        raise block.rows[0].refuse("asks for no mode: write how many")
+        raise block.rows[0].refuse("requests no mode: write how many")
     step.modes = number
 
 
@@ -66,7 +66,7 @@ def end_step(content: Content, step: Step) -> None:
             raise step.refuse("the step has no *STATIC or other procedure, so it is unknown what to solve")
         return
     if step.given:
-        raise step.given[0].block.refuse("cannot stand in a step with *FREQUENCY: modes have the supports of before")
+        raise step.given[0].block.refuse("cannot be in a step with *FREQUENCY: modes have the supports of before")
     content.steps.pop()
     if not content.steps:
         raise step.refuse("*FREQUENCY needs a step with *STATIC before: modes are those about its end")
@@ -93,4 +93,4 @@ def given(content: Content, step: Step | None, block: Block) -> None:
     elif block.keyword == "BOUNDARY":
         content.supports.append(made)
     else:
-        raise block.refuse("loads belong into a step")
+        raise block.refuse("loads belong in a step")

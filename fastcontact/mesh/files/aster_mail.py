@@ -144,14 +144,14 @@ class _Content:
 
     def _rows(self, keyword: str, line: int, words: list[Word], width: int) -> Iterator[list[Word]]:
         if len(words) % width:
-            raise self._refusal(line, f"{keyword} has {len(words)} words, which are no rows of {width}")
+            raise self._refusal(line, f"{keyword} has {len(words)} words, which do not form rows of {width}")
         yield from (words[i : i + width] for i in range(0, len(words), width))
 
     def _number(self, word: Word) -> float:
         try:
             return float(word[0].upper().replace("D", "E"))
         except ValueError:
-            raise self._refusal(word[1], f"'{word[0][:40]}' is no number") from None
+            raise self._refusal(word[1], f"'{word[0][:40]}' is not a number") from None
 
     def _point(self, word: Word) -> str:
         if word[0] not in self._points:

@@ -39,7 +39,7 @@ def build_mesh(
     try:
         places = np.asarray(points, np.float64)
     except (TypeError, ValueError):
-        raise MeshError("its coordinates are no numbers: check that the file is complete") from None
+        raise MeshError("its coordinates are not numbers: check that the file is complete") from None
     joined = merged(blocks)
     solid = [block for block in joined if block.kind != VERTEX and len(block.nodes)]
     vertices = [block for block in joined if block.kind == VERTEX]

@@ -166,7 +166,7 @@ def _read_nodes(entry: Any, code: str) -> AnyArray:
     flat = values(entry, "NOD")
     size = 1 if code == "PO1" else elements.BY_MED[code].n_nodes
     if len(flat) % size:
-        raise MeshError(f"its {code} cells have {len(flat)} node numbers, which is no multiple of {size}")
+        raise MeshError(f"its {code} cells have {len(flat)} node numbers, which is not a multiple of {size}")
     nodes = flat.reshape(size, -1).T - 1
     return nodes[:, NODE_ORDER[code]] if code in NODE_ORDER else nodes
 

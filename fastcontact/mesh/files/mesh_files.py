@@ -87,7 +87,7 @@ def read_mesh_report(path: PathLike, *, mesh_name: str | None = None, orient: bo
         mesh, file_format, name = content.mesh, f"MED {content.version}".strip(), content.name
         dropped = {"vertex": content.n_vertices}
     elif mesh_name is not None:
-        raise FileError(f"'{path}' is no MED file, so its mesh has no name: leave out mesh_name='{mesh_name}'")
+        raise FileError(f"'{path}' is not a MED file, so its mesh has no name: leave out mesh_name='{mesh_name}'")
     elif file.suffix.lower() == MAIL_SUFFIX:
         mesh, dropped = aster_mail.read(file)
         file_format, name = "code_aster", ""

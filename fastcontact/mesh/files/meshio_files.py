@@ -89,7 +89,7 @@ def _format(path: Path, writing: bool) -> str:
     # Ansys uses the same suffix, and meshio's reader of its files does not terminate on a damaged one.
     with open(path, "rb") as file:
         if file.read(1) != b"$":
-            raise FileError(f"'{path}' is no Gmsh file, which starts with $MeshFormat: convert it to .med")
+            raise FileError(f"'{path}' is not a Gmsh file, which starts with $MeshFormat: convert it to .med")
     return "gmsh"
 
 
@@ -184,7 +184,7 @@ def _references(path: Path) -> Iterator[tuple[Path, str]]:
     try:
         items = [item for item in ElementTree.parse(path).iter() if item.get("Format") in ("HDF", "Binary")]
     except (ElementTree.ParseError, ValueError, LookupError) as error:
-        raise _refusal("read", path, f"it is no XML: {error}") from error
+        raise _refusal("read", path, f"it is not XML: {error}") from error
     except OSError as error:
         raise FileError(f"cannot read '{path}': {error.strerror or error}") from error
     for item in items:
@@ -209,7 +209,7 @@ def write(path: Path, temporary: Path, mesh: Mesh) -> None:
     meshio = library()
     file_format = _format(path, writing=True)
     if file_format in ("tetgen", "svg"):
-        raise FileError(f"'{path}': {file_format} is no mesh format of one file; {OTHER_FORMATS}")
+        raise FileError(f"'{path}': {file_format} is not a single-file mesh format; {OTHER_FORMATS}")
     content = _parts(mesh, file_format)
     # By default XDMF writes the numbers to a second file, which cannot be replaced together with the first.
     options = {"data_format": "XML"} if file_format == "xdmf" else {}

@@ -220,7 +220,7 @@ def test_a_file_that_is_replaced_stops_the_run(whole, path, capsys, monkeypatch)
     assert "moved or replaced after 2 steps" in only_line(capsys.readouterr().err)
     assert path.read_text() == "mine"
     assert run(case, path, "--resume") == 1
-    assert only_line(capsys.readouterr().err).startswith(f"error: '{path}' is no HDF5 file: name a result file")
+    assert only_line(capsys.readouterr().err).startswith(f"error: '{path}' is not an HDF5 file: name a result file")
     assert path.read_text() == "mine"
 
 

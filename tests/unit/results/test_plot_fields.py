@@ -462,8 +462,8 @@ def test_the_command_writes_an_animation(result, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--section", "w=0"], "'w=0' is no plane: write for example y=0"),
-        (["--section", "z"], "'z' is no plane"),
+        (["--section", "w=0"], "'w=0' is not a plane: write for example y=0"),
+        (["--section", "z"], "'z' is not a plane"),
         (["--section", "z=99"], "does not meet the mesh"),
         (["--field", "stres.xx"], "did you mean 'stress.xx'"),
         (["--zoom", "3"], "draw a section"),

@@ -581,7 +581,7 @@ def test_files_that_must_not_be_replaced(tmp_path: Path, path: Path) -> None:
     h5py.File(mesh, "w").create_group("ENS_MAA").file.close()
     for foreign in (case, mesh):
         before = foreign.read_bytes()
-        with pytest.raises(FileError, match="exists and is no result file"):
+        with pytest.raises(FileError, match="exists and is not a result file"):
             ResultWriter(foreign, MESH)
         assert foreign.read_bytes() == before
     path.write_bytes(b"")  # a name that tempfile has made
@@ -610,7 +610,7 @@ def test_steps_that_do_not_fit(path: Path) -> None:
     with pytest.raises(FileError, match="is closed"):
         out.write(good)
     out.close()  # a second close does nothing
-    with pytest.raises(ModelError, match="need a mesh or a model to stand on, not str"):
+    with pytest.raises(ModelError, match="need a mesh or a model as a basis, not str"):
         ResultWriter(path, "mesh.med")  # type: ignore[arg-type]
 
 
@@ -623,7 +623,7 @@ def test_files_that_are_no_results(tmp_path: Path, path: Path) -> None:
     with pytest.raises(FileError, match="is a folder"):
         open_results(tmp_path)
     path.write_text("hello")
-    with pytest.raises(FileError, match="is no HDF5 file: name a result file"):
+    with pytest.raises(FileError, match="is not an HDF5 file: name a result file"):
         open_results(path)
     with h5py.File(path, "w") as file:
         file.create_group("VTKHDF")
@@ -643,7 +643,7 @@ def test_truncated_files_say_so(path: Path) -> None:
     whole = write(path).read_bytes()
     for part in (0.02, 0.3, 0.6, 0.9, 0.999):
         path.write_bytes(whole[: int(part * len(whole))])
-        with pytest.raises(FileError, match=r"truncated or damaged|is no HDF5 file"):
+        with pytest.raises(FileError, match=r"truncated or damaged|is not an HDF5 file"):
             open_results(path)
 
 

@@ -318,7 +318,7 @@ def test_a_second_writer_cannot_resume_either(path: Path) -> None:
 
 def test_what_is_no_result_is_not_resumed(path: Path) -> None:
     path.write_text("mine")
-    with pytest.raises(FileError, match="is no HDF5 file"):
+    with pytest.raises(FileError, match="is not an HDF5 file"):
         ResultWriter(path, MESH, resume=True)
     assert path.read_text() == "mine"
     assert os.listdir(path.parent) == [path.name]

@@ -37,7 +37,7 @@ def test_what_is_refused(lines, message, tmp_path):
     steps = STEP.replace("*Dsload", lines + "*Dsload")
     with pytest.raises(fc.CaseError, match=message):
         deck_of(tmp_path, NODES + MATERIAL + RUBBING + SUPPORTS + steps)
-    with pytest.raises(fc.CaseError, match=r"\*CHANGE FRICTION: belongs into a step"):
+    with pytest.raises(fc.CaseError, match=r"\*CHANGE FRICTION: belongs in a step"):
         deck_of(tmp_path, WHOLE.replace("*Boundary", CHANGE + "*Boundary"))
 
 

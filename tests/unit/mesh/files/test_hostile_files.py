@@ -105,7 +105,7 @@ def test_texts_in_a_mesh_file_are_not_read(tmp_path):
     assert fc.read_mesh(path).n_points == MESH.n_points
     with h5py.File(path, "r+") as file:
         file["ENS_MAA/mesh"].attrs["TYP"] = "a text"
-    with pytest.raises(FileError, match=r"'TYP' of '/ENS_MAA/mesh' of '.*' is no plain number: write the file anew"):
+    with pytest.raises(FileError, match=r"'TYP' of '/ENS_MAA/mesh' of '.*' is not a plain number: write the file anew"):
         fc.read_mesh(path)
 
 
@@ -123,7 +123,7 @@ def test_texts_in_a_mesh_file_are_not_read(tmp_path):
             r"1.07e\+09 bytes",
         ),
         ("fastcontact/mesh/elements", {"shape": (10**6,), "dtype": h5py.string_dtype()}, "1000000 texts or references"),
-        ("fastcontact/versions", {"data": ["{}"], "dtype": h5py.string_dtype()}, "is no text"),
+        ("fastcontact/versions", {"data": ["{}"], "dtype": h5py.string_dtype()}, "is not a text"),
         ("fastcontact/case", {"data": "x", "dtype": h5py.string_dtype(), "chunks": None}, "Expecting value"),
         ("fastcontact/mesh/cell_groups/sizes", {"data": np.zeros(10**6, np.int64)}, r"6 names for sizes of shape"),
     ],
@@ -138,7 +138,7 @@ def test_result_files_that_declare_too_much(results, name, created, message):
 def test_a_schema_that_is_no_whole_number(results, value):
     with h5py.File(results, "r+") as file:
         file["fastcontact"].attrs["schema"] = value
-    with pytest.raises(FileError, match=r"'schema' of '/fastcontact' is no whole number|damaged"):
+    with pytest.raises(FileError, match=r"'schema' of '/fastcontact' is not a whole number|damaged"):
         fc.open_results(results)
 
 
