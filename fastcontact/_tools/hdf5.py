@@ -108,9 +108,7 @@ def _check_dataset(dataset: Any, where: str, limit: int, file_size: int) -> int:
         filters = [settings.get_filter(number)[0] for number in range(settings.get_nfilters())]
         # HDF5 would search for an unknown filter among the shared libraries of the system.
         if not set(filters) <= set(built_in):
-            raise FileError(
-                f"{where} is packed by the filter {filters[0]}, which not every HDF5 library supports: use gzip"
-            )
+            raise FileError(f"{where} is packed by the filter {filters[0]}, which HDF5 may lack: use gzip")
         if dataset.get_storage_size() > 2 * (size + chunk) + PLAUSIBLE_BYTES:
             raise FileError(f"{where} takes more room packed than it can hold: the file is damaged, write it anew")
         size = max(size, chunk)
@@ -144,7 +142,5 @@ def attribute(item: Any, name: str, default: Any = None) -> Any:
     if name not in item.attrs and default is not None:
         return default
     if item.attrs.get_id(name).dtype.base.kind not in PLAIN_KINDS:
-        raise FileError(
-            f"'{name}' of '{item.name}' of '{item.file.filename}' is not a plain number: write the file anew"
-        )
+        raise FileError(f"'{name}' of '{item.name}' of '{item.file.filename}' is not a plain number: rewrite the file")
     return item.attrs[name]

@@ -111,7 +111,7 @@ def modes(
         )
     model = stage_of(model, step)
     sectors = Sectors.of(model)
-    diameters = _asked(model, sectors, nodal_diameters)
+    diameters = _diameters(model, sectors, nodal_diameters)
     vibration = _Vibration.of(model, sectors, step if stress_stiffening else None, step, hold_sliding)
     if sectors is None or diameters is None:
         values, vectors = vibration.lowest(n, linear_solver, None if sectors is None else Wave(sectors, 0))
@@ -121,7 +121,7 @@ def modes(
     return _of_ring(vibration, sectors, [(wave, *vibration.of_wave(wave, n, linear_solver)) for wave in waves])
 
 
-def _asked(
+def _diameters(
     model: Model, sectors: Sectors | None, nodal_diameters: int | str | Sequence[int] | None
 ) -> list[int] | None:
     """Return the requested nodal diameters; ModelError for a model without any."""

@@ -141,7 +141,7 @@ def sensitivities(
     (1.0, 0.001)
     """
     tuples = [tuple(parameter) for parameter in parameters]
-    check_asked(model, quantity, parameters)
+    check_labels(model, quantity, parameters)
     problem, contact = settled_step(model, step, ramp_of(ramp), criteria or Criteria(), linear_solver)
     nearest = checked_margin(contact, margin) if problem.pairs else 1.0
     contact, gradient = with_gradient(contact, step, tuple(quantity))
@@ -149,7 +149,7 @@ def sensitivities(
     return Sensitivities(gradient.value, dict(zip(tuples, values.tolist(), strict=True)), nearest, solutions)
 
 
-def check_asked(model: Model, quantity: Sequence[str | int], parameters: Sequence[Sequence[str | int]]) -> None:
+def check_labels(model: Model, quantity: Sequence[str | int], parameters: Sequence[Sequence[str | int]]) -> None:
     """Raise ModelError or MeshError if a model has no such quantity or parameter, see `sensitivities`."""
     model.refuse_nonlinear("sensitivities are")
     if model.conducts:

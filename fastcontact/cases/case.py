@@ -30,8 +30,8 @@ from fastcontact.results.units import known_units
 if TYPE_CHECKING:
     from fastcontact.cases.decks.deck import Deck
 
-# A quantity or a parameter of sensitivities.
-Asked = tuple[str | int, ...]
+# Label of a quantity or a parameter of sensitivities.
+Label = tuple[str | int, ...]
 # File suffix of input decks of Abaqus and CalculiX.
 DECK = ".inp"
 
@@ -85,7 +85,7 @@ class Case:
     units: dict[str, str] = field(default_factory=dict)
     approach: dict[str, float] = field(default_factory=dict)
     folder: Path = Path()
-    sensitivities: list[tuple[Asked, list[Asked]]] = field(default_factory=list)
+    sensitivities: list[tuple[Label, list[Label]]] = field(default_factory=list)
     modes: dict[str, Any] | None = None
     deck: Deck | None = None
 
@@ -256,10 +256,10 @@ def _checks(
     return checks
 
 
-def _sensitivities(model: Model, data: dict[str, Any]) -> list[tuple[Asked, list[Asked]]]:
+def _sensitivities(model: Model, data: dict[str, Any]) -> list[tuple[Label, list[Label]]]:
     asked_for, entries = [], list(tables("sensitivity", data.get("sensitivity", [])))
     if entries:
-        from fastcontact.analysis.sensitivities import check_asked  # imports half of the solver
+        from fastcontact.analysis.sensitivities import check_labels  # imports half of the solver
     for i, entry in enumerate(entries):
         where = f"sensitivity[{i}]"
         check_keys(where, entry, SENSITIVITY)
@@ -274,7 +274,7 @@ def _sensitivities(model: Model, data: dict[str, Any]) -> list[tuple[Asked, list
             )
         quantity, *by = (tuple(row) for row in rows)
         with at(where):
-            check_asked(model, quantity, by)
+            check_labels(model, quantity, by)
         asked_for.append((quantity, by))
     return asked_for
 

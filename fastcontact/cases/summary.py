@@ -9,7 +9,7 @@ import numpy as np
 
 from fastcontact._tools.versions import versions
 from fastcontact.analysis.contact_resultants import contact_resultants
-from fastcontact.cases.case import Asked, Case
+from fastcontact.cases.case import Case, Label
 from fastcontact.cases.checks import at_point, evaluated
 from fastcontact.errors import ModelError
 from fastcontact.results.step import CANCELLED, ContactResult, StepResult
@@ -69,7 +69,7 @@ def summarise(
     }
 
 
-def _sensitivity(case: Case, last: StepResult, quantity: Asked, by: Sequence[Asked]) -> dict[str, Any]:
+def _sensitivity(case: Case, last: StepResult, quantity: Label, by: Sequence[Label]) -> dict[str, Any]:
     """Return the derivatives of a quantity, or the reason why there are none in this state."""
     from fastcontact.analysis.sensitivities import sensitivities
 

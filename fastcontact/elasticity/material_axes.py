@@ -133,9 +133,7 @@ def frames(axes: Axes, points: Array, kinematics: str) -> Array:
     try:
         frame = np.asarray(returned, complex if np.iscomplexobj(returned) else float)
     except (TypeError, ValueError):
-        raise ModelError(
-            f"the function of a material's axes returned {returned!r:.80}, which are not numbers"
-        ) from None
+        raise ModelError(f"the function of a material's axes returned {returned!r:.80}, not numbers") from None
     if frame.shape != (len(points), 3, 3):
         raise ModelError(
             f"the function of a material's axes returned numbers of shape {frame.shape} for {len(points)} points: it must "

@@ -75,7 +75,7 @@ def _cohesion(name: str, options: Mapping[str, Any]) -> CohesiveLaw | None:
     excess = [option for option in beside if option in options and option != chosen[0]]
     if excess or options.get("kind", "unilateral") != "unilateral":
         other = (excess or ["kind"])[0]
-        raise ContactError(f"contact '{name}' has {chosen[0]}, which does not support {other}: leave out one of both")
+        raise ContactError(f"contact '{name}' has {chosen[0]}, which excludes {other}: leave out one of both")
     option, constants = chosen[0], options[chosen[0]]
     needed, allowed = LAWS[option]
     if not isinstance(constants, Mapping) or not set(needed) <= set(constants):
@@ -110,9 +110,7 @@ def _kind(name: str, options: Mapping[str, Any], against_obstacle: bool) -> str:
     kind = options.get("kind", "unilateral")
     check_known(f"kind of contact '{name}'", kind, KINDS, ContactError)
     if kind != "unilateral" and options.get("friction"):
-        raise ContactError(
-            f"contact '{name}' is {kind}, which does not support friction: leave out 'friction' or 'kind'"
-        )
+        raise ContactError(f"contact '{name}' is {kind}, which excludes friction: leave out 'friction' or 'kind'")
     if options.get("tangential_penalty") is not None and not options.get("friction"):
         raise ContactError(f"contact '{name}' has a tangential_penalty, but no friction that it could soften")
     if kind == "gap_only" and "penalty" in options:

@@ -125,7 +125,7 @@ MISTAKES = [
     Mistake("a clearance from an obstacle's nodes", lambda: obstacle(motion={"y": -1.0}, clearance_primary=0.1),
             fc.ContactError, r"a rigid obstacle has no nodes to measure from: give contact 'plane' the option 'clearance'"),
     Mistake("tied with friction", lambda: pair_of("CONT_UPPER", "CONT_LOWER", kind="tied", friction=0.3), fc.ContactError,
-            r"contact 'pair' is tied, which does not support friction: leave out 'friction' or 'kind'"),
+            r"contact 'pair' is tied, which excludes friction: leave out 'friction' or 'kind'"),
     Mistake("tied to an obstacle", lambda: obstacle(motion={"y": -1.0}, kind="tied"), fc.ContactError,
             r"contact 'plane' cannot be tied to a rigid obstacle: prescribe the displacements of the group, or couple them"),
     Mistake("a number as a group of nodes", lambda: pair_of("CONT_UPPER", "CONT_LOWER", excluded=3), fc.ContactError,

@@ -143,7 +143,7 @@ def moved(mesh, by):
 
 
 @pytest.mark.parametrize(("options", "words"), [
-    ({"kind": "bilateral", "friction": 0.3}, "contact 'pair' is bilateral, which does not support friction"),
+    ({"kind": "bilateral", "friction": 0.3}, "contact 'pair' is bilateral, which excludes friction"),
 ])  # fmt: skip
 def test_what_contradicts_itself_is_refused(options, words):
     with pytest.raises(fc.ContactError, match=words):

@@ -263,7 +263,7 @@ def test_one_vector_turns_all_forces(formulation, options):
     ({"slip": "none"}, "unknown kind of slip 'none'"),
     ({"search_distance": 0.0}, "search_distance = 0.0 of contact 'pair' must be positive; leave it out for any distance"),
     ({"kind": "gap_only", "penalty": 1.0}, "gap_only, which has no forces"),
-    ({"kind": "gap_only", "friction": 1.0}, "gap_only, which does not support friction"),
+    ({"kind": "gap_only", "friction": 1.0}, "gap_only, which excludes friction"),
     ({"tangential_penalty": 1.0}, "no friction that it could soften"),
     ({"tangential_penalty": -1.0, "friction": 0.1}, "tangential_penalty -1 of contact 'pair' must be positive"),
 ])  # fmt: skip

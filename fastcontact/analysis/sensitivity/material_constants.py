@@ -10,7 +10,7 @@ import numpy as np
 
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.sensitivity.moving_contact import CHANGED, MovingContact
-from fastcontact.analysis.sensitivity.quantities import Asked
+from fastcontact.analysis.sensitivity.quantities import Label
 from fastcontact.arrays import Array
 from fastcontact.elasticity.anisotropic_materials import NAMES, Anisotropic, Orthotropic
 from fastcontact.elasticity.materials import LinearElastic, Material
@@ -23,7 +23,7 @@ from fastcontact.model.ramp import combined
 CONSTANTS = {"E": "123", "nu": NAMES, "G": NAMES, "expansion": "123"}
 
 
-def by_constant(contact: MovingContact, parameter: Asked) -> tuple[Array, Array | None]:
+def by_constant(contact: MovingContact, parameter: Label) -> tuple[Array, Array | None]:
     """Return the derivatives of `Change.out` (n_dofs,) and `Change.sample` with respect to a constant, None for zero."""
     model, name = contact.problem.model, str(parameter[0])
     number, material, component = _constant_of(model, parameter)
@@ -42,12 +42,12 @@ def by_constant(contact: MovingContact, parameter: Asked) -> tuple[Array, Array 
     return (forces[0] + forces[1]) / (12.0 * step), contact.along(at, step) if contact.problem.pairs else None
 
 
-def check_constant(model: Model, parameter: Asked) -> None:
+def check_constant(model: Model, parameter: Label) -> None:
     """Raise ModelError if no material has such a constant, or the constant varies."""
     _constant_of(model, parameter)
 
 
-def _constant_of(model: Model, parameter: Asked) -> tuple[int, Material, int | None]:
+def _constant_of(model: Model, parameter: Label) -> tuple[int, Material, int | None]:
     """Return the number of a material in the model, the material, and the requested component."""
     matches = [
         (i, material) for i, (material, groups) in enumerate(model.materials)
@@ -66,7 +66,7 @@ def _constant_of(model: Model, parameter: Asked) -> tuple[int, Material, int | N
     return number, material, _component(parameter, list(CONSTANTS[name]) if len(components) > 1 else [])
 
 
-def _component(parameter: Asked, names: Sequence[str]) -> int | None:
+def _component(parameter: Label, names: Sequence[str]) -> int | None:
     """Return the number of the requested component; None if a constant has only one, or all are requested."""
     if len(parameter) == 2 and (not names or parameter[0] == "expansion"):
         return None

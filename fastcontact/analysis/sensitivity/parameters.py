@@ -12,7 +12,7 @@ import numpy as np
 from fastcontact.analysis.sensitivity.adjoint import Change
 from fastcontact.analysis.sensitivity.material_constants import CONSTANTS, by_constant, check_constant
 from fastcontact.analysis.sensitivity.moving_contact import MovingContact
-from fastcontact.analysis.sensitivity.quantities import Asked
+from fastcontact.analysis.sensitivity.quantities import Label
 from fastcontact.analysis.wear import Worn
 from fastcontact.arrays import Array
 from fastcontact.elasticity.inertia_loads import Centrifugal
@@ -42,7 +42,7 @@ FORMS = {
 WITH_COMPONENT = (*CONSTANTS, "prescribed")
 
 
-def check_parameter(model: Model, parameter: Asked) -> None:
+def check_parameter(model: Model, parameter: Label) -> None:
     """Raise ModelError if a model has no such parameter."""
     kind = str(parameter[0]) if parameter else ""
     if kind == "friction":
@@ -57,12 +57,12 @@ def check_parameter(model: Model, parameter: Asked) -> None:
     KINDS[kind][0](model, parameter)
 
 
-def change_by(contact: MovingContact, parameter: Asked) -> Change:
+def change_by(contact: MovingContact, parameter: Label) -> Change:
     """Return the change of the residual with a parameter that `check_parameter` has accepted."""
     return KINDS[str(parameter[0])][1](contact, parameter)
 
 
-def _item(kind: str, known: Mapping[str, Any], parameter: Asked) -> Any:
+def _item(kind: str, known: Mapping[str, Any], parameter: Label) -> Any:
     """Return the item of a given name; ModelError if there is none."""
     if parameter[1] not in known:
         raise ModelError(unknown(kind, str(parameter[1]), known))
@@ -83,7 +83,7 @@ def _on(items: Sequence[Item], group: str) -> list[Item]:
     ]  # fmt: skip
 
 
-def _named(kind: str, items: Sequence[Item], parameter: Asked, others: Sequence[str] = ()) -> list[Item]:
+def _named(kind: str, items: Sequence[Item], parameter: Label, others: Sequence[str] = ()) -> list[Item]:
     """Return the loads or temperatures on a group; ModelError if there are none, and `others` lack the name."""
     items_of_group = _on(items, str(parameter[1]))
     if not items_of_group and parameter[1] not in others:
@@ -92,7 +92,7 @@ def _named(kind: str, items: Sequence[Item], parameter: Asked, others: Sequence[
     return items_of_group
 
 
-def _loads(model: Model, parameter: Asked) -> list[Load]:
+def _loads(model: Model, parameter: Label) -> list[Load]:
     """Return the loads on a group; none for a force-driven obstacle."""
     driven = [pair.name for pair in model.force_driven.pairs]
     return _named("group with a load, or obstacle with a force,", model.loads, parameter, driven)
@@ -107,7 +107,7 @@ def _forces(contact: MovingContact, loads: Sequence[Load]) -> Array:
     return force
 
 
-def _of_load(contact: MovingContact, parameter: Asked) -> Change:
+def _of_load(contact: MovingContact, parameter: Label) -> Change:
     """Return the change with the factor of the loads on a group, or of the force on an obstacle."""
     problem = contact.problem
     driven = problem.force_driven.number(str(parameter[1]))
@@ -120,25 +120,25 @@ def _of_load(contact: MovingContact, parameter: Asked) -> Change:
     return replace(_nothing(contact), out=out)
 
 
-def _speeds(model: Model, parameter: Asked) -> list[Centrifugal]:
+def _speeds(model: Model, parameter: Label) -> list[Centrifugal]:
     """Return the centrifugal forces on a group."""
     turning = [load for load in model.loads if isinstance(load, Centrifugal)]
     return _named("group with a centrifugal force", turning, parameter)
 
 
-def _of_speed(contact: MovingContact, parameter: Asked) -> Change:
+def _of_speed(contact: MovingContact, parameter: Label) -> Change:
     """Return the change with the angular speed of a group; forces are proportional to its square."""
     loads = [load for load in _speeds(contact.problem.model, parameter) if load.speed]
     out = [-2.0 / load.speed * _forces(contact, [load]) for load in loads]
     return replace(_nothing(contact), out=np.sum(out, axis=0) if out else np.zeros(len(contact.u)))
 
 
-def _temperatures(model: Model, parameter: Asked) -> list[Temperature]:
+def _temperatures(model: Model, parameter: Label) -> list[Temperature]:
     """Return the temperatures of a group."""
     return _named("group with a temperature", model.temperatures, parameter)
 
 
-def _of_temperature(contact: MovingContact, parameter: Asked) -> Change:
+def _of_temperature(contact: MovingContact, parameter: Label) -> Change:
     """Return the change with the factor of the temperature rise of a group."""
     problem, change = contact.problem, _nothing(contact)
     heated = copy.copy(problem.model)
@@ -148,13 +148,13 @@ def _of_temperature(contact: MovingContact, parameter: Asked) -> Change:
     return change
 
 
-def _pretension(model: Model, parameter: Asked) -> Pretension:
+def _pretension(model: Model, parameter: Label) -> Pretension:
     """Return a pretension section."""
     section: Pretension = _item("pretension", {item.label: item for item in model.pretensions}, parameter)
     return section
 
 
-def _of_pretension(contact: MovingContact, parameter: Asked) -> Change:
+def _of_pretension(contact: MovingContact, parameter: Label) -> Change:
     """Return the change with the factor of the force of a pretension section, or of its shortening."""
     model = contact.problem.model
     section = _pretension(model, parameter)
@@ -165,7 +165,7 @@ def _of_pretension(contact: MovingContact, parameter: Asked) -> Change:
     return replace(_nothing(contact), out=-_forces(contact, forces))
 
 
-def _prescribing(model: Model, parameter: Asked) -> tuple[list[Support], list[int]]:
+def _prescribing(model: Model, parameter: Label) -> tuple[list[Support], list[int]]:
     """Return the supports on a group, and the numbers of constraints that prescribe its displacement along normals."""
     group, only = parameter[1], "xyz".find(str(parameter[2])) if len(parameter) == 3 else None
     supports = [s for s in model.supports if s.group == group and only in (None, s.component)]
@@ -179,7 +179,7 @@ def _prescribing(model: Model, parameter: Asked) -> tuple[list[Support], list[in
     return supports, along
 
 
-def _of_prescribed(contact: MovingContact, parameter: Asked) -> Change:
+def _of_prescribed(contact: MovingContact, parameter: Label) -> Change:
     """Return the change with the load factor of prescribed displacements of a group."""
     problem, instant = contact.problem, contact.instant
     model = problem.model
@@ -207,14 +207,14 @@ def _lifted(contact: MovingContact, values: Array, along: Sequence[int]) -> Chan
     return replace(_nothing(contact), lift=lift)
 
 
-def _moved(model: Model, parameter: Asked) -> ContactPair:
+def _moved(model: Model, parameter: Label) -> ContactPair:
     """Return the pair of a rigid obstacle with a prescribed motion."""
     moved = {pair.name: pair for pair in model.contact if any(pair.motion)}
     obstacle: ContactPair = _item("rigid obstacle with a motion", moved, parameter)
     return obstacle
 
 
-def _of_motion(contact: MovingContact, parameter: Asked) -> Change:
+def _of_motion(contact: MovingContact, parameter: Label) -> Change:
     """Return the change with the factor of the motion of a rigid obstacle."""
     problem, name = contact.problem, str(parameter[1])
     pair = _moved(problem.model, parameter)
@@ -236,13 +236,13 @@ def _of_motion(contact: MovingContact, parameter: Asked) -> Change:
     return replace(_nothing(contact), sample=contact.along(changed, contact.step / size))
 
 
-def _opened(model: Model, parameter: Asked) -> None:
+def _opened(model: Model, parameter: Label) -> None:
     """Refuse clearances of pairs that do not exist or are tied."""
     if _item("contact pair", {pair.name: pair for pair in model.contact}, parameter).options.get("kind") == "tied":
         raise ModelError(f"contact '{parameter[1]}' is tied: it keeps its gaps, and has no clearance")
 
 
-def _of_clearance(contact: MovingContact, parameter: Asked) -> Change:
+def _of_clearance(contact: MovingContact, parameter: Label) -> Change:
     """Return the change with a length added to the gap of a contact pair."""
     name = str(parameter[1])
     pair = contact.problem.pairs[name]
@@ -255,7 +255,7 @@ def _of_clearance(contact: MovingContact, parameter: Asked) -> Change:
     return replace(_nothing(contact), sample=contact.along(changed, contact.step))
 
 
-def _of_constant(contact: MovingContact, parameter: Asked) -> Change:
+def _of_constant(contact: MovingContact, parameter: Label) -> Change:
     """Return the change with a constant of a material."""
     nothing = _nothing(contact)
     out, sample = by_constant(contact, parameter)
@@ -263,7 +263,7 @@ def _of_constant(contact: MovingContact, parameter: Asked) -> Change:
 
 
 # By kind: a check that raises ModelError if there is no such parameter, and the change of the residual.
-KINDS: dict[str, tuple[Callable[[Model, Asked], object], Callable[[MovingContact, Asked], Change]]] = {
+KINDS: dict[str, tuple[Callable[[Model, Label], object], Callable[[MovingContact, Label], Change]]] = {
     **dict.fromkeys(CONSTANTS, (check_constant, _of_constant)),
     "load": (_loads, _of_load),
     "speed": (_speeds, _of_speed),

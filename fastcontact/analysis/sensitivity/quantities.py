@@ -14,7 +14,7 @@ from fastcontact.model.model import Model
 from fastcontact.results.step import StepResult
 
 Array = NDArray[np.float64]
-Asked = tuple[str | int, ...]
+Label = tuple[str | int, ...]
 FORMS = {
     "displacement": '("displacement", point, "y")',
     "reaction": '("reaction", group, "y")',
@@ -24,7 +24,7 @@ FORMS = {
 }
 
 
-def check_quantity(model: Model, quantity: Asked) -> None:
+def check_quantity(model: Model, quantity: Label) -> None:
     """Raise ModelError or MeshError if there is no such quantity of a model."""
     kind = str(quantity[0]) if quantity else ""
     if kind not in FORMS:
@@ -43,7 +43,7 @@ def check_quantity(model: Model, quantity: Asked) -> None:
         _axis(model, quantity)
 
 
-def with_gradient(contact: MovingContact, step: StepResult, quantity: Asked) -> tuple[MovingContact, Gradient]:
+def with_gradient(contact: MovingContact, step: StepResult, quantity: Label) -> tuple[MovingContact, Gradient]:
     """Return the gradient of a quantity that `check_quantity` has accepted, and the contact whose samples it needs.
 
     Raises ModelError if the quantity has no sensitivities in this state.
@@ -61,7 +61,7 @@ def with_gradient(contact: MovingContact, step: StepResult, quantity: Asked) -> 
     return _pressure(contact, none, step, quantity)
 
 
-def _axis(model: Model, quantity: Asked) -> int:
+def _axis(model: Model, quantity: Label) -> int:
     axes = "xyz"[: model.mesh.dim]
     if quantity[-1] not in list(axes):
         raise ModelError(unknown(f"component of the quantity {quantity}", str(quantity[-1]), list(axes)))
@@ -77,7 +77,7 @@ def _point(model: Model, point: str | int) -> int:
     return point
 
 
-def _reaction(contact: MovingContact, none: Gradient, quantity: Asked) -> Gradient:
+def _reaction(contact: MovingContact, none: Gradient, quantity: Label) -> Gradient:
     model = contact.problem.model
     axis, points = _axis(model, quantity), model.mesh.points_of(str(quantity[1]))
     if model.springs:
@@ -94,7 +94,7 @@ def _reaction(contact: MovingContact, none: Gradient, quantity: Asked) -> Gradie
     return replace(none, value=float(balance @ out), reaction=balance)
 
 
-def _contact_force(contact: MovingContact, none: Gradient, step: StepResult, quantity: Asked) -> Gradient:
+def _contact_force(contact: MovingContact, none: Gradient, step: StepResult, quantity: Label) -> Gradient:
     contact_of_step, axis = step.contact[str(quantity[1])], _axis(contact.problem.model, quantity)
     others = [name for name in contact.problem.pairs if name != quantity[1]]
     nodes = np.setdiff1d(contact_of_step.points, contact_of_step.primary_points)
@@ -114,7 +114,7 @@ def _contact_force(contact: MovingContact, none: Gradient, step: StepResult, qua
     return replace(none, value=float(contact_of_step.force[axis]), multiplier=rows @ sample[:n], sample=sample)
 
 
-def _pressure(contact: MovingContact, none: Gradient, step: StepResult, asked: Asked) -> tuple[MovingContact, Gradient]:
+def _pressure(contact: MovingContact, none: Gradient, step: StepResult, asked: Label) -> tuple[MovingContact, Gradient]:
     name, result = str(asked[1]), step.contact[str(asked[1])]
     row = int(result.pressure.argmax())
     if asked[0] == "pressure":

@@ -185,7 +185,7 @@ class Multigrid:
         while cg.norm > enough:
             if made >= MAX_ITERATIONS or raised > RAISES:
                 raise StallError(
-                    f"conjugate gradients stagnate at a relative residual of {cg.norm / scale:.1e} after {made} iterations, "
+                    f"conjugate gradients stall at a relative residual of {cg.norm / scale:.1e} after {made} iterations, "
                     f"above {self.tolerance:.1e}: use the direct solver, or look for near-incompressible or thin parts"
                 )
             if monitor is not None and made >= watched_from and made % WATCH_EVERY == 0:
@@ -298,9 +298,7 @@ class Multigrid:
                 if done:
                     return
                 left = iteration.norm / enough
-                raise StallError(
-                    f"conjugate residuals stagnate at {left:.1e} times the tolerance after {made} iterations"
-                )
+                raise StallError(f"conjugate residuals stall at {left:.1e} times the tolerance after {made} iterations")
             made += 1
             self._count()
 
