@@ -210,7 +210,7 @@ def _sources(function: Callable[..., Any], seen: set[Any]) -> Iterator[str]:
     yield _digest_of_file(code.co_filename)
     for name in code.co_names:
         value = function.__globals__.get(name)
-        called = getattr(value, "py_func", None) or getattr(value, "_defn", None)  # of a kernel or an intrinsic
+        called = getattr(value, "py_func", None) or getattr(value, "_defn", None)  # for kernels, intrinsics
         if called is not None:
             yield from _sources(called, seen)
         elif isinstance(value, CONSTANTS):

@@ -35,7 +35,7 @@ class DriverFile:
 
     def _fail(self, error: BaseException) -> None:
         """Store the first error, without its frames, which would keep HDF5 objects open."""
-        error = error.with_traceback(None)  # of later errors, too: they may be the same object
+        error = error.with_traceback(None)  # for later errors, too: they may be the same object
         self.failure = self.failure or error
 
     def fileno(self) -> int:

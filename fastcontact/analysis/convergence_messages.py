@@ -90,7 +90,7 @@ def not_balanced(bodies: FloatingBodies, rigid: RigidPosition, load: float, fric
 
 
 def limit_load(problem: Problem, state: State) -> str:
-    """Return what to add to the message of a load step after `state` whose bodies yield; nothing for others."""
+    """Return an addition to the message of a failed load step after `state` if bodies yield; otherwise empty."""
     if problem.bodies is None or problem.bodies.finite:
         return ""
     strain = max(float(history[..., PLASTIC_STRAIN].max(initial=0.0)) for history in state.history.values())

@@ -58,7 +58,7 @@ class StepContext:
     def driven(self, constraints: Constraints) -> Array:
         """Return the slips (k, m) imposed by supports and obstacles in the step, over the largest imposed motion [-]."""
         slips = np.stack([T @ self.prescribed_motion for T in constraints.tangents])
-        # Where nothing is prescribed, the motion is the round-off of earlier ones.
+        # Without prescribed displacements, the motion is the round-off of earlier motions.
         scale = max(largest(self.prescribed_motion), largest(self.state.u))
         if constraints.slip0 is not None and isinstance(constraints, StackedConstraints):
             begin, end = self.state.obstacles, self.load.obstacles

@@ -85,7 +85,7 @@ class Bodies:
         self._taken: Array | None = None
 
     def at(self, u: Array, *, tangent: bool = True) -> DeformedBodies:
-        """Return the bodies at u; `tangent` tells whether their tangent will probably be needed.
+        """Return the bodies at u; `tangent` is False if their tangent will probably not be needed.
 
         Raises
         ------

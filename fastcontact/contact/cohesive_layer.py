@@ -56,9 +56,7 @@ class Layer:
     def after(self, constraints: Constraints, u: Array) -> Bond:
         """Return the layer at the end of a step with displacements u (n_dofs,) [length]."""
         end = (constraints.gap0 + constraints.B @ u).reshape(self.rest.shape) + self.rest
-        opening, *slides = np.where(
-            self.damage < 1.0, end, self.separation
-        )  # what is broken has no rows along the sides
+        opening, *slides = np.where(self.damage < 1.0, end, self.separation)  # broken: no tangential rows
         sliding = sum((s[:, None] * t for s, t in zip(slides, self.directions)), np.zeros_like(self.before.sliding))
         size, law = np.linalg.norm(sliding, axis=1), self.law
         areas = np.where(np.isfinite(self.areas), self.areas, 0.0)

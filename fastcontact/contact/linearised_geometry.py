@@ -116,7 +116,7 @@ class _SurfacePoints:
     ) -> None:  # fmt: skip
         at, n_points, facet = pairing.places(primary, rows), len(coordinates), pairing.facet[rows]
         nodes, shape = np.hstack([candidates.nodes[rows], at.nodes]), np.hstack([candidates.shape[rows], -at.shape])
-        self._motion = shapes_at(shape, nodes, n_points)  # of points relative to the points they face
+        self._motion = shapes_at(shape, nodes, n_points)  # motion of points relative to the facing points
         self._slopes = [shapes_at(slope, at.nodes, n_points) for slope in np.moveaxis(at.gradient, 2, 0)]
         self._spreading = [csr_array(matrix.T) for matrix in (self._motion, *self._slopes)]
         self.axes = np.stack([slope @ coordinates for slope in self._slopes], axis=1)

@@ -127,7 +127,7 @@ def _beside(point, terms, directions, triangular, neighbours, f, height):
         middle = 1.0 / 3.0 if triangular[g] else 0.0
         s, t, converged = _newton(point, terms, directions, g, middle, middle, height)
         out = beyond(triangular[g], s, t) if converged else np.inf
-        # Of several left alike, the first one.
+        # Of several equivalent facets, the first one is taken.
         if converged and max(out, LENGTH_ROUND_OFF) < max(least, LENGTH_ROUND_OFF) - ROUND_OFF:
             best, best_s, best_t, least = g, s, t, out
     return best, best_s, best_t, least

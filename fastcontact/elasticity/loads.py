@@ -57,7 +57,7 @@ class Load:
     CONSTANT: ClassVar[bool] = False  # values are numbers, not functions of position
     group: str
     components: Components
-    value: Value  # of loads that have no components
+    value: Value  # value of a load without components
     ramp: Table | None
 
     @property

@@ -90,7 +90,7 @@ class MaterialField:
 
     @cached_property
     def treatment(self) -> AnyArray:
-        """What elements make of the strain, by moduli (n_moduli,): 1 a mean dilatation, 2 incompatible modes, 0 nothing.
+        """Strain treatment of elements, by moduli (n_moduli,): 1 mean dilatation, 2 incompatible modes, 0 none.
 
         Their sum means incompatible modes in the elements that have them, and a mean dilatation in others. Axisymmetric cells
         have no incompatible modes.

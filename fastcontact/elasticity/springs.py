@@ -19,7 +19,7 @@ from fastcontact.round_off import ROUND_OFF
 
 # Ratios of the stiffness of a spring between nodes to that of the bodies there that cause a warning and an error.
 STIFF, STIFFEST = 1e5, 1e12
-DIGITS = 16  # of double precision
+DIGITS = 16  # decimal digits of double precision
 
 
 @dataclass(frozen=True, eq=False)

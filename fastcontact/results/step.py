@@ -259,7 +259,7 @@ class ContactResult:
 
 
 class ContactsByName(dict[str, ContactResult]):
-    """Contact pairs by name, which tell the names that are there when asked for another one."""
+    """Contact pairs by name; the error for an unknown name lists the known ones."""
 
     def __missing__(self, name: object) -> ContactResult:
         raise KeyError(unknown("contact pair", str(name), self))

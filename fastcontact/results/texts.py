@@ -11,9 +11,9 @@ import struct
 from typing import Any
 
 SIGNATURE = b"GCOL\x01\0\0\0"  # with version and reserved bytes
-HEAD = struct.Struct("<8sQ")  # of a collection: signature, size
-OBJECT = struct.Struct("<H6xQ")  # of an object: number, size; free space at the end has the number 0
-REFERENCE = struct.Struct("<IQI")  # in a data set: length of the text, position of the collection, number of the object
+HEAD = struct.Struct("<8sQ")  # header of a collection: signature, size
+OBJECT = struct.Struct("<H6xQ")  # header of an object: number, size; free space at the end has the number 0
+REFERENCE = struct.Struct("<IQI")  # entry of a data set: length of the text, position of the collection, object number
 
 
 def read_text(dataset: Any, raw: Any) -> str:

@@ -138,7 +138,7 @@ class ResultWriter:
         self._background = Background() if background else None
         self._turn = threading.RLock()
         self._last: tuple[int, Any] = (0, None)  # index and case of the last step
-        self._notes: dict[str, str] = {}  # of the next step: the case file, if another one is resumed
+        self._notes: dict[str, str] = {}  # notes of the next step: the case file, if another one is resumed
         self._left: tuple[int, ...] | None = None
         with self._explained("begun"):
             self._lock = PathLock(self.path)

@@ -48,7 +48,7 @@ class Run:
     """One run of a study."""
 
     label: str  # for messages
-    name: str  # of the case, or of the function that makes the model
+    name: str  # name of the case or of the model function
     marks: dict[str, Any]  # distinguish this run from the others of its study, e.g. its level
     size: float = 0.0  # amount of work, in any unit that the runs of a study share
 

@@ -220,7 +220,7 @@ class Eliminated:
         across = np.stack([-d[1], d[0]])
         rows = sum(scaled(taken(T, at), factor) for factor, T in zip(across, self._rows[1:], strict=True))
         spring = np.minimum(turning / np.maximum(1.0 - turning, TINY), STIFFEST) * self._unit[at] ** 2
-        spring = spring / (1.0 + spring * self._gives[1, at])  # in series with that of the constraint itself
+        spring = spring / (1.0 + spring * self._gives[1, at])  # in series with that of the constraint
         return _Sliding(
             at, pull, _Across(across, Springs(csr_array(rows), spring), (across * self._free[1:, at]).sum(axis=0))
         )

@@ -37,13 +37,13 @@ class Location:
 
 
 class Located:
-    """What stands somewhere in a deck, at its `location`, which messages about it name."""
+    """Base class of deck items with a `location`, which error messages name."""
 
     __slots__ = ()
     location: Location
 
     def refuse(self, text: str) -> CaseError:
-        """Return the error that refuses it."""
+        """Return an error at the location of the item."""
         return self.location.refuse(text)
 
     def __str__(self) -> str:
@@ -247,7 +247,7 @@ def _blocks(path: Path, name: str, source: Source) -> Iterator[Block]:
     current: Block | None = None
     contents = _contents(path, source)
     lines = _lines(contents, 0, len(contents))
-    last = _Line(0, 0, 0, "")  # of the current keyword
+    last = _Line(0, 0, 0, "")  # last line of the current keyword
     for line in lines:
         if line.text.startswith("**"):
             continue

@@ -142,7 +142,7 @@ class Interaction(Located):
     cohesion: dict[str, Block] = field(default_factory=dict)
     conductance: list[Block] = field(default_factory=list)
     friction_heat: tuple[Location, float] | None = None
-    changes: list[tuple[int, Interaction]] = field(default_factory=list)  # of friction, after a number of steps
+    changes: list[tuple[int, Interaction]] = field(default_factory=list)  # (steps before, friction)
 
 
 @dataclass
@@ -220,7 +220,7 @@ class Link(Located):
     components: tuple[int, ...] = (1, 2, 3, 4, 5, 6)
     distributing: bool = False
     rotation: str = ""
-    orientation: str = ""  # whose axes the components refer to
+    orientation: str = ""  # the components refer to its axes
 
 
 @dataclass(frozen=True)
@@ -242,7 +242,7 @@ class Axes(Located):
     cylindrical: bool
     points: tuple[float, ...]
     distribution: str = ""  # name of the distribution of material axes by cell, in place of points
-    part: Part | None = None  # in which axes of materials are defined
+    part: Part | None = None  # the part that defines axes of materials
 
 
 @dataclass(frozen=True)

@@ -281,7 +281,7 @@ class ByShape(Generic[Name]):
 
 
 def given_values(values: Array, positions: Array) -> Array:
-    """Return given values (n,), repeated to the number of positions (k n, dim), whatever these are."""
+    """Return given values (n,), repeated to the number of positions (k n, dim), which do not matter otherwise."""
     return np.repeat(values, len(positions) // len(values))
 
 

@@ -14,8 +14,8 @@ from fastcontact.errors import ContactError
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 
-# A point counts as beyond the border of an open surface if it stands out by more than BESIDE, and leans by more than this
-# over its height: borders on a plane of symmetry, where facets never stand quite upright, still hold.
+# A point counts as beyond the border of an open surface if it overhangs by more than BESIDE, and by more than this fraction
+# of its height: borders on a plane of symmetry, to which facets are never exactly normal, remain in contact.
 LEAN = 0.27
 
 

@@ -17,8 +17,8 @@ from fastcontact.errors import ContactError
 
 # Number of consecutive points in the order of the search that need not be sorted among themselves.
 TOGETHER = 16
-# Overhang up to which a point may still face the side that ends there: nodes on an axis or plane of symmetry stand out a
-# little beyond facets that lean, nodes at the end of one side beyond that of the other where the two strain differently.
+# Overhang up to which a point still faces a side that ends there: nodes on an axis or plane of symmetry lie slightly beyond
+# inclined facets, and nodes at the end of one side beyond that of the other if the two strain differently.
 BESIDE = 0.05
 
 

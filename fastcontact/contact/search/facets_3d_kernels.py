@@ -31,7 +31,7 @@ def prepare(facets, begin, end, to_terms, weights, low, high):
         for d in range(3 if m > 4 else 0):
             low[i, d], high[i, d] = low[i, d] - stray, high[i, d] + stray
         extent = high[i, 0] - low[i, 0], high[i, 1] - low[i, 1], high[i, 2] - low[i, 2]
-        if stray >= LENGTH_ROUND_OFF * max(extent):  # else the facet is flat
+        if stray >= LENGTH_ROUND_OFF * max(extent):  # otherwise the facet is flat
             bend[i] = stray
         p, q = vector(terms, i, 1), vector(terms, i, 2)
         diagonal = np.sqrt(dot(extent, extent))

@@ -20,7 +20,7 @@ from fastcontact.mesh.mesh import Mesh
 # Inner points are closer than the longest admissible edge, since no triangulation has equal edges: fractions to be tried in
 # turn, and the smallest angle [degrees] at which an attempt, or an earlier better one, is accepted.
 _ATTEMPTS = ((0.84, 35.0), (0.82, 35.0), (0.80, 33.0), (0.78, 31.0), (0.75, 29.0), (0.70, 20.0))
-_ROUNDS = 8  # of adding points where edges are too long
+_ROUNDS = 8  # number of passes that add points where edges are too long
 _AROUND = 3.0  # distance from an added point, in edge lengths, within which points move
 _ROW = np.sqrt(3.0) / 2  # height of an equilateral triangle
 _CLEAR = 0.6  # smallest distance of seeds from the outline, in edge lengths

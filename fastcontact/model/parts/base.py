@@ -117,9 +117,7 @@ class ModelBase:
         self.heat_loads: list[FixedTemperature | Heating | Film] = []
         self.initial_states: list[InitialState] = []
         self.relations: list[MultiPointConstraint] = []
-        self.related_supports: list[
-            tuple[str, MultiPointConstraint]
-        ] = []  # those of the constraints that support a group
+        self.related_supports: list[tuple[str, MultiPointConstraint]] = []  # supports by group, as constraints
         self.springs: list[Springs] = []
         self.pretensions: list[Pretension] = []
         self.interpolated: list[str] = []  # cyclic symmetries whose nodes follow facets

@@ -16,7 +16,7 @@ from fastcontact.results.step import ContactResult, StepResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-else:  # which is imported where a picture is drawn
+else:  # matplotlib is imported only when a picture is drawn
     Axes = Any
 
 Units = Mapping[str, str]

@@ -15,7 +15,7 @@ from fastcontact.results.plot._axes import UNKNOWN, Axes, Panels, Units, contact
 from fastcontact.results.step import StepResult
 from fastcontact.results.units import labelled, units_of_results
 
-# So many numbers of closed nodes stand beside each other above the zones.
+# Largest number of node counts shown side by side above the zones.
 MOST_COUNTS = 20
 STATES = {"open": "0.85", "closed": "C0", "sticking": "C0", "sliding": "C1"}
 

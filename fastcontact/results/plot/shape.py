@@ -30,7 +30,7 @@ from fastcontact.results.plot.solid import MOST_EDGES, draw_solid, is_seen, view
 from fastcontact.results.step import StepResult
 from fastcontact.results.units import labelled
 
-LARGEST = 1e30  # of coordinates that can be drawn: the libraries multiply them
+LARGEST = 1e30  # largest coordinate that can be drawn: the libraries multiply coordinates
 
 
 def scaled(points: Array, scale: float, displacement: Array) -> Array:
