@@ -96,7 +96,7 @@ def _push(points: Array, edges: Indices, wanted: Array) -> Array:
 def polish(points: Array, movable: Mask, limit: Size, sweeps: int) -> Array:
     """Return points (n, 2) [length], moved one by one so that the worst triangle around each becomes better.
 
-    A trial move is accepted if it raises the smallest angle of the star, with a penalty on edges longer than `limit` (smart
+    A trial move is accepted if it raises the smallest angle of the star, with a penalty on edges that are too long (smart
     smoothing after L. Freitag and C. Ollivier-Gooch, Int. J. Numer. Meth. Engng 40, 1997). Points moved simultaneously share
     no edge. Of the `points` (n, 2) [length] only those `movable` (n,) of bool move, in at most `sweeps` sweeps;
     the function `limit` (n,) [length] of points is the longest admissible edge.
