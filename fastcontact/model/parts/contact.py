@@ -87,8 +87,10 @@ class ModelContact(ModelConnections):
               may share such nodes. ``frictionless``: groups whose nodes carry no friction, likewise.
               ``frictionless_along``: a vector (dim,) along which these nodes, or without ``frictionless`` all, have neither
               friction nor slip; across it they keep both [-].
-            - ``penalty``: pressure per penetration [pressure / length], by default exact constraints; or a table of pairs
-              (overclosure, pressure), ascending from zero pressure [length, pressure]. It does not regularise friction;
+            - ``penalty``: pressure per penetration [pressure / length], by default exact constraints; or a table of
+              pairs (overclosure, pressure), ascending from zero pressure [length, pressure]; or ``{"clearance": c,
+              "pressure": p}``, an exponential law with the pressure p at zero gap and p / 100 at the gap c. It does
+              not regularise friction;
               ``tangential_penalty`` does: shear per tangential displacement of sticking nodes, a number or a function of
               the secondary position [pressure / length].
             - ``cohesion``: bilinear cohesive zone, a mapping of ``strength`` [pressure] and fracture ``energy`` per
