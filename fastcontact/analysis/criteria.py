@@ -25,8 +25,8 @@ class Criteria:
         Largest residual force divided by the largest applied force, reaction or contact force (RESI_GLOB_RELA), at most
         0.01. If an iterative linear solver misses it, its tolerance is lowered or a factorisation takes over.
     absolute : float, optional
-        Largest residual force [force] that is accepted by itself (RESI_GLOB_MAXI). Without forces a relative criterion is
-        0/0; then, and by default, the bound is the round-off of the internal forces.
+        Largest admissible residual force [force] (RESI_GLOB_MAXI), an alternative to `relative`. By default, and if
+        there are no forces, the bound is the round-off of the internal forces.
     geometry_updates : int or None
         Number of contact detections on the deformed configuration after the first one of a step; None: until the
         displacement changes by less than `geometry` times its largest component.

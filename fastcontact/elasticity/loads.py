@@ -290,7 +290,7 @@ def facets_of(mesh: Mesh, group: str) -> dict[str, Numbers]:
 
 
 def outward(mesh: Mesh, group: str, element: str, block: Numbers) -> Numbers:
-    """Return the facets of `block` (n, n_nodes), oriented so that their normals point out of the solid.
+    """Return the facets (n, n_nodes) of `block` (n, n_nodes), oriented so that their normals point out of the solid.
 
     Raises ModelError if a facet does not lie on the outside of a solid.
     """
@@ -403,6 +403,6 @@ def _density(load: Traction | BodyForce, x: Array, measure: Array) -> Array:
 def add_density(forces: Array, cells: Numbers, N: Array, density: Array) -> None:
     """Add the integrals of a density times the shape functions to nodal `forces` (n_points, dim) [force], in place.
 
-    `cells` (c, n) of int, shape values `N` (q, n) [-], and `density` (c, q, dim) times the volume of each point [force].
+    `cells` (c, n) of int, shape values `N` (q, n) [-], and `density` (c, q, dim) [force], times the volume of each point.
     """
     np.add.at(forces, cells, np.einsum("qn,cqd->cnd", N, density))

@@ -161,7 +161,7 @@ def is_isotropic(moduli: Array) -> Mask:
 def of_cells(material: Numbers) -> Numbers:
     """Return one material number for each cell (n_cells,) of int, unique if nothing varies inside the cell.
 
-    `material` is (n_cells,) or (n_cells, n_q) of int.
+    The argument `material` (n_cells,) of int may also be (n_cells, n_q).
     """
     return material if material.ndim == 1 else np.ascontiguousarray(material[:, 0])
 

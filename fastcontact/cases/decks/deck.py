@@ -189,8 +189,8 @@ class Deck:
 def read_deck(path: PathLike) -> Deck:
     """Read an input deck of Abaqus or CalculiX: static steps of elastic, plastic and hyperelastic bodies in contact.
 
-    Every keyword and parameter is translated, noted as without effect, or refused. Nothing but the deck and what it includes
-    below its own folder is read.
+    Every keyword and parameter is translated, noted as without effect, or refused. Only the deck and included files in
+    its folder and subfolders are read.
 
     Parameters
     ----------
@@ -203,16 +203,16 @@ def read_deck(path: PathLike) -> Deck:
     Raises
     ------
     CaseError
-        If the deck is wrong or asks for what is outside of fastcontact; the message names file, line and keyword.
+        If the deck is invalid or requires an unsupported feature; the message names file, line and keyword.
     FileError
         If a file cannot be read.
     FastcontactError
-        If the model is wrong.
+        If the model is invalid.
 
     Warns
     -----
     FastcontactWarning
-        If a step has NLGEOM, and small strains are solved nevertheless: with plasticity, couplings.
+        If a step has NLGEOM, but small strains are used, as with plasticity or couplings.
 
     Examples
     --------

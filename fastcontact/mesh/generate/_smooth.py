@@ -64,7 +64,7 @@ def relax(points: Array, movable: Mask, size: Size, steps: int) -> Array:
 
     The bars of a truss push its nodes apart until the lengths follow the size function (P.-O. Persson and
     G. Strang, A simple mesh generator in MATLAB, SIAM Review 46, 2004, section 2). Of the `points` (n, 2) [length] those
-    `movable` (n,) of bool move, in `steps` steps; ``size(points)`` (n,) [length] is the desired length of edges.
+    `movable` (n,) of bool move, in `steps` steps; the function `size` (n,) [length] of points is the desired length of edges.
     """
     points = points.copy()
     if not movable.any():
@@ -96,10 +96,10 @@ def _push(points: Array, edges: Indices, wanted: Array) -> Array:
 def polish(points: Array, movable: Mask, limit: Size, sweeps: int) -> Array:
     """Return points (n, 2) [length], moved one by one so that the worst triangle around each becomes better.
 
-    A trial move is accepted if it raises the smallest angle of the star, with a penalty on edges longer than `limit` (smart
+    A trial move is accepted if it raises the smallest angle of the star, with a penalty on edges that are too long (smart
     smoothing after L. Freitag and C. Ollivier-Gooch, Int. J. Numer. Meth. Engng 40, 1997). Points moved simultaneously share
     no edge. Of the `points` (n, 2) [length] only those `movable` (n,) of bool move, in at most `sweeps` sweeps;
-    ``limit(points)`` (n,) [length] is the longest admissible edge.
+    the function `limit` (n,) [length] of points is the longest admissible edge.
     """
     points = points.copy()
     radius, moved = 0.1, True

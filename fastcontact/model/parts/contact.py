@@ -70,10 +70,11 @@ class ModelContact(ModelConnections):
             - ``friction``: coefficient of Coulomb friction.
             - ``kind``: ``"unilateral"`` (default): contact opens and closes. ``"bilateral"``: all gaps that have an opposite
               side are closed from the beginning and stay so (no separation), with frictionless sliding.
-              ``"bilateral_once_closed"``: no separation of what is closed at the end of a load step. ``"tied"``: neither
-              separation nor sliding; the sides are paired once, in the reference configuration, and their relative
-              displacement is zero, also across initial gaps, which are kept (a rotation then strains by its angle times the
-              gap). ``"gap_only"``: gaps are evaluated, negative where the sides penetrate, without forces.
+              ``"bilateral_once_closed"``: no separation of nodes that are closed at the end of a load step.
+              ``"tied"``: neither separation nor sliding; the sides are paired once, in the reference configuration,
+              and their relative displacement is zero, also across initial gaps, which are kept (a rotation then
+              strains by its angle times the gap). ``"gap_only"``: gaps are evaluated, negative where the sides
+              penetrate, without forces.
             - ``clearance``: added to the gap, a number or a function from reference positions (n, dim) on the secondary
               side to lengths (n,): positive for a clearance, negative for an interference, as of a press fit [length].
               ``clearance_primary``: the same on the primary side, at the opposite positions. ``clearance_ramp``: their
@@ -86,8 +87,10 @@ class ModelContact(ModelConnections):
               may share such nodes. ``frictionless``: groups whose nodes carry no friction, likewise.
               ``frictionless_along``: a vector (dim,) along which these nodes, or without ``frictionless`` all, have neither
               friction nor slip; across it they keep both [-].
-            - ``penalty``: pressure per penetration [pressure / length], by default exact constraints; or a table of pairs
-              (overclosure, pressure), ascending from zero pressure [length, pressure]. It does not regularise friction;
+            - ``penalty``: pressure per penetration [pressure / length], by default exact constraints; or a table of
+              pairs (overclosure, pressure), ascending from zero pressure [length, pressure]; or ``{"clearance": c,
+              "pressure": p}``, an exponential law with the pressure p at zero gap and p / 100 at the gap c. It does
+              not regularise friction;
               ``tangential_penalty`` does: shear per tangential displacement of sticking nodes, a number or a function of
               the secondary position [pressure / length].
             - ``cohesion``: bilinear cohesive zone, a mapping of ``strength`` [pressure] and fracture ``energy`` per

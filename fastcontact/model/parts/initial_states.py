@@ -92,8 +92,8 @@ class ModelInitialStates(ModelLoads):
     ) -> None:
         """Prescribe the temperature of groups of solid cells by a nodal field of one or several files.
 
-        Formats are MED, VTKHDF (such as result files) and those of meshio (such as .vtu). If the file has the points of the
-        mesh in the same order, its values are taken as they stand; otherwise points are matched by position.
+        Formats are MED, VTKHDF (such as result files) and those of meshio (such as .vtu). If the file has the points
+        of the mesh in the same order, its values are used directly; otherwise points are matched by position.
 
         Parameters
         ----------

@@ -58,7 +58,7 @@ def contact_map(
         Quantity drawn beside the pressure; see `ContactResult`.
     title, units
         As in `pressure_profile`.
-    axes : matplotlib Axes, two where there is shear, optional
+    axes : matplotlib Axes, two with friction, optional
 
     Returns a tuple of Axes, of the pressure and, with friction, of the shear or slip. FastcontactError if the mesh is
     not three-dimensional, does not contain the contact surface, or if the closed part of it goes around a body.
