@@ -30,6 +30,8 @@ def case_path(given: str | Path) -> Path:
     try:
         if path.exists() or path.suffix or path.name != str(given):
             return path
+        if path.name == "-":  # the standard input, to other programs
+            return Path("/dev/stdin")
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise CaseError(f"cannot look for the case file '{str(given)[:200]}' ({reason}): check its name") from None

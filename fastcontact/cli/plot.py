@@ -101,7 +101,7 @@ def _of_bodies(
     from fastcontact.results import plot
 
     at = f"section {options.section}, " if plane else ""
-    title = f"{case['title']}\n{at}load factor {step.load_factor:g}, displacements x {options.scale:g}".strip()
+    title = f"{case['title']}\n{at}{step.instant}, displacements x {options.scale:g}".strip()
     labels = {"field": options.field, "scale": options.scale, "zoom": options.zoom, "title": title}
     if plane is None:
         return plot.deformed_shape(results.mesh, step, mirrored=options.mirrored, **labels)
@@ -118,15 +118,15 @@ def _of_contact(options: argparse.Namespace, results: Any, step: Any, case: dict
     name = _results.chosen_contact(options, step)
     theories = case["theories"].get(name, {})
     if options.map:
-        labels["title"] = f"{case['title']}\ncontact '{name}', load factor {step.load_factor:g}".strip()
+        labels["title"] = f"{case['title']}\ncontact '{name}', {step.instant}".strip()
         beside = options.field.removeprefix("contact_") if options.field.startswith("contact_") else "shear"
         return plot.contact_map(results.mesh, step.contact[name], beside=beside, **labels)[0]
     if options.zones:
         return plot.contact_zones(list(results), name, **labels)
     if options.history:
-        options_of_theory = {"approach": case["approach"].get(name), "share": theories.get("share", 1.0)}
-        return plot.history(list(results), name, law=_results.law(theories), **options_of_theory, **labels)[0]
-    labels["title"] = f"{case['title']}\nstresses on the axis, load factor {step.load_factor:g}".strip()
+        given = {"approach": case["approach"].get(name), "share": theories.get("share", 1.0)}
+        return plot.history(list(results), name, law=_results.law(theories), **given, **labels)[0]
+    labels["title"] = f"{case['title']}\nstresses on the axis, {step.instant}".strip()
     return plot.axis_stress(results.mesh, step, name, _axis_curves(theories, step, name, case), **labels)
 
 

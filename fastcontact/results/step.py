@@ -294,7 +294,8 @@ class StepResult:
         geometry from meeting the criterion, ``scatter``: the variation of ``displacement`` and contact ``force`` [-].
         With temperatures, ``temperature_factors``, their multipliers; likewise ``initial_factors`` with initial
         stresses and strains, and ``pressure_factors`` with pressures in finite strain [-]. ``work`` and, with
-        pretension sections, ``pretension``: see the properties of these names.
+        pretension sections, ``pretension``: see the properties of these names. ``parameter`` of modes and their phases:
+        what their load factor is, ``frequency`` or ``phase``.
     warnings : tuple of str
         Warnings of the step.
     cell_fields : dict of str to ndarray (n_solids,)
@@ -349,11 +350,16 @@ class StepResult:
         object.__setattr__(self, "contact", ContactsByName(named or self.contact))
 
     @property
+    def instant(self) -> str:
+        """Load factor, or the frequency of a mode, as text."""
+        return f"{self.iterations.get('parameter', 'load factor')} {self.load_factor:.6g}"
+
+    @property
     def shown(self) -> dict[str, str]:
         """Texts for reprs and tables: load factor, largest displacement and stress, iterations."""
         moved, stressed = (float(np.abs(field).max(initial=0.0)) for field in (self.displacement, self.von_mises))
         shown = {
-            "load factor": f"{self.load_factor:.6g}",
+            self.iterations.get("parameter", "load factor"): f"{self.load_factor:.6g}",
             "largest displacement": with_unit(f"{moved:.6g}", self.units, "length"),
             "largest von Mises stress": with_unit(f"{stressed:.6g}", self.units, "pressure"),
         }
@@ -366,7 +372,7 @@ class StepResult:
             for c in self.contact.values()
         ]
         texts = [f"largest displacement {self.shown['largest displacement']}", *pairs]
-        return f"StepResult({self.index}, load factor {self.load_factor:.6g}; {'; '.join(texts)})"
+        return f"StepResult({self.index}, {self.instant}; {'; '.join(texts)})"
 
     def _repr_html_(self) -> str:
         """Return tables of the step and of its contact pairs for notebooks."""

@@ -289,7 +289,9 @@ def test_modes_are_steps_for_pictures_and_files(tmp_path):
     with fc.open_results(tmp_path / "modes.vtkhdf") as results:
         assert [step.load_factor for step in results] == pytest.approx(found.frequencies)
         np.testing.assert_array_equal(results[1].displacement, found.shapes[1])
-        assert fc.plot.deformed_shape(results.mesh, results[1], field="displacement").get_title()
+        title = fc.plot.deformed_shape(results.mesh, results[1], field="displacement").get_title()
+    assert f"frequency {found.frequencies[1]:.6g}" in title
+    assert "phase 0.5" in repr(found.phases(1, 2)[1])
 
 
 def test_a_case_file_asks_for_modes(tmp_path, capsys):

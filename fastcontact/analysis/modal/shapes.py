@@ -60,7 +60,8 @@ class Shapes(Sequence[StepResult]):
 def _as_step(number: int, frequency: float, u: Array, stress: Array) -> StepResult:
     equivalent = recovery.von_mises(stress)
     signed = recovery.von_mises_signed(stress, equivalent)
-    return StepResult(number + 1, float(frequency), u, stress, equivalent, signed, np.zeros_like(u))
+    kind = {"parameter": "frequency"}
+    return StepResult(number + 1, float(frequency), u, stress, equivalent, signed, np.zeros_like(u), iterations=kind)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

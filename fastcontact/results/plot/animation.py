@@ -118,7 +118,7 @@ def animate(
         for step in steps:
             figure.clear()
             axes = figure.add_subplot(projection=projection)
-            heading = f"{title}\nload factor {step.load_factor:.3g}, displacements x {scale:g}".strip()
+            heading = f"{title}\n{step.instant}, displacements x {scale:g}".strip()
             deformed_shape(
                 mesh, step, field=field, scale=scale, mirrored=mirrored, limits=colours, title=heading, units=units,
                 view=view, ax=axes,

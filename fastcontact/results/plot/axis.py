@@ -90,7 +90,7 @@ def axis_stress(
         for colour, curve in zip(COLOURS, curves, strict=True):
             axes.plot(fine, curve, style, color=colour, lw=1.0)
         axes.plot([], [], f"k{style}", lw=1.0, label=label)
-    title = title or f"Stresses on the axis, load factor {step.load_factor:g}"
+    title = title or f"Stresses on the axis, {step.instant}"
     axes.set(xlabel=labelled("depth under the surface", units, "length"), ylabel=labelled("stress", units, "pressure"))
     axes.set_title(title, fontsize="medium")
     axes.grid(alpha=0.3)

@@ -105,7 +105,7 @@ def section(
     if zoom is not None:
         axes.set(xlim=points[:, 0], ylim=points[:, 1])
     plane = f"section through {placed(at, float(np.ptp(mesh.points, axis=0).max()))}, normal {placed(direction, 1.0)}"
-    state = f"load factor {step.load_factor:g}, displacements x {scale:g}"
+    state = f"{step.instant}, displacements x {scale:g}"
     below, bar = (legend_below(points), bar_beside(points)) if ax is None else (-0.14, 0.8)
     labels = labels or ("along the section", "across it")
     return framed(axes, drawn, shown, title or f"{plane}\n{state}", units, below, bar, labels)

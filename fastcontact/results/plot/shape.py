@@ -104,7 +104,7 @@ def deformed_shape(
         raise FastcontactError(f"zoom = {zoom:g}: in the plane half a width > 0 can be drawn; in 3D draw a section")
     shown, units = field_of(mesh, step, field), units or step.units
     points = scaled(shown.mesh.points, scale, step.displacement[shown.node])
-    heading = title or f"Deformed shape (displacements x {scale:g}), load factor {step.load_factor:g}"
+    heading = title or f"Deformed shape (displacements x {scale:g}), {step.instant}"
     if mesh.dim == 3:
         axes = new_axes(ax, (6.4, 6.9), "3d")
         view = view or view_of_extreme(shown, points)

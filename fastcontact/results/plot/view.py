@@ -49,7 +49,7 @@ def view(results: Any, step: StepResult, *, scale: float = 1.0, title: str = "",
         grid, scalars="von_mises", show_edges=grid.n_cells <= 5000, line_width=0.3, cmap="viridis",
         scalar_bar_args={"vertical": True, "title": "von Mises stress"},
     )  # fmt: skip
-    plotter.add_text(title or f"load factor {step.load_factor:g}", font_size=10)
+    plotter.add_text(title or step.instant, font_size=10)
     if results.mesh.dim == 2:
         plotter.view_xy()
     plotter.add_axes()
