@@ -164,13 +164,6 @@ def _edges(mesh):
     return np.vstack([block[:, [0, 1]], block[:, [1, 2]], block[:, [2, 0]]])
 
 
-@pytest.mark.slow
-def test_half_a_millimetre_is_made_in_time():
-    quality = fc.quality(quarter_disc(size=0.5))
-    assert quality.longest_edge <= 0.5 * (1 + 1e-9)
-    assert quality.smallest_angle > 30.0
-
-
 @pytest.mark.parametrize(
     ("near", "far", "plateau"), [(0.5, 10.0, None), (0.1, 5.0, None), (0.01, 10.0, None), (1.0, 5.0, 10.0)]
 )
