@@ -72,6 +72,7 @@ def test_twenty_bytes_a_byte(kind, tmp_path):
     check_size(tmp_path, small, large, 16**3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "load",
     [

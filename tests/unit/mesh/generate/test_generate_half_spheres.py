@@ -124,6 +124,7 @@ def test_two_calls_give_the_same_bits(element):
     assert all(np.array_equal(first.cells[name], second.cells[name]) for name in first.cells)
 
 
+@pytest.mark.slow
 def test_lengths_scale_with_the_radius():
     small = half_spheres("quad4", R=1.0)
     assert small.points * R == pytest.approx(half_spheres("quad4").points, abs=1e-10)
