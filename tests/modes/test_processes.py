@@ -17,7 +17,7 @@ def found(method, run, before="run", **environment):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("method", [pytest.param("spawn", marks=pytest.mark.slow), "forkserver"])
+@pytest.mark.parametrize("method", ["spawn", "forkserver"])
 def test_started_children_find_the_same_bits(method):
     answer = found(method, "small")
     assert answer["child"] == answer["parent"]

@@ -232,6 +232,7 @@ def test_work_of_friction_does_not_depend_on_the_number_of_steps(formulation, el
         assert done == pytest.approx(steps[-1].work["friction_work"])
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:contact 'ball' has only")
 def test_shear_in_space_does_not_depend_on_the_number_of_steps():
     options = {"kinematics": "3d", "element": "hex8", "formulation": "mortar", "friction": 0.1}

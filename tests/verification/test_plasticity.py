@@ -168,14 +168,6 @@ def flattened(instants: list[float], size: float):
 @pytest.mark.filterwarnings("ignore:contact 'flat'")
 def test_a_ball_on_a_flat_past_yield() -> None:
     """Kogut and Etsion (2002): the force is 1.03 x^1.425 times that at yield up to x = 6 times its interference."""
-    force = flattened([1.0, 3.0, 6.0], 0.003)
+    force = flattened([1.0, 3.0, 6.0], 0.002)
     assert force[0] == pytest.approx(1.0, rel=0.01)
     assert force[-1] == pytest.approx(1.03 * 6.0**1.425, rel=0.05)
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:contact 'flat'")
-def test_a_ball_on_a_flat_far_past_yield() -> None:
-    """Kogut and Etsion (2002): 1.40 x^1.263 up to x = 110; contact grows along the way, so steps are small."""
-    force = flattened([1.0, 3.0, 6.0, 10.0, 15.0, *np.arange(20.0, 111.0, 5.0)], 0.003)
-    assert force[-1] == pytest.approx(1.40 * 110.0**1.263, rel=0.05)

@@ -125,6 +125,7 @@ def test_the_cache_notices_how_kernels_are_compiled(written, option, monkeypatch
     assert asked(written, CALLED) == (2.0, 1)
 
 
+@pytest.mark.slow
 @jitted
 def test_the_cache_notices_a_constant_of_another_file(tmp_path):
     write(tmp_path, caller="from constants import NUMBER\n" + CALLER.replace("10.0 *", "NUMBER *"))

@@ -206,13 +206,6 @@ def test_an_analysis_that_failed_goes_on_from_its_last_step():
         assert_same(found, expected, FRICTION)
 
 
-def test_the_same_bits():
-    steps = stopped_after(2, spheres("continuous"), fc.linear_ramp(4), linear_solver="direct")
-    again = fc.solve(spheres("continuous"), fc.linear_ramp(4), resume=steps, linear_solver="direct")
-    whole = fc.solve(spheres("continuous"), fc.linear_ramp(4), linear_solver="direct")
-    np.testing.assert_array_equal(again[-1].displacement, whole[-1].displacement)
-
-
 def test_only_the_last_step_keeps_its_state_and_what_was_given_stays_as_it_is():
     first = fc.solve(spheres(), fc.Ramp((0.2, 0.4)))
     assert [step.restart is None for step in first] == [True, False]

@@ -34,15 +34,6 @@ def test_the_same_steps_as_all_at_once(model):
 
 
 @pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")
-def test_any_step_can_be_gone_on_from(model):
-    first = next(fc.solve_steps(model, fc.linear_ramp(3)))
-    rest = list(fc.solve_steps(model, fc.linear_ramp(3), resume=[first]))
-    assert [step.index for step in rest] == [2, 3]
-    np.testing.assert_array_equal(rest[-1].displacement, fc.solve(model, fc.linear_ramp(3))[-1].displacement)
-    assert list(fc.solve_steps(model, fc.linear_ramp(3), resume=rest[-1:])) == []
-
-
-@pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")
 def test_nothing_is_computed_before_it_is_asked_for_and_nothing_is_kept(model, monkeypatch):
     computed = []
     step = step_halving.load_step

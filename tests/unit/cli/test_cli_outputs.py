@@ -198,8 +198,9 @@ def test_what_a_shell_opened_to_append_to_is_appended_to(name, files):
     assert main(["run", str(files / "case.toml"), "-o", "/dev/stdout"]) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="files as POSIX numbers them")
-@pytest.mark.parametrize("closed", [pytest.param(">&-", marks=pytest.mark.slow), "<&- >&- 2>&-"])
+@pytest.mark.parametrize("closed", [">&-", "<&- >&- 2>&-"])
 def test_a_process_without_standard_files(closed, files):
     """As daemons are started: no file that is opened takes the place of what is printed."""
     command = f"'{sys.executable}' -m fastcontact run case.toml -o out.vtkhdf --json out.json {closed}"

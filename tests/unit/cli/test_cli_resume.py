@@ -3,8 +3,6 @@
 import importlib.util
 import os
 import shutil
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -79,13 +77,6 @@ def assert_same(path, steps):
 # ------------------------------------------------------------------------------------------------ resuming
 
 
-def test_without_a_file_a_resumed_run_begins(whole, path, capsys):
-    case, steps = whole
-    assert main(["run", str(case), "-o", str(path), "--resume"]) == 0
-    assert f"wrote {path}" in capsys.readouterr().out
-    assert_same(path, steps)
-
-
 def test_an_interrupted_run_goes_on_and_a_complete_one_stays(whole, path, capsys, monkeypatch):
     case, steps = whole
     assert stopped(case, path, monkeypatch) == 130
@@ -146,16 +137,6 @@ def test_a_case_that_was_changed_since_is_refused(name, whole, begun, path, caps
     assert path.read_bytes() == before
 
 
-def test_a_changed_mesh_is_refused(whole, begun, path, capsys):
-    case, _ = whole
-    shutil.copy(begun, path)
-    before, changed = path.read_bytes(), path.with_name("changed.toml")
-    changed.write_text(case.read_text().replace("size = 6.0", "size = 5.0"))
-    assert run(changed, path, "--resume") == 1
-    assert only_line(capsys.readouterr().err).startswith(f"error: '{path}' belongs to another mesh: resume the case it")
-    assert path.read_bytes() == before
-
-
 def test_what_does_not_change_the_answer_may_change(whole, begun, path):
     """A title, a probe, a check, the order of the supports, a limit."""
     case, steps = whole
@@ -175,37 +156,6 @@ def test_what_does_not_change_the_answer_may_change(whole, begun, path):
 
 
 # ---------------------------------------------------------------------------------------------- accidents
-
-
-def test_a_second_run_on_the_file_of_a_first_one_is_refused(whole, path, capsys, monkeypatch):
-    case, steps = whole
-    told = []
-
-    def second():
-        twice = "import sys; from fastcontact.cli import main; run = sys.argv[1:]; print(main(run), main([*run, '--resume']))"
-        command = [sys.executable, "-c", twice, "run", str(case), "-o", str(path)]
-        told.append(subprocess.run(command, capture_output=True, text=True))
-
-    assert stopped(case, path, monkeypatch, act=second) == 0
-    expected = f"error: '{path}' is being written by process {os.getpid()}: let it end or name another file\n"
-    assert [(done.stdout, done.stderr) for done in told] == [("1 1\n", 2 * expected)]
-    assert_same(path, steps)
-    assert sorted(os.listdir(path.parent)) == [path.name]
-
-
-def test_a_folder_that_vanishes_stops_the_run(whole, tmp_path, capsys, monkeypatch):
-    case, steps = whole
-    folder, moved = tmp_path / "here", tmp_path / "there"
-    folder.mkdir()
-    path = folder / "run.vtkhdf"
-    assert stopped(case, path, monkeypatch, act=lambda: folder.rename(moved)) == 1
-    assert only_line(capsys.readouterr().err) == (
-        f"error: '{path}' is no longer there: the file or its folder was removed, moved or replaced after 2 steps. Put it "
-        "back and resume, or start again"
-    )
-    assert_same(moved / "run.vtkhdf", steps[:2])
-    assert run(case, moved / "run.vtkhdf", "--resume") == 0
-    assert_same(moved / "run.vtkhdf", steps)
 
 
 def test_a_file_that_is_replaced_stops_the_run(whole, path, capsys, monkeypatch):

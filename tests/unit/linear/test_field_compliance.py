@@ -166,7 +166,10 @@ def step_of(model, name):
 
 
 # As others, but for one more option.
-LONG = ("few", "soft penalty", "penalty beside", "tet10", "hex20", "hex20, penalty", "hex20 on a wall")
+LONG = (
+    "few", "soft penalty", "penalty beside", "tet10", "hex20", "hex20, penalty", "hex20 on a wall", "tet10, curved",
+    "tet10 on a wall", "stiff penalty",
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("case", [pytest.param(c, marks=pytest.mark.slow) if c in LONG else c for c in CASES])

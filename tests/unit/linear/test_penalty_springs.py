@@ -247,14 +247,10 @@ def test_springs_alone_precondition_the_matrix_that_they_are_part_of(kind):
     assert solver.counters.iterations <= 30
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*raise its penalty")
-@pytest.mark.parametrize(
-    ("element", "penalty"),
-    [
-        pytest.param("hex20", 1e3, marks=pytest.mark.slow), ("hex20", 1e5),
-        *(pytest.param("tet10", penalty, marks=pytest.mark.slow) for penalty in (1e3, 1e5)),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize("element", ["hex20", "tet10"])
+@pytest.mark.parametrize("penalty", [1e3, 1e5])
 def test_stiff_penalties_of_standard_multipliers_on_quadratic_facets_need_no_factors(element, penalty):
     """Factors that take over are told, and warnings are errors here."""
     model = pressed(element, n=3, formulation="mortar", multipliers="standard", penalty=penalty)

@@ -452,6 +452,7 @@ def test_the_command_draws_solids(result, tmp_path, options):
     assert len(np.unique(pixels[..., :3].reshape(-1, 3), axis=0)) > 50
 
 
+@pytest.mark.slow
 def test_the_command_writes_an_animation(result, tmp_path, capsys):
     target = tmp_path / "a.gif"
     assert main(["plot", str(result), "--animate", str(target)]) == 0

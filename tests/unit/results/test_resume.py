@@ -347,14 +347,6 @@ def test_a_folder_that_vanishes_is_told_at_the_next_step(tmp_path: Path) -> None
     assert len(resumed(moved, fc.linear_ramp(3))) == 3
 
 
-FULL = """
-    import sys
-    sys.path.insert(0, sys.argv[1])
-    import test_resume as t
-    t.resumed(t.Path(sys.argv[2]), t.fc.linear_ramp(60))
-"""
-
-
 # ---------------------------------------------------------------------------------------------- packing
 
 

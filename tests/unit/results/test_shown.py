@@ -238,6 +238,7 @@ print("listeners", len(compiling.listeners))
 """
 
 
+@pytest.mark.slow
 def test_compiling_is_told_once(tmp_path):
     """To the log, and on the line of the progress; Numba's own functions and cached ones say nothing."""
     run = subprocess.run(

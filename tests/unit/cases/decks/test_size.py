@@ -68,10 +68,11 @@ def check_size(folder, small, text, count):
 )
 def test_twenty_bytes_a_byte(kind, tmp_path):
     old, new = LINES[kind]
-    small, large = (block(n).replace(old, new(n)) if old else block(n) for n in (1, 12))
-    check_size(tmp_path, small, large, 12**3)
+    small, large = (block(n).replace(old, new(n)) if old else block(n) for n in (1, 16))
+    check_size(tmp_path, small, large, 16**3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "load",
     [

@@ -326,7 +326,7 @@ def meshes(draw):
     )
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(mesh=meshes())
 def test_any_mesh_comes_back_the_same(tmp_path, mesh):
     write_med_mesh(tmp_path / "any.med", mesh)
