@@ -39,11 +39,11 @@ MOST, HALVINGS = 40, 6
 SEARCHES, OVERSHOT, LEAST = 3, 0.8, 0.1
 # Number of iterations within which the change of the displacement must have decreased at least once by the factor.
 PATIENCE, FALL = 12, 0.5
-# Stiffness of springs along closed gaps beside the largest of the bodies. What contact does not hold, such as gaps between
-# values of a pressure field, creeps with stiff ones: an O-ring takes 5, 7, 11 iterations with 5e-5, 2e-4, 1e-3, and one that
-# fluid presses, which needs more than the first, 13 and 22 with the others.
+# Stiffness of springs along closed gaps over the largest of the bodies. Motions that contact does not hold, such as gaps
+# between values of a pressure field, creep with stiff springs: an O-ring takes 5, 7, 11 iterations with 5e-5, 2e-4, 1e-3, and
+# one under fluid pressure, for which the first is too soft, 13 and 22 with the others.
 HELD = 5e-5, 2e-4, 1e-3
-# Contact geometry of the linearised bodies settles to this part of the last relative change of the displacement.
+# The contact geometry of the linearised bodies converges to this fraction of the last relative change of the displacement.
 FORCING = 1e-3
 # Relative error of the displacement at which iterations end. Changes below SCATTER that do not decrease to the fraction STAYS
 # of the previous one are round-off, which is this large in slender bodies.
