@@ -70,7 +70,7 @@ def _prescribed_overlaps(pairs: Pairs, supports: Supports) -> list[str]:
     return prescribed_overlap_warnings(supported, supports)
 
 
-def _split_sides(model: Model, pairs: Pairs) -> list[str]:
+def _split_sides(model: Model, pairs: Pairs) -> Iterator[str]:
     """Return a warning for each two contacts that continue each other."""
     touched = {
         pair.name: np.union1d(*(model.mesh.points_of(side) for side in (pair.secondary, pair.primary)))
