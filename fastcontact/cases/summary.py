@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -242,21 +242,19 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
     return rows
 
 
-def _mode_lines(table: Mapping[str, Any]) -> list[str]:
+def _mode_lines(table: Mapping[str, Any]) -> Iterator[str]:
     """Return lines of frequencies, one for each number of nodal diameters; pairs of modes are listed once."""
     frequencies = table["frequencies"]
     diameters, twins = (
         table.get("nodal_diameters", [None] * len(frequencies)),
         table.get("twins", range(len(frequencies))),
     )
-    rows = []
     for d in dict.fromkeys(diameters):
         modes = [k for k, other in enumerate(diameters) if other == d and k <= twins[k]]
         shown = ", ".join(f"{frequencies[k]:.6g}" for k in modes)
         pairs = ", each of two modes" if any(twins[k] > k for k in modes) else ""
         where = "" if d is None else f", {count(d, 'nodal diameter')}{pairs}"
-        rows.append(f"  frequencies about the last step{where}: {shown}")
-    return rows
+        yield f"  frequencies about the last step{where}: {shown}"
 
 
 def count(number: int, noun: str) -> str:
@@ -264,31 +262,30 @@ def count(number: int, noun: str) -> str:
     return f"{number} {noun}" + "s" * (number != 1)
 
 
-def _contact_lines(name: str, contact: Mapping[str, Any], unit: Mapping[str, str]) -> list[str]:
+def _contact_lines(name: str, contact: Mapping[str, Any], unit: Mapping[str, str]) -> Iterator[str]:
     inside, outside = contact["radius"]
     force = valued(contact["force"], unit, "force", 6)
     if contact["force"] < CANCELLED * contact["normal_force"]:
         force += f", normal {valued(contact['normal_force'], unit, 'force', 6)} all round"
-    rows = [
+    yield (
         f"  contact '{name}' ({contact['formulation'].replace('_', '-')}): force {force}, largest pressure "
         f"{valued(contact['pressure_max'], unit, 'pressure', 6)}, {_edge(inside, outside, unit)}"
-    ]
+    )
     if any(contact["obstacle_displacement"] or ()):
         moved = ", ".join(f"{value:.6g}" for value in contact["obstacle_displacement"])
-        rows.append(f"  obstacle '{name}' stands {with_unit(f'({moved})', unit, 'length')} from its place at rest")
+        yield f"  obstacle '{name}' stands {with_unit(f'({moved})', unit, 'length')} from its place at rest"
     if "torque" in contact:
-        rows.append(
+        yield (
             f"  obstacle '{name}' has turned by {contact['obstacle_angle']:.6g} radian, with a torque of "
             + valued(contact["torque"], unit, "moment", 6)
         )
     if "wear_max" in contact:
-        rows.append(f"  contact '{name}' is worn by up to {valued(contact['wear_max'], unit, 'length')}")
+        yield f"  contact '{name}' is worn by up to {valued(contact['wear_max'], unit, 'length')}"
     if contact["penalty"] is not None:
-        rows.append(
+        yield (
             f"  contact '{name}' penetrates by up to {valued(contact['penetration'], unit, 'length')}, with a penalty of "
             + (valued(soft, unit, "penalty") if isinstance(soft := contact["penalty"], float) else "its law")
         )
-    return rows
 
 
 def _edge(inside: float | None, outside: float | None, unit: Mapping[str, str]) -> str:

@@ -123,16 +123,13 @@ class StressOffset:
     ----------
     rise : ndarray (n_points,)
         Rise of the temperature [temperature].
-    per_degree : ndarray (n_moduli, n_components)
-        Moduli times the coefficients of expansion [pressure / temperature], subtracted from the stress.
-    expansion : ndarray (n_moduli,)
-        Coefficients of expansion of the materials with a mean dilatation, zero for others [1 / temperature].
+    expansion : ndarray (n_moduli, n_components)
+        Thermal strains of a degree [1 / temperature].
     states : sequence of (float, InitialState)
         Factors, and initial stresses and strains.
     """
 
     rise: Array
-    per_degree: Array
     expansion: Array
     states: Sequence[tuple[float, InitialState]] = ()
 

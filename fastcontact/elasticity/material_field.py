@@ -153,10 +153,8 @@ class MaterialField:
         """
         if rise is None and not states:
             return None
-        strain = np.nan_to_num(self.expansion)
-        per_degree = np.einsum("mij,mj->mi", self.moduli, strain)
-        expansion = np.where(self.averaged, strain[:, 0], 0.0)
-        return StressOffset(np.zeros(n_points) if rise is None else rise, per_degree, expansion, tuple(states))
+        at_nodes = np.zeros(n_points) if rise is None else rise
+        return StressOffset(at_nodes, np.nan_to_num(self.expansion), tuple(states))
 
     def without_expansion(self, mesh: Mesh, rise: Array) -> int:
         """Return the number of cells with a temperature rise (n_points,) [temperature] and a material without expansion."""

@@ -56,13 +56,12 @@ def model_warnings(model: Model, ramp: Ramp) -> list[str]:
     """Return the warnings about a model accepted by `Model.check`, for an analysis along a ramp."""
     supports = Supports(*model.prescribed_by_ramp(), ramp)
     pairs, pushed = [(pair, model.bind(pair)) for pair in model.contact], _pushed(supports)
-    warnings = _moduli(model) + _named_units(model) + _proportions(model, float(pushed.max()))
-    warnings += [text for text in (poorest_cell(model.mesh), hanging_nodes_warning(model)) if text] + _coincident(model)
-    warnings += _friction(model) + _penetrating(model, pairs, pushed) + _unramped(model, ramp)
-    warnings += (
-        _prescribed_overlaps(pairs, supports) + _lost_loads(model) + _split_sides(model, pairs) + _wetted_twice(model)
-    )
-    return warnings + _stiffness(model.mesh) + [text for load in model.loads for text in _load_integral(model, load)]
+    texts = [*_moduli(model), *_named_units(model), *_proportions(model, float(pushed.max())), poorest_cell(model.mesh)]
+    texts += [hanging_nodes_warning(model), _coincident(model), *_friction(model), *_penetrating(model, pairs, pushed)]
+    texts += [*_unramped(model, ramp), *_prescribed_overlaps(pairs, supports), *_lost_loads(model)]
+    texts += [*_split_sides(model, pairs), *_wetted_twice(model), _stiffness(model.mesh)]
+    texts += [text for load in model.loads for text in _load_integral(model, load)]
+    return [text for text in texts if text]
 
 
 def _prescribed_overlaps(pairs: Pairs, supports: Supports) -> list[str]:
@@ -71,7 +70,7 @@ def _prescribed_overlaps(pairs: Pairs, supports: Supports) -> list[str]:
     return prescribed_overlap_warnings(supported, supports)
 
 
-def _split_sides(model: Model, pairs: Pairs) -> list[str]:
+def _split_sides(model: Model, pairs: Pairs) -> Iterator[str]:
     """Return a warning for each two contacts that continue each other."""
     touched = {
         pair.name: np.union1d(*(model.mesh.points_of(side) for side in (pair.secondary, pair.primary)))
@@ -85,57 +84,53 @@ def _split_sides(model: Model, pairs: Pairs) -> list[str]:
     )
 
 
-def _lost_loads(model: Model) -> list[str]:
+def _lost_loads(model: Model) -> Iterator[str]:
     """Return a warning for each load that only acts on prescribed components."""
     fixed, _ = model.prescribed()
-    texts = []
     for load in model.loads:
         forces = model.load_vector(load)
         total = float(np.abs(forces).sum())
         if total > 0.0 and float(np.abs(forces[~fixed]).sum()) <= ROUND_OFF * total:
-            texts.append(
+            yield (
                 f"{load.name} acts on {int(forces.any(axis=1).sum())} points whose displacement is prescribed in its "
                 "direction: all of it goes into the supports. Load other points, or leave out the support"
             )
-    return texts
 
 
-def _moduli(model: Model) -> list[str]:
+def _moduli(model: Model) -> Iterator[str]:
     """Compare the moduli with each other."""
     values = [value for material, _ in model.materials for value in material.young]
     ratio = max(values) / min(values)
-    if ratio <= MODULI:
-        return []
-    return [
-        f"Young's moduli differ by a factor of {ratio:.3g} (E = {min(values):g} and {max(values):g}): are both in the "
-        "same unit?"
-    ]
+    if ratio > MODULI:
+        yield (
+            f"Young's moduli differ by a factor of {ratio:.3g} (E = {min(values):g} and {max(values):g}): are both in the "
+            "same unit?"
+        )
 
 
-def _named_units(model: Model) -> list[str]:
+def _named_units(model: Model) -> Iterator[str]:
     """Compare moduli with those of solids, and the units with each other, if these are known."""
     units = model.units
-    pascal, texts = in_si(units, "pressure"), [text for text in [misfit(units)] if text]
+    yield misfit(units)
+    pascal = in_si(units, "pressure")
     if pascal is None:
-        return texts
+        return
     for material, groups in model.materials:
         low, high = (young * pascal for young in material.young)
         if low < SOLIDS[0] or high > SOLIDS[1]:
             E, limit, quantity = (high, SOLIDS[1], "diamond") if high > SOLIDS[1] else (low, SOLIDS[0], "aerogel")
             where = "all cells" if groups is None else ", ".join(f"'{group}'" for group in groups)
-            texts.append(
+            yield (
                 f"Young's modulus E = {E / pascal:g} {units['pressure']} of {where} is {E / limit:.3g} times that of "
                 f"{quantity}: is it in another unit?"
             )
-    return texts
 
 
-def _proportions(model: Model, moved: float) -> list[str]:
+def _proportions(model: Model, moved: float) -> Iterator[str]:
     """Compare prescribed displacements with the size of the model, and loads with its stiffness."""
     size = float(np.ptp(model.mesh.points, axis=0).max())
-    texts = []
     if moved > DISPLACED * size:
-        texts.append(
+        yield (
             f"a displacement of {moved:g} is prescribed, {moved / size:.3g} times the size of the model ({size:g}): are "
             "mesh and displacement in the same unit?"
         )
@@ -144,11 +139,10 @@ def _proportions(model: Model, moved: float) -> list[str]:
     stiffness = min(material.young[0] for material, _ in model.materials) * size * depth
     strain = max(forces, default=0.0) / stiffness
     if strain > STRAINED or 0.0 < strain < UNSTRAINED:
-        texts.append(
+        yield (
             f"the loads strain the model by about {strain:.2g} (all forces over E times its size squared): are loads, "
             "lengths and E in one set of units?"
         )
-    return texts
 
 
 def _pushed(supports: Supports) -> Array:
@@ -163,7 +157,7 @@ def _peak(ramp: Table | None) -> float:
     return 1.0 if ramp is None else max(abs(value) for _, value in ramp)
 
 
-def _coincident(model: Model) -> list[str]:
+def _coincident(model: Model) -> str:
     """Return a warning if nodes of solid cells nearly coincide without a contact or constraint between them."""
     mesh, size = model.mesh, float(np.ptp(model.mesh.points, axis=0).max())
     edge = np.full(mesh.n_points, np.inf)  # the shortest one at each node on the outside of a body, where cracks lie
@@ -183,15 +177,15 @@ def _coincident(model: Model) -> list[str]:
     pairs, apart = pairs[near], apart[near]
     count = len(np.unique(pairs[:, 1]))
     if count < mesh.dim:  # bodies that touch only at a corner
-        return []
+        return ""
     first = pairs[np.lexsort(mesh.points[pairs[:, 0]].T)[0]]
     point = ", ".join(f"{x:.6g}" for x in mesh.points[first[0]])
     largest = float(apart.max())
     where = "where another one is" if largest <= LENGTH_ROUND_OFF * size else f"within {largest:.3g} of another one"
-    return [
+    return (
         f"{count} nodes lie {where}, and no contact joins them (first: points {first[0]} and {first[1]} at ({point})): merge "
         "them in the mesher or with generate.transform.merge_points, or define the contact"
-    ]
+    )
 
 
 def _wetted_twice(model: Model) -> list[str]:
@@ -219,9 +213,8 @@ def _friction(model: Model) -> list[str]:
     ]
 
 
-def _penetrating(model: Model, pairs: Pairs, pushed: Array) -> list[str]:
+def _penetrating(model: Model, pairs: Pairs, pushed: Array) -> Iterator[str]:
     """Return a warning for each contact whose sides penetrate by more than motions (dim,) push before they do [length]."""
-    texts = []
     for pair, bound in pairs:
         motion = pushed if not any(pair.motion) else np.maximum(pushed, _peak(pair.ramp) * np.abs(pair.motion))
         if not motion.any():
@@ -233,20 +226,19 @@ def _penetrating(model: Model, pairs: Pairs, pushed: Array) -> list[str]:
         if -gap[row] > along[row]:
             point = bound.secondary.points[row]
             driver = "supports push" if motion is pushed else "motions push"
-            texts.append(
+            yield (
                 f"contact '{pair.name}' begins with a penetration of {-gap[row]:.4g} at point {point} "
                 f"{np.array2string(model.mesh.points[point], precision=4)}, more than the {np.abs(normal[row]) @ motion:.4g} "
                 f"that {driver} along its normal: "
                 "forces are those of the penetration. Move a body apart, or give an interference that is meant as clearance"
             )
-    return texts
 
 
-def _unramped(model: Model, ramp: Ramp) -> list[str]:
+def _unramped(model: Model, ramp: Ramp) -> Iterator[str]:
     """Return a warning if some loads have their own histories, and others exceed their given values with the ramp."""
     top = max(ramp.value(instant) for instant in ramp.instants)
     if top <= 1.0 or len(ramp.table) > 2:
-        return []
+        return
     items: list[Any] = [*(s for s in model.supports if s.value), *model.loads, *model.temperatures]
     ramps = [(item.name, item.ramp) for item in items]
     ramps += [(f"the motion of obstacle '{pair.name}'", pair.ramp) for pair in model.contact if any(pair.motion)]
@@ -254,17 +246,16 @@ def _unramped(model: Model, ramp: Ramp) -> list[str]:
     ramps += [(f"the rotation of '{group}'", own) for group, own in turning.items()]
     ramps += [(f"the force on obstacle '{pair.name}'", pair.ramp) for pair in model.contact if any(pair.force)]
     without = [name for name, own in ramps if own is None]
-    if not without or len(without) == len(ramps):
-        return []
-    return [
-        f"{', '.join(without)} {'has' if len(without) == 1 else 'have'} no ramp, as others have: at load factor {top:g} "
-        f"{'it is' if len(without) == 1 else 'they are'} {top:g} times what was given; to hold it from 1 on give "
-        f"ramp=[(0, 0), (1, 1), ({top:g}, 1)]"
-    ]
+    if 0 < len(without) < len(ramps):
+        yield (
+            f"{', '.join(without)} {'has' if len(without) == 1 else 'have'} no ramp, as others have: at load factor {top:g} "
+            f"{'it is' if len(without) == 1 else 'they are'} {top:g} times what was given; to hold it from 1 on give "
+            f"ramp=[(0, 0), (1, 1), ({top:g}, 1)]"
+        )
 
 
 @remembered
-def _stiffness(mesh: Mesh) -> list[str]:
+def _stiffness(mesh: Mesh) -> str:
     """Return a warning if the quadrature of the stiffness is inexact on curved or distorted cells.
 
     The measure is the trace of the stiffness of a scalar field, the integral of all squared gradients of shape functions.
@@ -278,11 +269,11 @@ def _stiffness(mesh: Mesh) -> list[str]:
         coarse, fine = (_traces(corners, element, *rule) for rule in (element.quadrature, integration_rule(element)))
         off, total = off + float(np.abs(coarse - fine).sum()), total + float(fine.sum())
     if off <= STIFFNESS * total:
-        return []
-    return [
+        return ""
+    return (
         f"the quadrature of the stiffness is not exact on curved or distorted cells: it is off by {off / total:.2%} of the "
         "whole; use smaller cells, or better shaped ones"
-    ]
+    )
 
 
 def _traces(corners: Array, element: Element, xi: Array, weights: Array) -> Array:
@@ -296,7 +287,7 @@ def _some(cells: AnyArray) -> AnyArray:
     return cells[:: max(1, len(cells) // SOME)]
 
 
-def _load_integral(model: Model, load: Load) -> list[str]:
+def _load_integral(model: Model, load: Load) -> Iterator[str]:
     """Return a warning if a load that is a function varies too much within a cell for the quadrature of loads."""
     off = total = 0.0
     for value in (value for value in load.values if callable(value)):
@@ -305,12 +296,11 @@ def _load_integral(model: Model, load: Load) -> list[str]:
                 _integrals(model.mesh, element, _some(cells), value, load.name, finer) for finer in (False, True)
             )
             off, total = off + float(np.abs(coarse - fine).sum()), total + float(np.abs(fine).sum())
-    if off <= INTEGRAL * total:
-        return []
-    return [
-        f"{load.name} varies within single elements, so that its quadrature is not exact: it is off by {off / total:.2%} of "
-        "the whole; refine the mesh there"
-    ]
+    if off > INTEGRAL * total:
+        yield (
+            f"{load.name} varies within single elements, so that its quadrature is not exact: it is off by {off / total:.2%} "
+            "of the whole; refine the mesh there"
+        )
 
 
 def _loaded(model: Model, load: Load) -> Iterator[tuple[str, Numbers]]:

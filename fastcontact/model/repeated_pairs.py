@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 from typing import Any
 
@@ -79,29 +79,27 @@ def _moved(pair: ContactPair) -> tuple[Any, ...]:
     return pair.motion, pair.ramp, pair.rotation, pair.rotation_ramp
 
 
-def split_side_warnings(pairs: Sequence[tuple[ContactPair, Formulation]]) -> list[str]:
-    """Return a warning for each two pairs whose sides continue each other at common nodes, on both bodies.
+def split_side_warnings(pairs: Sequence[tuple[ContactPair, Formulation]]) -> Iterator[str]:
+    """Yield a warning for each two pairs whose sides continue each other at common nodes, on both bodies.
 
     Each pair has its own pressure at such a node, but only the sum of both follows from the gap: its division, also over the
     neighbours, is arbitrary. Node-to-segment contact divides the force of a node by areas, which is correct if both
     pairs have the same primary side; if that is divided, too, each pair faces a part of it only.
     """
-    texts = []
-    for (one, first), (other, second) in combinations(pairs, 2):
-        if not isinstance(first.primary, Surface) or not isinstance(second.primary, Surface):
+    for (one, ours), (other, theirs) in combinations(pairs, 2):
+        if not isinstance(ours.primary, Surface) or not isinstance(theirs.primary, Surface):
             continue
         if {one.formulation, other.formulation} == {"node_to_segment"} and one.primary == other.primary:
             continue
         roles = ((second.secondary, second.primary), (second.primary, second.secondary))
         for secondary, primary in roles:
-            nodes = _common(first.points, first.secondary, secondary)
-            if len(nodes) and len(_common(first.points, first.primary, primary)):
-                texts.append(
+            nodes = _common(ours.points, ours.secondary, secondary)
+            if len(nodes) and len(_common(ours.points, ours.primary, primary)):
+                yield (
                     f"contacts '{one.name}' and '{other.name}' go on in each other at {len(nodes)} common nodes of their "
                     f"sides (first: point {nodes[0]}): the pressure near these is not unique; make one contact of both, "
                     "with one group for each side"
                 )
-    return texts
 
 
 def _common(points: Array, side: Surface, other: Surface) -> Numbers:
