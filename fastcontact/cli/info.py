@@ -125,7 +125,7 @@ def _result_lines(results: Any) -> Iterator[str]:
         closed = ", ".join(f"{name}: {int(c.active.sum())} nodes closed" for name, c in step.contact.items())
         counts = step.iterations
         yield (
-            f"  step {step.index:>3}  load factor {step.load_factor:<8.5g} geometry updates "
+            f"  step {step.index:>3}  {step.instant:<20} geometry updates "
             f"{counts.get('geometry_updates', 0):>3}  active-set iterations "
             f"{counts.get('active_set_iterations', 0):>3}  linear {counts.get('linear_iterations', 0):>4}  {closed}"
         )

@@ -91,7 +91,7 @@ def split_side_warnings(pairs: Sequence[tuple[ContactPair, Formulation]]) -> Ite
             continue
         if {one.formulation, other.formulation} == {"node_to_segment"} and one.primary == other.primary:
             continue
-        roles = ((second.secondary, second.primary), (second.primary, second.secondary))
+        roles = ((theirs.secondary, theirs.primary), (theirs.primary, theirs.secondary))
         for secondary, primary in roles:
             nodes = _common(ours.points, ours.secondary, secondary)
             if len(nodes) and len(_common(ours.points, ours.primary, primary)):
