@@ -45,8 +45,8 @@ PATIENCE, FALL = 12, 0.5
 HELD = 5e-5, 1e-3
 # The contact geometry of the linearised bodies converges to this fraction of the last relative change of the displacement.
 FORCING = 1e-3
-# Relative error of the displacement at which iterations end. Changes that may be round-off (`scatter`), and do not decrease to
-# the fraction STAYS of the previous one, are: it is this large in slender bodies.
+# Relative error of the displacement at which iterations end. Changes that may be round-off (`scatter`), and do not decrease
+# to the fraction STAYS of the previous one, are: it is this large in slender bodies.
 UNCHANGED, STAYS = 1e-10, 0.3
 
 
