@@ -6,6 +6,8 @@ import numpy as np
 
 from fastcontact.arrays import Array, Indices
 
+# Number of earlier iterates that are mixed into the next one.
+DEPTH = 5
 # Changes of the residual are dependent if their directions agree to more than this.
 DEPENDENT = 1e-8
 

@@ -9,7 +9,7 @@ from typing import NoReturn
 import numpy as np
 
 from fastcontact._jit.norms_kernels import largest, largest_difference
-from fastcontact.analysis.anderson import Anderson
+from fastcontact.analysis.anderson import DEPTH, Anderson
 from fastcontact.analysis.convergence_messages import active_set_cycles, geometry_moves, nearest_nodes
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.geometry_newton import newton_step
@@ -27,8 +27,6 @@ from fastcontact.errors import ConvergenceError
 log = logging.getLogger("fastcontact")
 # One active-set iteration per pairing is cheapest near the solution but may cycle; after this many, the set converges first.
 SEMISMOOTH_UPDATES = 8
-# Number of earlier geometries that are mixed into the next one.
-MIXED = 5
 # Pairings after which an iteration begins again from elsewhere, or with rounded edges: nodes flip between facets.
 PATIENT_UPDATES = 25
 
@@ -138,7 +136,7 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
     if iterate.history:  # already started: no extrapolation
         plan = replace(plan, extrapolate=False)
     tolerances = Tolerances(problem.solver, problem.criteria, plan.extrapolate, step.state.gap_round_off, expected)
-    mixing, watch = _Mixing(Anderson(MIXED, step.dofs.compared, problem.solver.iterative), plan.newton), Watch()
+    mixing, watch = _Mixing(Anderson(DEPTH, step.dofs.compared, problem.solver.iterative), plan.newton), Watch()
     if plan.extrapolate:
         iterate.u = extrapolation.displacement(iterate.u)
     for update in range(plan.limit + 1):

@@ -25,8 +25,6 @@ from fastcontact.contact.linearised_geometry import Linearised
 
 # Relative residual of the change, and the largest number of iterations.
 ACCURACY, MOST = 1e-6, 20
-# Largest response relative to the change: far from the solution, larger steps do not converge.
-FARTHEST = 1.0
 
 
 def newton_step(
@@ -73,7 +71,8 @@ def newton_step(
     system = LinearOperator((len(changed),) * 2, matvec=along, dtype=float)
     size = largest(changed) or 1.0
     v, _ = gmres(system, changed / size, rtol=ACCURACY, atol=0.0, restart=MOST, maxiter=1)
-    if not largest_difference(size * v, changed) <= FARTHEST * size:
+    # Far from the solution a step in which the response adds more than the change itself leads anywhere.
+    if not largest_difference(size * v, changed) <= size:
         return None
     mixed = image.copy()
     mixed[where] = before[where] + size * v

@@ -73,4 +73,4 @@ def _floating(
         motions = turned if len(turned) == len(motions) else motions
     before = problem.floating_bodies.dofs if rigid is None else rigid.dofs
     relative_stiffness = STIFF if stiff else floating_stiffness(problem.solver)
-    return FloatingBodies(motions, system, system.involved(problem.contact_dofs), relative_stiffness, before)
+    return FloatingBodies(motions, system, relative_stiffness, before)

@@ -24,6 +24,7 @@ from fastcontact.analysis.inequalities import StepContext
 from fastcontact.analysis.iterate import Iterate
 from fastcontact.analysis.linearisation import linearised, load_about
 from fastcontact.analysis.problem import Problem, StepLoad
+from fastcontact.analysis.scatter import DISPLACEMENT
 from fastcontact.analysis.state import State
 from fastcontact.analysis.step_equilibrium import StepEquilibrium
 from fastcontact.analysis.terms import Fluid, Terms
@@ -45,9 +46,9 @@ PATIENCE, FALL = 12, 0.5
 HELD = 5e-5, 2e-4, 1e-3
 # The contact geometry of the linearised bodies converges to this fraction of the last relative change of the displacement.
 FORCING = 1e-3
-# Relative error of the displacement at which iterations end. Changes below SCATTER that do not decrease to the fraction STAYS
-# of the previous one are round-off, which is this large in slender bodies.
-UNCHANGED, SCATTER, STAYS = 1e-10, 1e-6, 0.3
+# Relative error of the displacement at which iterations end. Changes that may be round-off (`scatter`), and do not decrease
+# to the fraction STAYS of the previous one, are: it is this large in slender bodies.
+UNCHANGED, STAYS = 1e-10, 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,7 +196,7 @@ class _Newton:
         """Return whether relative `changes` leave an error below the criterion, or are round-off."""
         before, last = changes[-2:]
         error = last * min(last / before, 1.0) if before else last
-        return error <= self._enough or (last <= SCATTER and last > STAYS * before)
+        return error <= self._enough or (last <= DISPLACEMENT and last > STAYS * before)
 
     def _serves_again(self, changes: list[float]) -> bool:
         """Return whether a second iteration with the last tangent is expected to be the last iteration.

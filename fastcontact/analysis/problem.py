@@ -307,7 +307,7 @@ def prepare(
     contact_dofs = _contact_dofs(mesh, pairs, len(driven))
     involved = system.involved(contact_dofs)
     motions = floating_motions(model, supported)
-    bodies = FloatingBodies(motions, system, involved, floating_stiffness(solver)) if len(motions) else None
+    bodies = FloatingBodies(motions, system, floating_stiffness(solver)) if len(motions) else None
     involved = prepare_solver(solver, system, bodies, driven.near_nullspace(near_nullspace(model)), involved)
     return Problem(
         model, ramp, criteria, solver, pairs, field, sides, system, bodies,

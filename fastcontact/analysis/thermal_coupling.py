@@ -14,7 +14,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact._jit.norms_kernels import largest, largest_difference
-from fastcontact.analysis.anderson import Anderson
+from fastcontact.analysis.anderson import DEPTH, Anderson
 from fastcontact.analysis.balance import Balance
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.heat import Temperatures
@@ -34,8 +34,8 @@ from fastcontact.results.step import StepResult
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 Solve = Callable[[StepLoad, StepEquilibrium | None], StepEquilibrium]
-# Largest number of exchanges, and number of temperatures that are mixed.
-MOST_EXCHANGES, MIXED = 60, 8
+# Largest number of exchanges.
+MOST_EXCHANGES = 60
 # Accuracy of temperatures over the tolerance of linear solutions.
 SETTLED = 10.0
 
@@ -96,7 +96,7 @@ def settle_heat(
     ConvergenceError
         If temperatures and contact do not converge.
     """
-    heat, mixing = problem.heat, Anderson(MIXED, np.arange(len(rise)))
+    heat, mixing = problem.heat, Anderson(DEPTH, np.arange(len(rise)))
     assert heat is not None
     enough = max(problem.criteria.geometry, SETTLED * heat.linear_tolerance)
     change = np.inf

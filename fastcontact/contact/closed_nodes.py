@@ -15,7 +15,7 @@ from fastcontact.arrays import Array, Mask
 from fastcontact.contact.surface import Surface
 from fastcontact.round_off import SUM_ROUND_OFF
 
-# A node with less than this fraction of the mean area receives no share: its pressure would be arbitrary.
+# Less than this fraction of an area counts as none: a node would have any pressure, a multiplier next to no equation.
 NO_AREA = 1e-3
 
 

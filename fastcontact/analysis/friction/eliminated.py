@@ -17,9 +17,11 @@ from fastcontact.analysis.friction.cone_newton import EXACT, Forces, newton
 from fastcontact.analysis.friction.coulomb_law import Law
 from fastcontact.analysis.friction.slip_directions import GIVING, aligning, compliance_of_rows, idle
 from fastcontact.analysis.solution import Accuracy
+from fastcontact.analysis.tolerances import RESIDUAL
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.errors import ConvergenceError
+from fastcontact.linear.choice import LOOSEST
 from fastcontact.linear.protocol import MILD, FrictionTerms, LoadedNonsymmetric
 from fastcontact.linear.sparse_rows import scaled, taken
 from fastcontact.linear.springs import Springs
@@ -36,10 +38,6 @@ SOFTER = 0.2
 # Tolerance of the residual of the friction law over that of the linear solutions; and the tolerance after PATIENCE steps:
 # contact forces that are a small fraction of all forces are no more accurate.
 ENOUGH, ACCEPTABLE, PATIENCE = 10.0, 300.0, 12
-# Forcing term of the inexact Newton method: the accuracy of a step over the residual of the friction law, at most LOOSEST,
-# because looser steps change the directions of slips that hardly move. A step less than LOOSER times as loose as the last one
-# saves nothing and is solved exactly. The last step is exact.
-FORCING, LOOSEST, LOOSER = 0.03, 1e-3, 1e3
 
 
 def solve(
@@ -198,13 +196,16 @@ class Eliminated:
         return self.reached, self._scaled(self._gaps(u, new))
 
     def _accuracy(self, y: Array, gaps: Array) -> float:
-        """Return the relative residual of the linear solution of a step from forces `y` and `gaps`, see FORCING."""
+        """Return the relative residual of the linear solution of a step from forces `y` and `gaps`.
+
+        Steps follow the residual of the friction law, as the solutions of pairings do, up to LOOSEST: looser steps change the
+        directions of slips that hardly move. The last step is exact.
+        """
         if not self._inexact:
             return self._tolerance
         size = float(np.abs(y).max(initial=0.0))
         off = float(np.abs(self.law.residual(y, gaps)).max(initial=0.0))
-        worth = min(FORCING * off / size, LOOSEST) if size else LOOSEST
-        return worth if worth > LOOSER * self._tolerance else self._tolerance
+        return max(self._tolerance, min(RESIDUAL * off / size, LOOSEST) if size else LOOSEST)
 
     def finish(self) -> bool:
         """Make further steps exact; return whether the last one was inexact."""

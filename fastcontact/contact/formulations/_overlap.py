@@ -16,9 +16,6 @@ from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.mesh import elements
 
-# Facets of which a smaller fraction of the area faces the other side are left out: their multipliers would be undetermined.
-LEAST = 1e-3
-
 
 @dataclass(frozen=True, eq=False)
 class Coupling:

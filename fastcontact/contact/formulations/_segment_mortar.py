@@ -16,11 +16,11 @@ from typing import ClassVar
 import numpy as np
 
 from fastcontact.arrays import Array, Indices
+from fastcontact.contact.closed_nodes import NO_AREA
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations._cut_lines import line_points
 from fastcontact.contact.formulations._determined_field import WholeFacets, determined
-from fastcontact.contact.formulations._overlap import LEAST
 from fastcontact.contact.formulations._pressure_field import PressureField, PressureFieldFormulation
 from fastcontact.contact.integration import facet_measure
 from fastcontact.contact.pairing import Candidates
@@ -77,7 +77,7 @@ class SegmentMortar(PressureFieldFormulation):
         paired = np.repeat(faced.paired.reshape(-1, n_gauss).mean(axis=1) > 0.5, n_gauss)
         total = np.bincount(facet, weights=area)
         covered = np.bincount(facet, weights=np.where(paired, area, 0.0))
-        kept = paired & (covered > LEAST * total)[facet] & (area > 0) & ~self.options.out(candidates)
+        kept = paired & (covered > NO_AREA * total)[facet] & (area > 0) & ~self.options.out(candidates)
         pairing = replace(faced, paired=kept)
         field = self._pressure_field(facet, shape, np.where(kept, area, 0.0), area)
         return self.of_points(candidates, pairing, field, at)

@@ -25,19 +25,21 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Mask
+from fastcontact.contact.closed_nodes import NO_AREA
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints, NodalField
 from fastcontact.contact.formulations._cut_faces import face_overlap
 from fastcontact.contact.formulations._cut_lines import line_overlap
 from fastcontact.contact.formulations._dual_basis import COVERED, dual_functions, positive
 from fastcontact.contact.formulations._formulation import Formulation
-from fastcontact.contact.formulations._overlap import LEAST, Overlap, obstacle_overlap
+from fastcontact.contact.formulations._overlap import Overlap, obstacle_overlap
 from fastcontact.contact.integration import facet_measure, fine_rule, nodal_areas
 from fastcontact.contact.linearised_geometry import NodalNormals, Points, WeightedForces, faced
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.pairing import Candidates, Pairing, filled_up, pair, tangents
 from fastcontact.contact.prescribed_normals import Normals
 from fastcontact.contact.projection import facet_normals, nodal_normals, smooth_normals
+from fastcontact.contact.projection_kernels import BEYOND
 from fastcontact.errors import ContactError, unknown
 from fastcontact.linear.sparse_rows import Entries, rows_of, scaled
 from fastcontact.mesh import elements
@@ -46,8 +48,6 @@ from fastcontact.round_off import SINGLE_PRECISION, TINY
 MULTIPLIERS = ("standard", "dual")
 # A tangent of which a smaller fraction, squared, is free counts as held.
 FREE = 0.1
-# In facet lengths: points of facets in contact farther beyond the end of the primary side than this do not face it.
-BESIDE = 1.0
 
 
 @dataclass(eq=False)
@@ -180,7 +180,7 @@ class WeightedMortar(Formulation):
             shapes.append(np.tile(shape, (len(facets), 1)))
             first += area.size
         candidates = Candidates(filled_up(nodes), filled_up(shapes))
-        pairing = pair(candidates.positions(deformed), self.primary, deformed, BESIDE, "facet", at.pose)
+        pairing = pair(candidates.positions(deformed), self.primary, deformed, BEYOND, "facet", at.pose)
         rows, size = np.flatnonzero(pairing.paired), (len(multiplier), first)
         along = "facet" if self.normals == "secondary" else self.normals
         points = faced(candidates, pairing, rows, self.primary, deformed, along, at.pose, pairing.normal[rows])
@@ -315,10 +315,10 @@ class WeightedMortar(Formulation):
         for block, weights, full in zip(self.secondary.blocks, covered, self._whole, strict=True):
             np.add.at(total, block.local, weights)
             np.add.at(complete, block.local, full)
-        enough = total > (COVERED if self.multipliers == "dual" else LEAST) * complete
+        enough = total > (COVERED if self.multipliers == "dual" else NO_AREA) * complete
         for block, weights, full in zip(self.secondary.blocks, covered, self._whole, strict=True):
             # The overlap of a facet is not lost: where no node has a sufficient part, the node with the largest takes it.
-            lost = ~enough[block.local].any(axis=1) & (weights.sum(axis=1) > LEAST * full.sum(axis=1))
+            lost = ~enough[block.local].any(axis=1) & (weights.sum(axis=1) > NO_AREA * full.sum(axis=1))
             most = np.argmax(total[block.local[lost]], axis=1)
             rescued[block.local[lost][np.arange(len(most)), most]] = True
         return (enough | rescued) & (complete > 0.0)

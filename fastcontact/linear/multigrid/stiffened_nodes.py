@@ -20,9 +20,8 @@ from scipy.sparse.linalg import splu
 
 from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.linear.elimination.elimination import Elimination
+from fastcontact.round_off import SINGLE_PRECISION
 
-# Relative regularisation of constraints that are linearly dependent on the stiffened nodes.
-REPEATED = 1e-6
 # Unknowns follow the pivots if translations of their side move these by at least this fraction.
 LEAST = 0.3
 
@@ -52,7 +51,8 @@ class FreeMotions:
         self._moves = csr_array(self._yielding @ W.T)
         self._pulls = csr_array(self._moves.T)  # stored by rows for fast products
         compliance = csr_array(W @ self._moves)
-        shifted = compliance + diags_array(REPEATED * compliance.diagonal(), format="csr")
+        # Some are linearly dependent on the stiffened nodes, as far as the cycle's precision tells.
+        shifted = compliance + diags_array(SINGLE_PRECISION * compliance.diagonal(), format="csr")
         self._factors = splu(csc_array(shifted), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
 
     def correct(self, r: AnyArray, factor: float, step: AnyArray, x: AnyArray) -> None:

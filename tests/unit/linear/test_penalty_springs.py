@@ -245,16 +245,3 @@ def test_springs_alone_precondition_the_matrix_that_they_are_part_of(kind):
     S = B.T @ diags_array(np.full(6, 0.5)) @ B
     assert np.abs(bsr_array(K + S) @ u - f - B.T @ (0.5 * c)).max() < 1e-9
     assert solver.counters.iterations <= 30
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:.*raise its penalty")
-@pytest.mark.parametrize("element", ["hex20", "tet10"])
-@pytest.mark.parametrize("penalty", [1e3, 1e5])
-def test_stiff_penalties_of_standard_multipliers_on_quadratic_facets_need_no_factors(element, penalty):
-    """Factors that take over are told, and warnings are errors here."""
-    model = pressed(element, n=3, formulation="mortar", multipliers="standard", penalty=penalty)
-    one, other = (fc.solve(model, linear_solver=solver)[-1] for solver in ("direct", "amg"))
-    assert other.iterations["linear_iterations"] < 100
-    ours, theirs = one.contact["c"].force_vectors, other.contact["c"].force_vectors
-    assert np.abs(ours - theirs).max() <= 1e-7 * np.abs(ours).max()
